@@ -1,0 +1,191 @@
+"""The models of ``assignment.yaml``.
+
+Their docstrings and field descriptions are the documentation of the YAML; ``make docs``
+renders them.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, WithJsonSchema
+
+from grader.assignment.name import (
+    ID,
+    INTERFACE,
+    NODE,
+    TOPIC,
+    check_id,
+    interface_name,
+    namespace,
+    node_name,
+    package_name,
+    topic_name,
+)
+from grader.assignment.quantity import Duration, DurationOrZero
+from grader.assignment.source import Model
+
+
+def _pattern(pattern: str) -> WithJsonSchema:
+    """The rule for a name, for editors."""
+    return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$"})
+
+
+Id = Annotated[str, AfterValidator(check_id), _pattern(ID)]
+PackageName = Annotated[str, AfterValidator(package_name), _pattern(ID)]
+NodeName = Annotated[str, AfterValidator(node_name), _pattern(NODE)]
+Namespace = Annotated[str, AfterValidator(namespace), _pattern(rf"(/|{TOPIC})")]
+TopicName = Annotated[str, AfterValidator(topic_name), _pattern(TOPIC)]
+InterfaceName = Annotated[str, AfterValidator(interface_name), _pattern(INTERFACE)]
+
+Reliability = Literal["reliable", "best_effort"]
+Durability = Literal["volatile", "transient_local"]
+
+
+class Visibility(str, Enum):
+    """When a student gets to see a check."""
+
+    VISIBLE = "visible"
+    AFTER_DUE_DATE = "after_due_date"
+    AFTER_PUBLISHED = "after_published"
+    HIDDEN = "hidden"
+
+
+class Package(Model):
+    """A package that the student hands in."""
+
+    name: PackageName = Field(description="Name in package.xml.")
+    build_type: Literal["ament_python", "ament_cmake"] = Field(
+        "ament_python", description="Build type exported by package.xml."
+    )
+    depends: tuple[str, ...] = Field(
+        (), description="ROS packages that the solution needs; the starter package names them."
+    )
+    executables: tuple[str, ...] = Field(
+        (), description="Executables that `ros2 run` must find in the package."
+    )
+
+
+class Launch(Model):
+    """A process to start, as `ros2 run` would."""
+
+    executable: str = Field(description="Name of the executable (entry point).")
+    package: PackageName | None = Field(
+        None, description="Its package; may be left out where the assignment has only one."
+    )
+    name: NodeName | None = Field(None, description="Rename the node (`--ros-args -r __node:=`).")
+    namespace: Namespace | None = Field(
+        None, description="Namespace of the node (`--ros-args -r __ns:=`)."
+    )
+    parameters: dict[str, Any] = Field(
+        default_factory=dict, description="Parameters (`--ros-args -p name:=value`)."
+    )
+    remap: dict[str, str] = Field(
+        default_factory=dict, description="Remapping rules (`--ros-args -r from:=to`)."
+    )
+    arguments: tuple[str, ...] = Field((), description="Arguments of the program itself.")
+
+
+class RecordedTopic(Model):
+    """A topic that the probe subscribes to, with the QoS that the probe requests."""
+
+    topic: TopicName = Field(description="Fully qualified topic name.")
+    type: InterfaceName = Field(description="Interface, such as geometry_msgs/msg/Twist.")
+    reliability: Reliability = Field(
+        "reliable",
+        description="Requested reliability. A publisher that does not match it is still "
+        "recorded through a second, best-effort subscription.",
+    )
+    durability: Durability = Field("volatile", description="Requested durability.")
+    depth: int = Field(100, ge=1, le=10_000, description="Queue depth of the probe.")
+
+
+class ListParameters(Model):
+    """Call the parameter service `list_parameters` of every node of the student.
+
+    It answers only while the node's executor spins, and so shows from outside whether a
+    callback blocks the executor.
+    """
+
+    call: Literal["list_parameters"] = Field(description="Always `list_parameters`.")
+    every: Duration = Field(description="Time between two calls to one node.")
+
+
+class Until(Model):
+    """When the observation may end early: as soon as everything that is named here holds.
+
+    The clock of `elapsed` and `quiet` starts with the first match of an endpoint, never with
+    the launch, so that a slow start costs nobody a point.
+    """
+
+    messages: int | None = Field(
+        None, ge=1, description="So many messages on every recorded topic."
+    )
+    quiet: Duration | None = Field(
+        None,
+        description="No message on any recorded topic for so long, and every timer that the "
+        "process declared has had the time to fire.",
+    )
+    elapsed: Duration | None = Field(None, description="So long since the first match.")
+
+
+class Scenario(Model):
+    """One run: what is launched, what is recorded, when it ends."""
+
+    id: Id = Field(description="Short name, unique in the assignment.")
+    title: str = Field("", description="What happens in it, for the report.")
+    launch: tuple[Launch, ...] = Field(min_length=1, description="Processes of the student.")
+    record: tuple[RecordedTopic, ...] = Field((), description="Topics to record.")
+    stimuli: tuple[ListParameters, ...] = Field((), description="What the probe does meanwhile.")
+    until: Until = Field(default_factory=Until, description="When to end early.")
+    timeout: Duration = Field(description="End of the observation, counted from the first match.")
+    discovery: Duration = Field(
+        10.0,
+        description="How long the first node may take to appear; time that the host took "
+        "from it is not counted.",
+        validate_default=False,
+    )
+    shutdown: DurationOrZero = Field(
+        2.0,
+        description="How long the node may take to end after SIGINT before it gets SIGTERM.",
+        validate_default=False,
+    )
+
+
+class CheckSpec(Model):
+    """A check with its points."""
+
+    id: Id = Field(description="Short name, unique in the assignment.")
+    title: str = Field("", description="One line for the student; by default the check's own.")
+    uses: str | None = Field(None, description="Name of a check in the catalogue.")
+    python: str | None = Field(
+        None, description="An own check: `file.py:function`, beside assignment.yaml."
+    )
+    with_: dict[str, Any] = Field(
+        default_factory=dict, alias="with", description="Parameters of the check."
+    )
+    scenarios: tuple[Id, ...] = Field(
+        (),
+        description="Scenarios whose recordings it judges; by default all. Checks of the "
+        "submission itself have none.",
+    )
+    points: float = Field(ge=0, description="Points for passing.")
+    requires: tuple[Id, ...] = Field(
+        (), description="Checks that must have passed; otherwise this one is skipped."
+    )
+    hint: str = Field("", description="What to try when it fails, in the author's words.")
+    visibility: Visibility = Field(
+        Visibility.VISIBLE, description="When the student gets to see it."
+    )
+
+
+class Assignment(Model):
+    """A lesson's assignment: `assignments/<id>/assignment.yaml`."""
+
+    rosgrade: Literal[1] = Field(description="Version of this format.")
+    id: Id = Field(description="Name of the assignment and of its folder.")
+    title: str = Field(description="One line for people.")
+    packages: tuple[Package, ...] = Field(min_length=1, description="What is handed in.")
+    scenarios: tuple[Scenario, ...] = Field((), description="The runs.")
+    checks: tuple[CheckSpec, ...] = Field(min_length=1, description="What is judged.")

@@ -1,0 +1,88 @@
+"""Rules for names: ids of ours, and names of ROS (REP-144, the ROS 2 topic name design).
+
+Sources: https://ros.org/reps/rep-0144.html,
+https://design.ros2.org/articles/topic_and_service_names.html
+"""
+
+from __future__ import annotations
+
+import re
+
+ID = r"[a-z][a-z0-9_]*"
+TOPIC = r"(/[A-Za-z_][A-Za-z0-9_]*)+"
+NODE = r"[A-Za-z_][A-Za-z0-9_]*"
+INTERFACE = r"[a-z][a-z0-9_]*/(msg|srv|action)/[A-Z][A-Za-z0-9]*"
+
+
+def check_id(name: str) -> str:
+    """An id of ours: lower case letters, digits and underscores.
+
+    Raises:
+        ValueError: It is anything else.
+    """
+    if not re.fullmatch(ID, name):
+        raise ValueError(f"{name!r} is not an id: use lower case letters, digits and underscores")
+    return name
+
+
+def package_name(name: str) -> str:
+    """A package name (REP-144).
+
+    Raises:
+        ValueError: It is not one.
+    """
+    if not re.fullmatch(ID, name):
+        raise ValueError(
+            f"{name!r} is not a package name: lower case letters, digits and underscores, "
+            "beginning with a letter (REP-144)"
+        )
+    return name
+
+
+def topic_name(name: str) -> str:
+    """A fully qualified topic or service name.
+
+    Raises:
+        ValueError: It is relative, or has characters that ROS does not allow.
+    """
+    if not name.startswith("/"):
+        raise ValueError(f"{name!r} is relative: write the full name, '/{name}'")
+    if not re.fullmatch(TOPIC, name) or "__" in name:
+        raise ValueError(f"{name!r} is not a ROS topic name: letters, digits, '_' and '/'")
+    return name
+
+
+def node_name(name: str) -> str:
+    """A node name without its namespace.
+
+    Raises:
+        ValueError: It is not one.
+    """
+    if not re.fullmatch(NODE, name):
+        raise ValueError(
+            f"{name!r} is not a node name: letters, digits and underscores, not beginning "
+            "with a digit"
+        )
+    return name
+
+
+def namespace(name: str) -> str:
+    """A namespace, which begins with a slash; ``/`` is the root.
+
+    Raises:
+        ValueError: It is relative, or has characters that ROS does not allow.
+    """
+    return name if name == "/" else topic_name(name)
+
+
+def interface_name(name: str) -> str:
+    """An interface name such as ``geometry_msgs/msg/Twist``.
+
+    Raises:
+        ValueError: It has another form.
+    """
+    if not re.fullmatch(INTERFACE, name):
+        short = re.fullmatch(r"([a-z][a-z0-9_]*)/([A-Z][A-Za-z0-9]*)", name)
+        remedy = f" Did you mean '{short[1]}/msg/{short[2]}'?" if short else ""
+        raise ValueError(f"{name!r} is not an interface name (package/msg/Type).{remedy}")
+    return name

@@ -1,0 +1,145 @@
+"""A YAML file read with the line of every value, so that each error can name its place."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from grader.assignment.document import Place, parse_yaml, path
+from grader.assignment.mistake import Mistake, mistakes
+from grader.errors import AssignmentError, Problem, UsageError
+
+M = TypeVar("M", bound=BaseModel)
+
+MAX_BYTES = 256 * 1024
+
+
+class Model(BaseModel):
+    """Base of everything read from YAML: frozen, and unknown keys are errors."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        populate_by_name=True,
+        protected_namespaces=(),
+        allow_inf_nan=False,
+    )
+
+
+@dataclass(frozen=True)
+class Source:
+    """A YAML document with its positions.
+
+    Attributes:
+        file: Where it was read from.
+        data: Plain dicts, lists and scalars; a dict at the top.
+        lines: Line (from 1) of each value and, for a mapping entry, of its key.
+    """
+
+    file: Path
+    data: dict[str, Any]
+    lines: dict[Place, int]
+
+    def line(self, place: Place) -> int | None:
+        """Line of a place, or of the nearest enclosing place that was written down."""
+        for end in range(len(place), -1, -1):
+            if place[:end] in self.lines:
+                return self.lines[place[:end]]
+        return None
+
+    def problem(self, place: Place, message: str) -> Problem:
+        """A problem at a place of this document."""
+        return Problem(message=message, line=self.line(place), where=path(place))
+
+    def entries(self, key: str) -> list[Any]:
+        """The list under a key at the top, or an empty one where there is no list."""
+        value = self.data.get(key)
+        return value if isinstance(value, list) else []
+
+    def read(self, model: type[M], place: Place = ()) -> M:
+        """Validate the document, or a part of it, as a model.
+
+        Args:
+            model: The pydantic model.
+            place: The part to read; a part that was not written down reads as empty.
+
+        Raises:
+            AssignmentError: With every problem that was found.
+        """
+        result, problems = self.examine(model, place)
+        if result is None:
+            raise AssignmentError(self.file, problems)
+        return result
+
+    def examine(self, model: type[M], place: Place = ()) -> tuple[M | None, list[Problem]]:
+        """Validate like :meth:`read`, but hand the problems back.
+
+        Returns:
+            The model and no problem, or None and at least one.
+        """
+        # Strict in the way of JSON: a list is a tuple and a word is an enum's member, but true
+        # is no number and '3' neither. By alias only: the name in Python is no key of the YAML.
+        text = json.dumps(self._part(place))
+        try:
+            return model.model_validate_json(text, strict=True, by_alias=True, by_name=False), []
+        except ValidationError as error:
+            found = mistakes(error, model, lambda step: (*place, *step) in self.lines)
+        return None, _sorted([self._problem(place, mistake) for mistake in found])
+
+    def _part(self, place: Place) -> Any:
+        data: Any = self.data
+        for end, step in enumerate(place, start=1):
+            data = data[step] if place[:end] in self.lines else {}
+        return data
+
+    def _problem(self, place: Place, mistake: Mistake) -> Problem:
+        return self.problem((*place, *mistake.place), mistake.message)
+
+
+def _sorted(problems: list[Problem]) -> list[Problem]:
+    return sorted(dict.fromkeys(problems), key=lambda problem: problem.line or 0)
+
+
+def read_source(file: Path) -> Source:
+    """Read a YAML file.
+
+    Args:
+        file: The file to read.
+
+    Returns:
+        Its data with the line of every value.
+
+    Raises:
+        UsageError: The file does not exist or cannot be read.
+        AssignmentError: It is not YAML, has a key twice, or is absurdly large.
+    """
+    try:
+        with file.open("rb") as stream:
+            raw = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise UsageError(f"{file}: {error.strerror or error}") from error
+    if len(raw) > MAX_BYTES:
+        raise AssignmentError(file, [Problem(f"larger than {MAX_BYTES // 1024} KiB")])
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        text = f"not UTF-8 text ({error.reason}): save the file as UTF-8"
+        raise AssignmentError(file, [Problem(text, line)]) from error
+    return parse_source(text, file)
+
+
+def parse_source(text: str, file: Path) -> Source:
+    """Read YAML text; ``file`` is only named in errors.
+
+    Raises:
+        AssignmentError: As :func:`read_source`.
+    """
+    data, lines = parse_yaml(text, file)
+    if not isinstance(data, dict):
+        raise AssignmentError(file, [Problem("expected keys and values at the top", 1)])
+    return Source(file, data, lines)

@@ -1,0 +1,1 @@
+"""Checks: pure functions of what was recorded, a module per family."""

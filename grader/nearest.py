@@ -1,0 +1,27 @@
+"""The nearest of some names to a mistyped one: every "did you mean" comes from here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+def nearest(name: str, candidates: Iterable[str], *, cutoff: float = 0.6) -> str | None:
+    """Find the candidate that is most like ``name``.
+
+    Args:
+        name: What was written.
+        candidates: What would have been allowed.
+        cutoff: Least similarity in [0, 1], as in :func:`difflib.get_close_matches`.
+
+    Returns:
+        The nearest candidate, the alphabetically first of equals, or None.
+    """
+    matches = get_close_matches(name, sorted(set(candidates)), n=1, cutoff=cutoff)
+    return matches[0] if matches else None
+
+
+def did_you_mean(name: str, candidates: Iterable[str]) -> str:
+    """Make the sentence to append to an error, or nothing when no name is near."""
+    match = nearest(name, candidates)
+    return f" Did you mean {match!r}?" if match else ""

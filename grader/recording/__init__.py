@@ -1,0 +1,1 @@
+"""Everything observed in one run, and its MCAP file."""

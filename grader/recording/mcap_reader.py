@@ -1,0 +1,148 @@
+"""A recording from its MCAP file, checked at the edge."""
+
+from __future__ import annotations
+
+import array
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from pydantic import TypeAdapter, ValidationError
+
+from grader.errors import UsageError
+from grader.recording.mcap_writer import CHANNELS, FORMAT
+from grader.recording.model import (
+    Call,
+    Declaration,
+    Disturbance,
+    Endpoint,
+    LogLine,
+    Message,
+    Node,
+    Process,
+    Recording,
+    Wait,
+)
+from grader.submission.record import SubmissionRecord
+
+_FACTS: dict[str, type] = {
+    "nodes": Node,
+    "endpoints": Endpoint,
+    "processes": Process,
+    "log": LogLine,
+    "declarations": Declaration,
+    "calls": Call,
+    "waits": Wait,
+    "disturbance": Disturbance,
+}
+assert _FACTS.keys() == CHANNELS.keys()
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def read_recording(file: Path) -> Recording:
+    """Read a recording.
+
+    Args:
+        file: An MCAP file that :func:`~grader.recording.mcap_writer.write_recording` made.
+
+    Raises:
+        UsageError: The file is missing, damaged, or not a recording of rosgrade.
+    """
+    try:
+        with file.open("rb") as stream:
+            return _read(stream)
+    except OSError as error:
+        raise UsageError(f"{file}: {error.strerror or error}") from error
+    except _NotARecording as error:
+        raise UsageError(f"{file}: {error}") from error
+    except (McapError, ValidationError, ValueError, KeyError, EOFError) as error:
+        reason = str(error).partition("\n")[0]
+        raise UsageError(f"{file}: damaged recording: {reason}") from error
+
+
+class _NotARecording(Exception):
+    pass
+
+
+def _read(stream: Any) -> Recording:
+    reader = make_reader(stream)
+    frame = _frame(reader)
+    facts: dict[str, list[Any]] = {name: [] for name in CHANNELS}
+    messages: dict[str, list[Message]] = {}
+    factory = DecoderFactory()
+    for schema, channel, message in reader.iter_messages(log_time_order=False):
+        if channel.message_encoding == "json":
+            name = channel.topic.removeprefix("/rosgrade/")
+            if name in facts:
+                fact = _adapter(_FACTS[name]).validate_json(message.data)
+                facts[name].append((message.sequence, fact))
+            continue
+        decode = factory.decoder_for(channel.message_encoding, schema)
+        if decode is None or schema is None:
+            continue
+        messages.setdefault(channel.topic, []).append(
+            Message(
+                topic=channel.topic,
+                type=schema.name,
+                value=_fields(decode(message.data)),
+                stamp_ns=message.publish_time,
+                received_ns=message.log_time,
+                sequence=message.sequence,
+            )
+        )
+    ordered = {
+        name: tuple(fact for _, fact in sorted(items, key=lambda item: item[0]))
+        for name, items in facts.items()
+    }
+    return _adapter(Recording).validate_python(
+        {
+            **frame,
+            **ordered,
+            "submission": _submission(reader),
+            "messages": {
+                topic: tuple(sorted(items, key=lambda m: (m.stamp_ns, m.sequence)))
+                for topic, items in messages.items()
+            },
+        }
+    )
+
+
+def _frame(reader: Any) -> dict[str, Any]:
+    for record in reader.iter_metadata():
+        if record.name == "rosgrade":
+            frame = {key: json.loads(value) for key, value in record.metadata.items()}
+            if frame.pop("format", None) != FORMAT:
+                raise _NotARecording(f"made by another version of rosgrade (not format {FORMAT})")
+            return frame
+    raise _NotARecording("an MCAP file, but not a recording of rosgrade")
+
+
+def _submission(reader: Any) -> SubmissionRecord:
+    for attachment in reader.iter_attachments():
+        if attachment.name == "submission.json":
+            record: SubmissionRecord = _adapter(SubmissionRecord).validate_json(attachment.data)
+            return record
+    raise _NotARecording("the facts of the submission are missing")
+
+
+def _fields(value: Any) -> Any:
+    """Plain mappings and lists from what the CDR decoder made."""
+    if hasattr(value, "__slots__") and not isinstance(value, str | bytes | array.array):
+        return {name: _fields(getattr(value, name)) for name in value.__slots__}
+    if isinstance(value, SimpleNamespace):
+        return {name: _fields(item) for name, item in vars(value).items()}
+    if isinstance(value, Mapping):
+        return {name: _fields(item) for name, item in value.items()}
+    if isinstance(value, list | tuple | array.array):
+        return [_fields(item) for item in value]
+    return value

@@ -1,0 +1,164 @@
+"""A recording into an MCAP file that any MCAP reader opens.
+
+Messages of ROS keep their CDR bytes and get a ``ros2msg`` schema. Everything else is JSON:
+one channel per kind under ``/rosgrade/``, one message per fact; the submission's facts are
+the attachment ``submission.json``, the frame of the run is the metadata ``rosgrade``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mcap.writer import CompressionType, Writer
+
+from grader.recording.model import Recording
+
+FORMAT = "1"
+"""Version of the layout; a reader refuses another one."""
+
+CHANNELS: dict[str, str] = {
+    "nodes": "appeared_ns",
+    "endpoints": "appeared_ns",
+    "processes": "started_ns",
+    "log": "time_ns",
+    "declarations": "time_ns",
+    "calls": "requested_ns",
+    "waits": "began_ns",
+    "disturbance": "time_ns",
+}
+"""Field of the recording -> attribute that dates it, for the facts kept as JSON."""
+
+
+@dataclass(frozen=True)
+class RawMessage:
+    """A message as it came over DDS.
+
+    Attributes:
+        topic: Fully qualified name.
+        type: Interface name.
+        cdr: Serialized bytes with their encapsulation header.
+        stamp_ns: Source timestamp.
+        received_ns: When the reader had it.
+        sequence: The writer's sequence number.
+    """
+
+    topic: str
+    type: str
+    cdr: bytes
+    stamp_ns: int
+    received_ns: int
+    sequence: int
+
+
+def write_recording(
+    file: Path,
+    recording: Recording,
+    messages: Iterable[RawMessage],
+    definitions: Mapping[str, str],
+    submission: bytes | None = None,
+) -> None:
+    """Write a recording; the file appears whole or not at all.
+
+    Args:
+        file: Where to.
+        recording: What was observed; its own ``messages`` are ignored.
+        messages: The messages as bytes.
+        definitions: Concatenated definition of every type in ``messages``.
+        submission: The submission's facts as JSON, where the recording itself does not have
+            them (a cell passes them on unread).
+    """
+    temporary = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        with temporary.open("wb") as stream:
+            _write(
+                stream, recording, messages, definitions, submission or to_json(recording.submission)
+            )
+        temporary.replace(file)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _write(
+    stream: BinaryIO,
+    recording: Recording,
+    messages: Iterable[RawMessage],
+    definitions: Mapping[str, str],
+    submission: bytes,
+) -> None:
+    writer = Writer(stream, compression=CompressionType.ZSTD)
+    writer.start(profile="ros2", library="rosgrade")
+    writer.add_metadata("rosgrade", _frame(recording))
+    _write_messages(writer, messages, definitions)
+    schema = writer.register_schema("rosgrade", "jsonschema", b'{"type": "object"}')
+    for name, dated in CHANNELS.items():
+        facts = getattr(recording, name)
+        if not facts:
+            continue
+        channel = writer.register_channel(f"/rosgrade/{name}", "json", schema)
+        for number, fact in enumerate(facts):
+            time_ns = getattr(fact, dated)
+            writer.add_message(channel, time_ns, to_json(fact), time_ns, number)
+    writer.add_attachment(
+        recording.launched_ns,
+        recording.launched_ns,
+        "submission.json",
+        "application/json",
+        submission,
+    )
+    writer.finish()
+
+
+def _write_messages(
+    writer: Writer, messages: Iterable[RawMessage], definitions: Mapping[str, str]
+) -> None:
+    channels: dict[tuple[str, str], int] = {}
+    schemas: dict[str, int] = {}
+    for message in messages:
+        key = (message.topic, message.type)
+        if key not in channels:
+            if message.type not in schemas:
+                schemas[message.type] = writer.register_schema(
+                    message.type, "ros2msg", definitions[message.type].encode()
+                )
+            channels[key] = writer.register_channel(
+                message.topic, "cdr", schemas[message.type]
+            )
+        writer.add_message(
+            channels[key], message.received_ns, message.cdr, message.stamp_ns, message.sequence
+        )
+
+
+def _frame(recording: Recording) -> dict[str, str]:
+    frame = {
+        "format": FORMAT,
+        "scenario": recording.scenario,
+        "seed": recording.seed,
+        "ending": recording.ending.value,
+        "launched_ns": recording.launched_ns,
+        "matched_ns": recording.matched_ns,
+        "stop_ns": recording.stop_ns,
+        "end_ns": recording.end_ns,
+        "faults": list(recording.faults),
+        "environment": dict(recording.environment),
+    }
+    return {key: json.dumps(value, sort_keys=True) for key, value in frame.items()}
+
+
+def to_json(fact: Any) -> bytes:
+    """A dataclass of the model as compact JSON."""
+    return json.dumps(
+        dataclasses.asdict(fact), default=_plain, separators=(",", ":"), sort_keys=True
+    ).encode()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    raise TypeError(f"{type(value).__name__} is not a plain value")

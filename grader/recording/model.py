@@ -1,0 +1,342 @@
+"""The model of a recording: what was observed in one run of one scenario, nothing judged.
+
+Times are integer nanoseconds since the Unix epoch on the clock of the machine that ran the
+cell, the clock that DDS stamps messages with. Names are fully qualified (``/bot/cmd_vel``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from functools import cached_property
+from typing import Any
+
+from grader.submission.record import SubmissionRecord
+
+NS = 1_000_000_000
+
+
+class Owner(str, Enum):
+    """Whose a node or an endpoint is."""
+
+    STUDENT = "student"
+    PROBE = "probe"
+    FOREIGN = "foreign"
+
+
+class Kind(str, Enum):
+    """Which end of a topic an endpoint is."""
+
+    PUBLISHER = "publisher"
+    SUBSCRIPTION = "subscription"
+
+
+class Ending(str, Enum):
+    """Why the observation of a scenario ended."""
+
+    UNTIL = "until"
+    """The scenario's ``until`` was met."""
+    TIMEOUT = "timeout"
+    """The scenario's ``timeout`` passed first."""
+    EXITED = "exited"
+    """Every process of the student had ended."""
+    NO_NODE = "no_node"
+    """No node of the student appeared within the discovery limit."""
+    NO_MATCH = "no_match"
+    """Nodes appeared, but no endpoint on a recorded topic."""
+    NOT_STARTED = "not_started"
+    """Nothing could be launched: the executable does not exist."""
+    FAULT = "fault"
+    """Something of ours or of the machine ended it (see ``Recording.faults``)."""
+
+
+@dataclass(frozen=True)
+class Qos:
+    """QoS of an endpoint, in the words of the ROS docs; ``unknown`` where DDS does not tell.
+
+    Attributes:
+        reliability: ``reliable``, ``best_effort`` or ``unknown``.
+        durability: ``volatile``, ``transient_local`` or ``unknown``.
+        history: ``keep_last``, ``keep_all`` or ``unknown`` (not discovered over DDS).
+        depth: Queue depth, or None where unknown.
+        deadline_s: None for infinite.
+        lifespan_s: None for infinite.
+        liveliness: ``automatic``, ``manual_by_topic`` or ``unknown``.
+        liveliness_lease_s: None for infinite.
+    """
+
+    reliability: str = "unknown"
+    durability: str = "unknown"
+    history: str = "unknown"
+    depth: int | None = None
+    deadline_s: float | None = None
+    lifespan_s: float | None = None
+    liveliness: str = "unknown"
+    liveliness_lease_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Node:
+    """A node seen in the graph.
+
+    Attributes:
+        name: Fully qualified, such as ``/bot_publisher``.
+        owner: Whose it is.
+        appeared_ns: First time it was seen.
+        vanished_ns: First time it was missing again, or None.
+    """
+
+    name: str
+    owner: Owner
+    appeared_ns: int
+    vanished_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A publisher or subscription seen in the graph.
+
+    Attributes:
+        kind: Which end.
+        topic: Fully qualified topic name.
+        type: Interface name, such as ``geometry_msgs/msg/Twist``.
+        node: Fully qualified node name.
+        owner: Whose it is.
+        qos: As discovered.
+        gid: DDS identifier as hex.
+        appeared_ns: First time it was seen.
+        vanished_ns: First time it was missing again, or None.
+    """
+
+    kind: Kind
+    topic: str
+    type: str
+    node: str
+    owner: Owner
+    qos: Qos
+    gid: str
+    appeared_ns: int
+    vanished_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Message:
+    """A message as the probe received it.
+
+    Attributes:
+        topic: Fully qualified topic name.
+        type: Interface name.
+        value: Fields by name; nested messages are mappings, arrays are lists.
+        stamp_ns: Source timestamp: when the writer published it.
+        received_ns: When the probe's reader had it.
+        sequence: The writer's sequence number, from 1.
+    """
+
+    topic: str
+    type: str
+    value: Mapping[str, Any]
+    stamp_ns: int
+    received_ns: int
+    sequence: int
+
+
+@dataclass(frozen=True)
+class Process:
+    """One launched process of the student.
+
+    Attributes:
+        name: ``package/executable``.
+        pid: Process id on the host.
+        started_ns: When it was started.
+        exited_ns: When it had ended, or None if it could not be ended at all.
+        exit_code: As in :mod:`subprocess`: negative for the signal that ended it.
+        stopped_by: ``itself`` (before we asked), ``SIGINT``, ``SIGTERM`` or ``SIGKILL``:
+            the last signal of ours that was needed.
+        stop_s: Seconds from our SIGINT to its end, less what the host took; None if it
+            ended before.
+        survivors: Commands of descendants that were still there after it and had to be killed.
+        dropped_bytes: Bytes of output beyond what was kept.
+    """
+
+    name: str
+    pid: int
+    started_ns: int
+    exited_ns: int | None = None
+    exit_code: int | None = None
+    stopped_by: str = "itself"
+    stop_s: float | None = None
+    survivors: tuple[str, ...] = ()
+    dropped_bytes: int = 0
+
+
+@dataclass(frozen=True)
+class LogLine:
+    """A line that a process wrote, or a message on /rosout.
+
+    Attributes:
+        time_ns: When it was read (for rosout: the stamp in the message).
+        process: ``package/executable``, or the logger's name for rosout.
+        stream: ``stdout``, ``stderr`` or ``rosout``.
+        text: Without the line end; undecodable bytes are replaced.
+        level: For rosout ``DEBUG``, ``INFO``, ``WARN``, ``ERROR`` or ``FATAL``; else empty.
+    """
+
+    time_ns: int
+    process: str
+    stream: str
+    text: str
+    level: str = ""
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """Something that the tracer in the student's process reported.
+
+    It is *declared by the process* and never used where the wire can tell.
+
+    Attributes:
+        time_ns: When the probe read it.
+        process: ``package/executable``.
+        kind: ``started``, ``node``, ``publisher``, ``subscription``, ``timer``, ``spin``,
+            ``executor``, ``callback_group``, ``held`` (a publisher waited for its match).
+        data: For publisher and subscription: node, topic, type, reliability, durability,
+            history, depth. For timer: node, period_s, callback, group. For spin: executor,
+            threads. For held: topic, waited_s, matched.
+    """
+
+    time_ns: int
+    process: str
+    kind: str
+    data: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Call:
+    """A service call by the probe.
+
+    Attributes:
+        service: Fully qualified service name.
+        type: Interface name.
+        requested_ns: When the request was sent.
+        answered_ns: When the answer was there, or None if there was none by the end.
+    """
+
+    service: str
+    type: str
+    requested_ns: int
+    answered_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Wait:
+    """A bounded wait of the probe and how it ended.
+
+    Attributes:
+        what: Such as ``a publisher on /cmd_vel``.
+        limit_s: How long it would have lasted at most, host disturbance not counted.
+        began_ns: When it began.
+        met_ns: When it was met, or None.
+    """
+
+    what: str
+    limit_s: float
+    began_ns: int
+    met_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """One sample of what the host took from us since the sample before.
+
+    Attributes:
+        time_ns: When the sample was taken.
+        late_ns: How much later the probe's metronome woke up than it asked to.
+        waited_ns: How long threads of the student that were ready to run had to wait for a
+            CPU (the kernel's run delay, /proc/PID/schedstat), the worst thread.
+    """
+
+    time_ns: int
+    late_ns: int
+    waited_ns: int
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Everything observed in one run of one scenario.
+
+    Attributes:
+        scenario: Its id.
+        seed: What its random values were made from.
+        ending: Why the observation ended.
+        launched_ns: When the student's first process was started.
+        matched_ns: When the first endpoint of the student on a recorded topic was matched.
+        stop_ns: When the observation ended and SIGINT was sent.
+        end_ns: When everything had ended.
+        submission: What was known before the run.
+        messages: By topic, in the order of their source timestamps.
+        faults: What of ours or of the machine went wrong, one sentence each.
+        environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...
+    """
+
+    scenario: str
+    seed: int
+    ending: Ending
+    launched_ns: int
+    stop_ns: int
+    end_ns: int
+    submission: SubmissionRecord
+    matched_ns: int | None = None
+    messages: Mapping[str, tuple[Message, ...]] = field(default_factory=dict)
+    nodes: tuple[Node, ...] = ()
+    endpoints: tuple[Endpoint, ...] = ()
+    processes: tuple[Process, ...] = ()
+    log: tuple[LogLine, ...] = ()
+    declarations: tuple[Declaration, ...] = ()
+    calls: tuple[Call, ...] = ()
+    waits: tuple[Wait, ...] = ()
+    disturbance: tuple[Disturbance, ...] = ()
+    faults: tuple[str, ...] = ()
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+    def on(self, topic: str) -> tuple[Message, ...]:
+        """Messages on a topic, oldest first."""
+        return self.messages.get(topic, ())
+
+    @cached_property
+    def student_nodes(self) -> tuple[Node, ...]:
+        """The student's nodes, in the order of their appearance."""
+        return tuple(node for node in self.nodes if node.owner is Owner.STUDENT)
+
+    def student_endpoints(self, kind: Kind, topic: str | None = None) -> tuple[Endpoint, ...]:
+        """The student's endpoints of a kind, on one topic or on all."""
+        return tuple(
+            endpoint
+            for endpoint in self.endpoints
+            if endpoint.owner is Owner.STUDENT
+            and endpoint.kind is kind
+            and topic in (None, endpoint.topic)
+        )
+
+    def declared(self, kind: str) -> tuple[Declaration, ...]:
+        """Declarations of a kind."""
+        return tuple(item for item in self.declarations if item.kind == kind)
+
+    def since_launch_s(self, time_ns: int) -> float:
+        """Seconds from launch to a time."""
+        return (time_ns - self.launched_ns) / NS
+
+    def taken_s(self, begin_ns: int, end_ns: int) -> float:
+        """How much the host took from the run in ``[begin_ns, end_ns]``, at most.
+
+        The sum of the student's waits for a CPU and the worst lateness of the metronome, over
+        all samples that overlap the interval.
+        """
+        waited = late = 0
+        previous_ns = self.launched_ns
+        for sample in self.disturbance:
+            if sample.time_ns >= begin_ns and previous_ns <= end_ns:
+                waited += sample.waited_ns
+                late = max(late, sample.late_ns)
+            previous_ns = sample.time_ns
+        return (waited + late) / NS

@@ -1,0 +1,153 @@
+"""The ROS 2 installation that builds and runs students' packages.
+
+Either ROS 2 Jazzy is sourced in the shell, or it is the wheels beside this interpreter;
+which one is a pure function of the environment (:func:`find`).
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from grader.errors import GraderFault
+
+DISTRO = "jazzy"
+
+_KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "XDG_RUNTIME_DIR", "TMPDIR", "HOME", "USER")
+
+
+@dataclass(frozen=True)
+class RosInstallation:
+    """Where ROS is and how a child process gets to see it.
+
+    Attributes:
+        source: ``wheels`` or ``sourced``.
+        python: Interpreter that imports rclpy.
+        prefixes: ament prefixes, the first wins.
+        inherited: Variables that a sourced installation needs, taken from the environment.
+    """
+
+    source: str
+    python: Path
+    prefixes: tuple[Path, ...]
+    inherited: tuple[tuple[str, str], ...] = ()
+    distro: str = DISTRO
+
+    @cached_property
+    def packages(self) -> frozenset[str]:
+        """Names of all packages in the ament index."""
+        found: set[str] = set()
+        for prefix in self.prefixes:
+            index = prefix / "share/ament_index/resource_index/packages"
+            if index.is_dir():
+                found.update(entry.name for entry in index.iterdir())
+        return frozenset(found)
+
+    @cached_property
+    def python_modules(self) -> frozenset[str]:
+        """Names of the packages in the ament index that can be imported in Python."""
+        roots = [Path(path) for path in dict(self.inherited).get("PYTHONPATH", "").split(":") if path]
+        roots += self._site_packages()
+        return frozenset(
+            name for name in self.packages if any((root / name).is_dir() for root in roots)
+        )
+
+    def _site_packages(self) -> list[Path]:
+        found: list[Path] = []
+        for prefix in self.prefixes:
+            found.extend(sorted(prefix.glob("lib/python3.*/site-packages")))
+        return found
+
+    def environment(
+        self, environ: Mapping[str, str], overlays: tuple[Path, ...] = ()
+    ) -> dict[str, str]:
+        """Variables for a child process that uses this ROS, and nothing else of the caller's.
+
+        Args:
+            environ: The caller's environment, of which only locale and home are kept.
+            overlays: Install spaces (merged layout) in front of ROS, as after sourcing
+                their ``local_setup.bash``.
+        """
+        result = {name: environ[name] for name in _KEPT if name in environ}
+        result.update(self.inherited)
+        result["PATH"] = os.pathsep.join([str(self.python.parent), "/usr/local/bin:/usr/bin:/bin"])
+        result["ROS_DISTRO"] = self.distro
+        result["ROS_VERSION"] = "2"
+        result["ROS_PYTHON_VERSION"] = "3"
+        prefixes = os.pathsep.join(str(path) for path in (*overlays, *self.prefixes))
+        result["AMENT_PREFIX_PATH"] = prefixes
+        result["CMAKE_PREFIX_PATH"] = prefixes
+        result["PYTHONNOUSERSITE"] = "1"
+        python_path: list[str] = []
+        library_path: list[str] = []
+        for overlay in overlays:
+            python_path.extend(str(path) for path in sorted(overlay.glob("lib/python3.*/site-packages")))
+            library_path.append(str(overlay / "lib"))
+        if self.source == "wheels":
+            library_path.extend(self._wheel_libraries())
+            # The wheels' start-up hook would set LD_LIBRARY_PATH and execute Python again.
+            result["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"
+        inherited = dict(self.inherited)
+        _prepend(result, "PYTHONPATH", python_path, inherited)
+        _prepend(result, "LD_LIBRARY_PATH", library_path, inherited)
+        return result
+
+    def _wheel_libraries(self) -> list[str]:
+        libraries = [str(prefix / "lib") for prefix in self.prefixes]
+        for site in self._site_packages():
+            libraries.extend(str(path) for path in sorted(site.glob("ros_*.libs")))
+        return libraries
+
+
+def _prepend(
+    result: dict[str, str], name: str, paths: list[str], inherited: Mapping[str, str]
+) -> None:
+    parts = paths + [part for part in inherited.get(name, "").split(os.pathsep) if part]
+    if parts:
+        result[name] = os.pathsep.join(parts)
+
+
+def is_sourced(environ: Mapping[str, str]) -> bool:
+    """Whether a ROS 2 installation is sourced in this environment."""
+    return bool(environ.get("ROS_DISTRO") and environ.get("AMENT_PREFIX_PATH"))
+
+
+def find(
+    environ: Mapping[str, str] = os.environ,
+    prefix: Path = Path(sys.prefix),
+    executable: Path = Path(sys.executable),
+) -> RosInstallation:
+    """Choose the ROS installation: a sourced Jazzy wins over the wheels.
+
+    Args:
+        environ: The environment to decide by.
+        prefix: Prefix of the Python environment that would hold the wheels.
+        executable: Its interpreter.
+
+    Raises:
+        GraderFault: Another distribution is sourced, or there is none at all.
+    """
+    if is_sourced(environ):
+        distro = environ["ROS_DISTRO"]
+        if distro != DISTRO:
+            raise GraderFault(
+                f"ROS 2 {distro} is sourced, but rosgrade grades with {DISTRO}: open a shell "
+                f"without it, or source /opt/ros/{DISTRO}/setup.bash"
+            )
+        names = ("PYTHONPATH", "LD_LIBRARY_PATH")
+        return RosInstallation(
+            source="sourced",
+            python=executable,
+            prefixes=tuple(Path(p) for p in environ["AMENT_PREFIX_PATH"].split(os.pathsep) if p),
+            inherited=tuple((name, environ[name]) for name in names if environ.get(name)),
+        )
+    if (prefix / "share/ament_index/resource_index/packages/rclpy").exists():
+        return RosInstallation(source="wheels", python=executable, prefixes=(prefix,))
+    raise GraderFault(
+        "no ROS 2 found: source /opt/ros/jazzy/setup.bash, or install the wheels with "
+        "pip install 'rosgrade[ros]' (make setup does it)"
+    )

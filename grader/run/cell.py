@@ -1,0 +1,372 @@
+"""A cell: one run of one scenario, in a process of its own.
+
+``python -m grader.run.cell FOLDER`` reads a :class:`~grader.run.order.CellOrder` from
+``order.json`` in a folder of its own, writes ``recording.mcap`` beside it, and tells its
+progress as JSON lines on standard output. When its standard input ends, whoever ordered the
+run is gone, and the cell kills what it started and ends.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from grader.recording.model import NS, Ending, Owner, Recording, Wait
+from grader.run.descendants import become_subreaper, kill_descendants
+from grader.run.disturbance import DisturbanceMeter
+from grader.run.domain import lock_domain
+from grader.run.order import ORDER_FILE, RECORDING_FILE, CellOrder
+from grader.run.output import OutputReader
+from grader.run.student import StudentProcesses
+from grader.submission.record import SubmissionRecord
+
+if TYPE_CHECKING:
+    from grader.run.graph import GraphObserver
+    from grader.run.probe import Probe
+
+_TICK_S = 0.02
+_CALM_TICK_S = 0.1
+_GRAPH_PERIOD_S = 0.1
+_PIPES_LIMIT_S = 1.0
+_LONGEST_STRETCH = 8.0
+
+
+class Abandoned(Exception):
+    """Whoever ordered the run is gone."""
+
+
+class Stopwatch:
+    """Time since its start, less what the host took from us meanwhile."""
+
+    def __init__(self, meter: DisturbanceMeter) -> None:
+        """Start now."""
+        self._meter = meter
+        self.start_ns = time.time_ns()
+        self._wall_s = time.monotonic()
+        self._taken_s = meter.taken_s
+
+    @property
+    def elapsed_s(self) -> float:
+        """Undisturbed seconds; at least an eighth of the wall time, so that every wait ends."""
+        wall_s = time.monotonic() - self._wall_s
+        return max(wall_s - (self._meter.taken_s - self._taken_s), wall_s / _LONGEST_STRETCH)
+
+
+def tell(event: str, **data: Any) -> None:
+    """One line of progress for whoever ordered the run."""
+    print(json.dumps({"event": event, **data}), flush=True)
+
+
+class Cell:
+    """Runs one scenario from launch to recording."""
+
+    def __init__(self, order: CellOrder, domain_id: int, probe: Probe) -> None:
+        """Set the cell up; nothing of the student's runs yet."""
+        from grader.run.graph import GraphObserver
+
+        self._order = order
+        self._domain_id = domain_id
+        self._probe = probe
+        self._output = OutputReader(order.limits.output_bytes)
+        self._students = StudentProcesses(self._output)
+        self._meter = DisturbanceMeter(lambda: self._students.pids)
+        self._graph: GraphObserver = GraphObserver(
+            probe.node, lambda: self._students.pids, self._students.refresh
+        )
+        self._waits: list[Wait] = []
+        self._faults: list[str] = []
+        self._next_graph = 0.0
+        self._next_call = 0.0
+        self._matched_ns: int | None = None
+
+    def run(self) -> Recording:
+        """Launch, observe, stop.
+
+        Raises:
+            Abandoned: Nobody waits for the recording any more.
+        """
+        self._meter.start()
+        launched_ns = time.time_ns()
+        try:
+            ending = self._observe()
+            self._probe.recording = False
+            stop_ns = time.time_ns()
+            tell("stopping")
+            self._stop()
+        finally:
+            self._students.clean_up()
+        log = self._output.close(_PIPES_LIMIT_S)
+        disturbance = self._meter.stop()
+        return Recording(
+            scenario=self._order.scenario,
+            seed=self._order.seed,
+            ending=ending,
+            launched_ns=launched_ns,
+            matched_ns=self._matched_ns,
+            stop_ns=stop_ns,
+            end_ns=time.time_ns(),
+            submission=SubmissionRecord(id="", sha256=""),
+            nodes=self._graph.nodes,
+            endpoints=self._graph.endpoints,
+            processes=self._students.records(),
+            log=log,
+            declarations=self._output.declarations,
+            calls=self._probe.calls,
+            waits=tuple(self._waits),
+            disturbance=disturbance,
+            faults=tuple(self._faults),
+            environment={**self._order.facts, "domain_id": str(self._domain_id)},
+        )
+
+    def _observe(self) -> Ending:
+        ending = self._launch() or self._await_node() or self._await_match()
+        if ending is None:
+            tell("matched")
+            ending = self._await_until()
+        # What arrived while the last wait ended still counts.
+        self._graph.poll()
+        self._find_foreign()
+        return Ending.FAULT if self._faults else ending
+
+    def _launch(self) -> Ending | None:
+        environment = dict(self._order.environment)
+        environment["ROS_DOMAIN_ID"] = str(self._domain_id)
+        environment["ROSGRADE_HOLD"] = ":".join(topic.name for topic in self._order.topics)
+        for command in self._order.commands:
+            tell("launching", process=command.name)
+            try:
+                self._students.launch(
+                    command.name, command.argv, environment, Path(self._order.scratch)
+                )
+            except OSError as error:
+                self._waits.append(
+                    Wait(f"start of {command.name}: {error.strerror}", 0.0, time.time_ns())
+                )
+                return Ending.NOT_STARTED
+        return None
+
+    def _await_node(self) -> Ending | None:
+        def seen() -> bool:
+            return any(node.owner is Owner.STUDENT for node in self._graph.nodes)
+
+        tell("domain", id=self._domain_id)
+        tell("waiting", what="a node")
+        limit_s = self._order.limits.discovery_s
+        for watch in self._wait("a node of the student", limit_s):
+            if seen():
+                return None
+            if self._faults:
+                return Ending.FAULT
+            if not self._students.poll():
+                return self._last_look(seen)
+            if watch.elapsed_s > limit_s:
+                return Ending.NO_NODE
+        return None
+
+    def _last_look(self, seen: Any) -> Ending | None:
+        """What an ended process announced may still be on its way: look for a moment more."""
+        for watch in self._ticks():
+            if seen():
+                return None
+            if watch.elapsed_s > 2 * _GRAPH_PERIOD_S:
+                break
+        return Ending.EXITED
+
+    def _await_match(self) -> Ending | None:
+        topics = self._order.topics
+        if not topics:
+            self._matched_ns = time.time_ns()
+            return None
+        names = ", ".join(topic.name for topic in topics)
+        tell("waiting", what=f"a publisher on {names}")
+        settle_s = self._order.limits.settle_s
+        changed_ns, since_change = 0, Stopwatch(self._meter)
+        for _ in self._wait(f"a publisher on {names}", settle_s):
+            if self._match():
+                return None
+            if self._faults:
+                return Ending.FAULT
+            if not self._students.poll():
+                return self._last_look(self._match)
+            if self._graph.changed_ns != changed_ns:
+                changed_ns, since_change = self._graph.changed_ns, Stopwatch(self._meter)
+            if since_change.elapsed_s > settle_s:
+                return Ending.NO_MATCH
+        return None
+
+    def _match(self) -> bool:
+        matching = [e for e in self._graph.endpoints if self._probe.matches(e)]
+        for endpoint in matching:
+            self._probe.subscribe_leniently(endpoint)
+        if matching and self._matched_ns is None:
+            self._matched_ns = time.time_ns()
+        return bool(matching)
+
+    def _await_until(self) -> Ending:
+        timeout_s = self._order.limits.timeout_s
+        reported = -1
+        for watch in self._wait("the end of the scenario", timeout_s):
+            self._match()
+            if self._faults:
+                return Ending.FAULT
+            if self._until_met(watch):
+                return Ending.UNTIL
+            if not self._students.poll():
+                return self._last_messages(watch)
+            if watch.elapsed_s > timeout_s:
+                return Ending.TIMEOUT
+            count = sum(self._probe.counts.values())
+            if count != reported:
+                tell("recording", messages=count, elapsed_s=watch.elapsed_s, limit_s=timeout_s)
+                reported = count
+        return Ending.TIMEOUT
+
+    def _last_messages(self, watch: Stopwatch) -> Ending:
+        """Take in what a process published before it ended."""
+        for late in self._ticks():
+            if late.elapsed_s > 2 * _GRAPH_PERIOD_S:
+                break
+        return Ending.UNTIL if self._until_met(watch) else Ending.EXITED
+
+    def _until_met(self, watch: Stopwatch) -> bool:
+        until = self._order.until
+        conditions = []
+        if until.messages is not None:
+            conditions.append(all(n >= until.messages for n in self._probe.counts.values()))
+        if until.quiet_s is not None:
+            conditions.append(self._quiet_s(watch) >= self._longest_silence_s(until.quiet_s))
+        if until.elapsed_s is not None:
+            conditions.append(watch.elapsed_s >= until.elapsed_s)
+        return bool(conditions) and all(conditions)
+
+    def _quiet_s(self, watch: Stopwatch) -> float:
+        last_ns = self._probe.last_message_ns
+        if last_ns is None:
+            return watch.elapsed_s
+        return min(watch.elapsed_s, (time.time_ns() - last_ns) / NS)
+
+    def _longest_silence_s(self, quiet_s: float) -> float:
+        """How long silence must last: a timer that has not fired yet may still publish."""
+        periods = [
+            float(item.data["period_s"])
+            for item in self._output.declarations
+            if item.kind == "timer" and isinstance(item.data.get("period_s"), int | float)
+        ]
+        return max([quiet_s, *(1.2 * period + 0.2 for period in periods)])
+
+    def _wait(self, what: str, limit_s: float) -> Iterator[Stopwatch]:
+        """Tick until the caller leaves the loop; the wait is recorded either way."""
+        began_ns = time.time_ns()
+        met_ns: int | None = None
+        watch = None
+        try:
+            for watch in self._ticks():
+                yield watch
+        finally:
+            if watch is None or watch.elapsed_s <= limit_s:
+                met_ns = time.time_ns()
+            self._waits.append(Wait(what, limit_s, began_ns, met_ns))
+
+    def _ticks(self) -> Iterator[Stopwatch]:
+        """Handle events; yields the time since the first tick."""
+        watch = Stopwatch(self._meter)
+        while True:
+            # A message ends the wait at once; only the graph has to be polled.
+            self._probe.spin_once(_TICK_S if self._matched_ns is None else _CALM_TICK_S)
+            now = time.monotonic()
+            if now >= self._next_graph:
+                self._next_graph = now + _GRAPH_PERIOD_S
+                self._graph.poll()
+                self._find_foreign()
+                _raise_if_abandoned()
+            self._call_services(now)
+            yield watch
+
+    def _call_services(self, now: float) -> None:
+        every_s = self._order.list_parameters_s
+        if every_s is None or self._matched_ns is None or now < self._next_call:
+            return
+        self._next_call = now + every_s
+        for node in self._graph.nodes:
+            if node.owner is Owner.STUDENT and node.vanished_ns is None:
+                self._probe.call_list_parameters(node.name)
+
+    def _find_foreign(self) -> None:
+        names = sorted({n.name for n in self._graph.nodes if n.owner is Owner.FOREIGN})
+        if names and not self._faults:
+            self._faults.append(
+                f"not alone on ROS domain {self._domain_id}: the node "
+                f"{', '.join(names)} belongs neither to rosgrade nor to the submission"
+            )
+
+    def _stop(self) -> None:
+        """SIGINT, SIGTERM, SIGKILL, each with a bounded wait."""
+        limits = self._order.limits
+        watch = Stopwatch(self._meter)
+        for number, limit_s in (
+            (signal.SIGINT, limits.shutdown_s),
+            (signal.SIGTERM, limits.terminate_s),
+            (signal.SIGKILL, limits.terminate_s),
+        ):
+            if not self._students.poll():
+                break
+            self._students.signal(number)
+            step = Stopwatch(self._meter)
+            while self._students.poll() and step.elapsed_s <= limit_s:
+                time.sleep(0.005)
+                self._students.note_stop(watch.elapsed_s)
+            self._students.note_stop(watch.elapsed_s)
+
+
+def _raise_if_abandoned() -> None:
+    """Standard input ends with the process that ordered the run."""
+    readable, _, _ = select.select([0], [], [], 0)
+    if readable and not os.read(0, 1):
+        raise Abandoned
+
+
+def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
+    from grader.recording.definition import concatenated_definition, definition_finder
+
+    find = definition_finder(Path(prefix) for prefix in order.prefixes)
+    return {name: concatenated_definition(name, find) for name in types}
+
+
+def main(folder: Path) -> int:
+    """Run the order in a folder."""
+    order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
+    # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
+    gc.disable()
+    become_subreaper()
+    with lock_domain(order.avoid_domains) as domain:
+        from grader.run.probe import Probe
+
+        probe = Probe(domain.domain_id, order.topics, order.limits)
+        try:
+            recording = Cell(order, domain.domain_id, probe).run()
+        except Abandoned:
+            return 1
+        finally:
+            kill_descendants(os.getpid())
+        messages = probe.messages
+        probe.close()
+    from grader.recording.mcap_writer import write_recording
+
+    definitions = _definitions(order, {message.type for message in messages})
+    write_recording(
+        folder / RECORDING_FILE, recording, messages, definitions, order.submission.encode()
+    )
+    tell("recorded")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

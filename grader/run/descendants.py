@@ -1,0 +1,112 @@
+"""Processes and what came of them, read from /proc."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import time
+from pathlib import Path
+
+_PR_SET_CHILD_SUBREAPER = 36
+_PROC = Path("/proc")
+
+
+def become_subreaper() -> None:
+    """Make orphaned descendants our children, so that none can leave us by forking twice.
+
+    Source: prctl(2), PR_SET_CHILD_SUBREAPER.
+    """
+    ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def descendants(of: int) -> dict[int, str]:
+    """All living descendants of a process.
+
+    Args:
+        of: Its id.
+
+    Returns:
+        Process id -> command line (or name), zombies left out.
+    """
+    children: dict[int, list[int]] = {}
+    for entry in os.listdir("/proc"):
+        if entry.isdigit():
+            parent = _living_parent(entry)
+            if parent is not None:
+                children.setdefault(parent, []).append(int(entry))
+    found: dict[int, str] = {}
+    queue = children.get(of, [])
+    while queue:
+        pid = queue.pop()
+        found[pid] = command_line(pid)
+        queue.extend(children.get(pid, ()))
+    return found
+
+
+def _living_parent(pid: str) -> int | None:
+    """Parent of a process, or None for one that has ended or is a zombie."""
+    try:
+        with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  a scan of all processes
+            stat = file.read()
+    except OSError:
+        return None
+    # The command stands in parentheses and may contain anything; the rest is plain words.
+    state, parent = stat[stat.rindex(b")") + 2 :].split(b" ", 2)[:2]
+    return None if state in (b"Z", b"X") else int(parent)
+
+
+def command_line(pid: int) -> str:
+    """Command line of a process, for people."""
+    try:
+        line = (_PROC / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").strip()
+        return (line or (_PROC / str(pid) / "comm").read_bytes().strip()).decode(errors="replace")
+    except OSError:
+        return f"process {pid}"
+
+
+def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:
+    """SIGKILL every descendant until none is left.
+
+    New ones may be forked while we kill, so this repeats; they are stopped first.
+
+    Args:
+        of: Whose descendants.
+        limit_s: Give up after this time.
+
+    Returns:
+        Those that were found, process id -> command line.
+    """
+    killed: dict[int, str] = {}
+    deadline = time.monotonic() + limit_s
+    while (alive := descendants(of)) and time.monotonic() < deadline:
+        killed.update(alive)
+        for number in (signal.SIGSTOP, signal.SIGKILL):
+            for pid in alive:
+                try:
+                    os.kill(pid, number)
+                except ProcessLookupError:
+                    continue
+        reap()
+    reap()
+    return killed
+
+
+def kill_tree(pid: int) -> None:
+    """SIGKILL a process and everything that descends from it now."""
+    for victim in (pid, *descendants(pid)):
+        try:
+            os.kill(victim, signal.SIGKILL)
+        except ProcessLookupError:
+            continue
+
+
+def reap() -> None:
+    """Take the exit status of ended children that no Popen object waits for."""
+    while True:
+        try:
+            pid, _ = os.waitpid(-1, os.WNOHANG)
+        except ChildProcessError:
+            return
+        if pid == 0:
+            return

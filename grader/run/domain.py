@@ -1,0 +1,70 @@
+"""A ROS domain of one's own on this machine, locked for the life of the holder.
+
+Domains 1 to 101 are used: the ports of higher ones collide with the system's ephemeral
+ports (https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html), and 0 is
+everybody's default. The lock is the one of ROS's own ``domain_coordinator``: a TCP socket
+bound to port 32768 + domain, which the kernel releases with the process.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import socket
+from collections.abc import Collection
+from types import TracebackType
+
+from grader.errors import GraderFault
+
+DOMAINS = range(1, 102)
+_BASE_PORT = 32768
+
+
+class DomainLock:
+    """Holds one domain until it is closed."""
+
+    def __init__(self, domain_id: int, lock: socket.socket) -> None:
+        """Keep the bound socket."""
+        self.domain_id = domain_id
+        self._socket = lock
+
+    def close(self) -> None:
+        """Release the domain."""
+        self._socket.close()
+
+    def __enter__(self) -> DomainLock:
+        """Use the lock as a context."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Release the domain."""
+        self.close()
+
+
+def lock_domain(avoid: Collection[int] = ()) -> DomainLock:
+    """Lock any free domain.
+
+    The order is shuffled, so that a domain whose nodes were just killed is not the next.
+
+    Args:
+        avoid: Domains not to use, such as the caller's own ROS_DOMAIN_ID.
+
+    Raises:
+        GraderFault: All are in use.
+    """
+    order = [domain for domain in DOMAINS if domain not in avoid]
+    random.Random(os.urandom(8)).shuffle(order)
+    for domain in order:
+        lock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            lock.bind(("", _BASE_PORT + domain))
+        except OSError:
+            lock.close()
+            continue
+        return DomainLock(domain, lock)
+    raise GraderFault(f"all ROS domains from {DOMAINS[0]} to {DOMAINS[-1]} are in use")

@@ -1,0 +1,157 @@
+"""The ROS graph as the probe sees it, and who in it is whose."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import time
+from collections.abc import Callable, Collection
+from typing import Any
+
+from rclpy.node import Node as RclpyNode
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from grader.recording.model import NS, Endpoint, Kind, Node, Owner, Qos
+
+_INFRASTRUCTURE = ("/rosout", "/parameter_events")
+_UNKNOWN_NAME = "_NODE_NAME_UNKNOWN_"
+_INFINITE_NS = 2**63 - 1
+
+
+def full_name(namespace: str, name: str) -> str:
+    """Fully qualified node name."""
+    return f"{namespace.rstrip('/')}/{name}"
+
+
+def process_bits(gid: bytes) -> int:
+    """The low 16 bits of the id of the process that an endpoint lives in.
+
+    Fast DDS makes a participant's GUID prefix of vendor (2 bytes), host (2), process id (2,
+    little endian), random (2) and participant number (4); measured with Fast DDS 2.14.5.
+    """
+    return int.from_bytes(gid[4:6], "little")
+
+
+def qos_of(profile: Any) -> Qos:
+    """QoS in the words of the model from a QoSProfile of rclpy."""
+    history = profile.history.name.lower()
+    known = history in ("keep_last", "keep_all")
+    return Qos(
+        reliability=profile.reliability.name.lower(),
+        durability=profile.durability.name.lower(),
+        history=history if known else "unknown",
+        depth=profile.depth if known else None,
+        deadline_s=_seconds(profile.deadline),
+        lifespan_s=_seconds(profile.lifespan),
+        liveliness=profile.liveliness.name.lower(),
+        liveliness_lease_s=_seconds(profile.liveliness_lease_duration),
+    )
+
+
+def _seconds(duration: Any) -> float | None:
+    nanoseconds = duration.nanoseconds
+    return None if nanoseconds <= 0 or nanoseconds >= _INFINITE_NS else nanoseconds / NS
+
+
+class GraphObserver:
+    """Polls the graph and dates every appearance and disappearance."""
+
+    def __init__(
+        self, node: RclpyNode, student_pids: Callable[[], Collection[int]], rescan: Callable[[], None]
+    ) -> None:
+        """Prepare the observer.
+
+        Args:
+            node: The probe's node, to ask through.
+            student_pids: Processes of the student known at the moment.
+            rescan: Looks for new processes of the student.
+        """
+        self._node = node
+        self._student_pids = student_pids
+        self._rescan = rescan
+        self._nodes: dict[tuple[str, str], Node] = {}
+        self._endpoints: dict[str, Endpoint] = {}
+        self._owners: dict[str, Owner] = {}
+        self.changed_ns = 0
+
+    @property
+    def nodes(self) -> tuple[Node, ...]:
+        """Every node seen so far, in the order of appearance."""
+        return tuple(self._nodes.values())
+
+    @property
+    def endpoints(self) -> tuple[Endpoint, ...]:
+        """Every endpoint seen so far except those on /rosout and /parameter_events."""
+        return tuple(self._endpoints.values())
+
+    def poll(self) -> None:
+        """Look at the graph once."""
+        now_ns = time.time_ns()
+        nodes: set[tuple[str, str]] = set()
+        gids: set[str] = set()
+        for topic, _ in self._node.get_topic_names_and_types():
+            for kind, infos in (
+                (Kind.PUBLISHER, self._node.get_publishers_info_by_topic(topic)),
+                (Kind.SUBSCRIPTION, self._node.get_subscriptions_info_by_topic(topic)),
+            ):
+                for info in infos:
+                    if info.node_name == _UNKNOWN_NAME:
+                        continue
+                    nodes.add(self._see_node(info, now_ns))
+                    if topic not in _INFRASTRUCTURE:
+                        gids.add(self._see_endpoint(kind, topic, info, now_ns))
+        self._note_vanished(nodes, gids, now_ns)
+
+    def _see_node(self, info: TopicEndpointInfo, now_ns: int) -> tuple[str, str]:
+        gid = bytes(info.endpoint_gid)
+        key = (full_name(info.node_namespace, info.node_name), gid[:12].hex())
+        known = self._nodes.get(key)
+        if known is None or known.vanished_ns is not None:
+            self._nodes[key] = Node(key[0], self._owner(gid), now_ns)
+            self.changed_ns = now_ns
+        return key
+
+    def _see_endpoint(
+        self, kind: Kind, topic: str, info: TopicEndpointInfo, now_ns: int
+    ) -> str:
+        gid = bytes(info.endpoint_gid)
+        key = gid.hex()
+        if key not in self._endpoints:
+            self._endpoints[key] = Endpoint(
+                kind=kind,
+                topic=topic,
+                type=info.topic_type,
+                node=full_name(info.node_namespace, info.node_name),
+                owner=self._owner(gid),
+                qos=qos_of(info.qos_profile),
+                gid=key,
+                appeared_ns=now_ns,
+            )
+            self.changed_ns = now_ns
+        return key
+
+    def _note_vanished(
+        self, nodes: set[tuple[str, str]], gids: set[str], now_ns: int
+    ) -> None:
+        for key, node in self._nodes.items():
+            if node.vanished_ns is None and key not in nodes:
+                self._nodes[key] = dataclasses.replace(node, vanished_ns=now_ns)
+        for gid, endpoint in self._endpoints.items():
+            if endpoint.vanished_ns is None and gid not in gids:
+                self._endpoints[gid] = dataclasses.replace(endpoint, vanished_ns=now_ns)
+
+    def _owner(self, gid: bytes) -> Owner:
+        participant = gid[:12].hex()
+        if participant not in self._owners:
+            self._owners[participant] = self._find_owner(process_bits(gid))
+        return self._owners[participant]
+
+    def _find_owner(self, bits: int) -> Owner:
+        if bits == os.getpid() & 0xFFFF:
+            return Owner.PROBE
+        for attempt in range(2):
+            if any(pid & 0xFFFF == bits for pid in self._student_pids()):
+                return Owner.STUDENT
+            if attempt == 0:
+                self._rescan()
+        return Owner.FOREIGN

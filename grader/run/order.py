@@ -1,0 +1,133 @@
+"""What a cell is told to do: one scenario, without points, checks or anything else.
+
+Kept to the standard library, because a cell starts for every run.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import dataclass, field
+
+ORDER_FILE = "order.json"
+RECORDING_FILE = "recording.mcap"
+
+
+@dataclass(frozen=True)
+class Command:
+    """A process of the student to start.
+
+    Attributes:
+        name: ``package/executable``.
+        argv: What to execute; the first entry is a path.
+    """
+
+    name: str
+    argv: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic to record.
+
+    Attributes:
+        name: Fully qualified.
+        type: Interface name.
+        reliability: Requested by the probe's first subscription.
+        durability: Requested by the probe's first subscription.
+        depth: Queue depth of the probe.
+    """
+
+    name: str
+    type: str
+    reliability: str
+    durability: str
+    depth: int
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of one run; times in seconds.
+
+    Attributes:
+        discovery_s: Until the first node.
+        settle_s: From the newest change of the student's graph until we stop to expect a
+            matching endpoint.
+        timeout_s: From the first match to the end of the observation.
+        shutdown_s: From SIGINT to SIGTERM.
+        terminate_s: From SIGTERM to SIGKILL.
+        messages: Messages kept per topic.
+        message_bytes: Largest message kept.
+        output_bytes: Output kept per stream, half of it from the end.
+    """
+
+    discovery_s: float
+    timeout_s: float
+    shutdown_s: float
+    settle_s: float = 5.0
+    terminate_s: float = 1.0
+    messages: int = 20_000
+    message_bytes: int = 4 * 2**20
+    output_bytes: int = 128 * 2**10
+
+
+@dataclass(frozen=True)
+class Until:
+    """When to end early; None where not asked for. See the YAML's ``until``."""
+
+    messages: int | None = None
+    quiet_s: float | None = None
+    elapsed_s: float | None = None
+
+
+@dataclass(frozen=True)
+class CellOrder:
+    """One scenario for one cell.
+
+    Attributes:
+        scenario: Its id.
+        seed: For everything random.
+        commands: Processes of the student.
+        environment: Their variables.
+        prefixes: ament prefixes, for message definitions.
+        topics: What to record.
+        list_parameters_s: Call the parameter services this often, or None.
+        until: When to end early.
+        limits: Bounds.
+        scratch: Folder of the student: working directory, home and temporary files.
+        submission: The submission's facts, as JSON, to go into the recording unread.
+        facts: Environment facts to go into the recording.
+        avoid_domains: Domains that must not be used.
+    """
+
+    scenario: str
+    seed: int
+    commands: tuple[Command, ...]
+    environment: dict[str, str]
+    prefixes: tuple[str, ...]
+    topics: tuple[Topic, ...]
+    list_parameters_s: float | None
+    until: Until
+    limits: Limits
+    scratch: str
+    submission: str
+    facts: dict[str, str] = field(default_factory=dict)
+    avoid_domains: tuple[int, ...] = ()
+
+    def to_json(self) -> str:
+        """As one line."""
+        return json.dumps(dataclasses.asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> CellOrder:
+        """Read what :meth:`to_json` wrote."""
+        data = json.loads(text)
+        data["commands"] = tuple(
+            Command(item["name"], tuple(item["argv"])) for item in data["commands"]
+        )
+        data["topics"] = tuple(Topic(**item) for item in data["topics"])
+        data["until"] = Until(**data["until"])
+        data["limits"] = Limits(**data["limits"])
+        data["prefixes"] = tuple(data["prefixes"])
+        data["avoid_domains"] = tuple(data["avoid_domains"])
+        return cls(**data)

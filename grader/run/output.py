@@ -1,0 +1,179 @@
+"""Output of the student's processes: always drained, kept within bounds, line by line."""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass
+
+from grader.recording.model import Declaration, LogLine
+
+_READ_BYTES = 1 << 16
+_LONGEST_LINE = 8192
+_MOST_DECLARATIONS = 2000
+
+
+@dataclass
+class _Kept:
+    """The first and the last lines of one stream, half of the bytes each."""
+
+    limit: int
+    head: list[LogLine]
+    tail: deque[LogLine]
+    head_bytes: int = 0
+    tail_bytes: int = 0
+    dropped_bytes: int = 0
+
+    def add(self, line: LogLine) -> None:
+        size = len(line.text) + 1
+        if not self.tail and self.head_bytes + size <= self.limit // 2:
+            self.head.append(line)
+            self.head_bytes += size
+            return
+        self.tail.append(line)
+        self.tail_bytes += size
+        while self.tail_bytes > self.limit // 2 and len(self.tail) > 1:
+            dropped = len(self.tail.popleft().text) + 1
+            self.tail_bytes -= dropped
+            self.dropped_bytes += dropped
+
+
+class _Stream:
+    """One pipe being read."""
+
+    def __init__(self, process: str, name: str, limit: int) -> None:
+        self.process = process
+        self.name = name
+        self.kept = _Kept(limit, [], deque())
+        self._partial = b""
+
+    def feed(self, data: bytes) -> None:
+        """Split into lines; a line without end is cut at a bound."""
+        now_ns = time.time_ns()
+        *lines, self._partial = (self._partial + data).split(b"\n")
+        for line in lines:
+            self._add(line, now_ns)
+        if len(self._partial) > _LONGEST_LINE:
+            self._add(self._partial, now_ns)
+            self._partial = b""
+
+    def finish(self) -> None:
+        """Keep a last line that has no line end."""
+        if self._partial:
+            self._add(self._partial, time.time_ns())
+            self._partial = b""
+
+    def _add(self, line: bytes, now_ns: int) -> None:
+        over = max(0, len(line) - _LONGEST_LINE)
+        text = line[:_LONGEST_LINE].rstrip(b"\r").decode(errors="replace")
+        self.kept.dropped_bytes += over
+        self.kept.add(LogLine(now_ns, self.process, self.name, text))
+
+
+class OutputReader:
+    """Reads all pipes of all processes in one thread."""
+
+    def __init__(self, limit_bytes: int) -> None:
+        """Start reading.
+
+        Args:
+            limit_bytes: What is kept of each stream.
+        """
+        self._limit = limit_bytes
+        self._selector = selectors.DefaultSelector()
+        self._streams: list[_Stream] = []
+        self._declarations: list[Declaration] = []
+        self._lock = threading.Lock()
+        self._wake_read, self._wake_write = os.pipe()
+        self._selector.register(self._wake_read, selectors.EVENT_READ, None)
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name="output", daemon=True)
+        self._thread.start()
+
+    def add(self, fd: int, process: str, stream: str) -> None:
+        """Read a pipe until its end; ``stream`` is stdout, stderr or tracer.
+
+        The descriptor belongs to the reader from here on.
+        """
+        os.set_blocking(fd, False)
+        target = _Stream(process, stream, self._limit)
+        with self._lock:
+            self._streams.append(target)
+            self._selector.register(fd, selectors.EVENT_READ, target)
+        os.write(self._wake_write, b".")
+
+    @property
+    def declarations(self) -> tuple[Declaration, ...]:
+        """What the tracers have reported so far."""
+        return tuple(self._declarations)
+
+    def tail(self, process: str, stream: str, lines: int) -> list[str]:
+        """The newest lines of a stream, for messages."""
+        for item in list(self._streams):
+            if item.process == process and item.name == stream:
+                kept = [*item.kept.head, *item.kept.tail]
+                return [line.text for line in kept[-lines:]]
+        return []
+
+    def close(self, limit_s: float) -> tuple[LogLine, ...]:
+        """Wait for the ends of the pipes and return all lines in the order of their times.
+
+        Args:
+            limit_s: A pipe that somebody still holds open after this time is left.
+        """
+        self._closing = True
+        os.write(self._wake_write, b".")
+        self._thread.join(limit_s)
+        for stream in self._streams:
+            stream.finish()
+        lines = [
+            line
+            for stream in self._streams
+            if stream.name != "tracer"
+            for line in (*stream.kept.head, *stream.kept.tail)
+        ]
+        return tuple(sorted(lines, key=lambda line: line.time_ns))
+
+    def dropped_bytes(self, process: str) -> int:
+        """How much output of a process was not kept."""
+        return sum(s.kept.dropped_bytes for s in self._streams if s.process == process)
+
+    def _run(self) -> None:
+        while not (self._closing and len(self._selector.get_map()) == 1):
+            for key, _ in self._selector.select():
+                if key.data is None:
+                    os.read(self._wake_read, _READ_BYTES)
+                    continue
+                self._read(key.fd, key.data)
+
+    def _read(self, fd: int, stream: _Stream) -> None:
+        try:
+            data = os.read(fd, _READ_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._selector.unregister(fd)
+            os.close(fd)
+            return
+        stream.feed(data)
+        if stream.name == "tracer":
+            self._take_declarations(stream)
+
+    def _take_declarations(self, stream: _Stream) -> None:
+        """Turn lines of a tracer into declarations; what is not one is dropped."""
+        lines = [*stream.kept.head, *stream.kept.tail]
+        stream.kept = _Kept(self._limit, [], deque())
+        for line in lines:
+            try:
+                data = json.loads(line.text)
+                kind = str(data.pop("kind"))
+            except (ValueError, KeyError, AttributeError, RecursionError):
+                continue
+            if len(self._declarations) < _MOST_DECLARATIONS:
+                self._declarations.append(Declaration(line.time_ns, line.process, kind, data))

@@ -1,0 +1,191 @@
+"""The probe: our node in the cell. It observes, it never judges.
+
+It offers no parameter services, publishes no log and has no use_sim_time, so that nothing a
+student sends can change it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from grader.recording.mcap_writer import RawMessage
+from grader.recording.model import Call, Endpoint, Kind, Owner
+from grader.run.order import Limits, Topic
+
+NAME = "rosgrade_probe"
+_LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
+
+
+def import_interface(name: str) -> Any:
+    """Import a message class by its interface name.
+
+    Raises:
+        ImportError: The package or the message does not exist.
+    """
+    package, kind, short = name.split("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.{kind}"), short)
+    except AttributeError as error:
+        raise ImportError(f"no interface {name}") from error
+
+
+@dataclass
+class _Pending:
+    requested_ns: int
+    future: Any
+    answered_ns: int | None = None
+
+
+class Probe:
+    """Subscribes to the scenario's topics and calls parameter services."""
+
+    def __init__(self, domain_id: int, topics: tuple[Topic, ...], limits: Limits) -> None:
+        """Join the graph.
+
+        Args:
+            domain_id: ROS domain.
+            topics: What to record.
+            limits: How much is kept.
+
+        Raises:
+            ImportError: An interface of a topic does not exist.
+        """
+        self._limits = limits
+        self._context = rclpy.Context()
+        rclpy.init(args=[], context=self._context, domain_id=domain_id)
+        self.node = Node(
+            NAME,
+            context=self._context,
+            start_parameter_services=False,
+            enable_rosout=False,
+            use_global_arguments=False,
+        )
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._topics = {topic.name: topic for topic in topics}
+        self._fallbacks: set[str] = set()
+        self._seen: set[tuple[str, int, int]] = set()
+        self._clients: dict[str, Any] = {}
+        self._calls: dict[str, list[_Pending]] = {}
+        self.messages: list[RawMessage] = []
+        self.counts = dict.fromkeys(self._topics, 0)
+        self.last_message_ns: int | None = None
+        self.recording = True
+        for topic in topics:
+            self._subscribe(topic, topic.reliability, topic.durability)
+
+    def spin_once(self, limit_s: float) -> None:
+        """Handle what has arrived, waiting at most so long for something to arrive."""
+        self._executor.spin_once(timeout_sec=limit_s)
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.shutdown(timeout_sec=1.0)
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+    def matches(self, endpoint: Endpoint) -> bool:
+        """Whether an endpoint of the student is one that the scenario records."""
+        topic = self._topics.get(endpoint.topic)
+        return (
+            topic is not None
+            and endpoint.owner is Owner.STUDENT
+            and endpoint.kind is Kind.PUBLISHER
+            and endpoint.type == topic.type
+        )
+
+    def subscribe_leniently(self, endpoint: Endpoint) -> None:
+        """Also hear a publisher whose QoS does not match what the probe requested."""
+        topic = self._topics[endpoint.topic]
+        offered = endpoint.qos
+        heard = not (
+            (topic.reliability == "reliable" and offered.reliability == "best_effort")
+            or (topic.durability == "transient_local" and offered.durability == "volatile")
+        )
+        if heard or topic.name in self._fallbacks:
+            return
+        self._fallbacks.add(topic.name)
+        self._subscribe(topic, "best_effort", "volatile")
+
+    def call_list_parameters(self, node: str) -> None:
+        """Call a node's parameter service, unless its last call is still unanswered."""
+        from rcl_interfaces.srv import ListParameters
+
+        service = f"{node}/list_parameters"
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(ListParameters, service)
+            self._calls[service] = []
+        client, calls = self._clients[service], self._calls[service]
+        if (calls and calls[-1].answered_ns is None) or not client.service_is_ready():
+            return
+        pending = _Pending(time.time_ns(), None)
+        pending.future = client.call_async(ListParameters.Request())
+
+        def answered(_: Any) -> None:
+            pending.answered_ns = time.time_ns()
+
+        pending.future.add_done_callback(answered)
+        calls.append(pending)
+
+    @property
+    def calls(self) -> tuple[Call, ...]:
+        """Every call so far, oldest first."""
+        found = [
+            Call(service, _LIST_PARAMETERS, call.requested_ns, call.answered_ns)
+            for service, calls in self._calls.items()
+            for call in calls
+        ]
+        return tuple(sorted(found, key=lambda call: call.requested_ns))
+
+    def _subscribe(self, topic: Topic, reliability: str, durability: str) -> None:
+        profile = QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=topic.depth,
+            reliability=ReliabilityPolicy[reliability.upper()],
+            durability=DurabilityPolicy[durability.upper()],
+        )
+
+        # rclpy decides by the number of parameters whether a callback gets the message info.
+        def receive(data: bytes, info: Any) -> None:
+            self._receive(topic, data, info)
+
+        self.node.create_subscription(
+            import_interface(topic.type), topic.name, receive, profile, raw=True
+        )
+
+    def _receive(self, topic: Topic, data: bytes, info: Any) -> None:
+        if not self.recording:
+            return
+        stamp_ns, sequence = info["source_timestamp"], info["publication_sequence_number"]
+        key = (topic.name, stamp_ns, sequence)
+        # A topic with a lenient second subscription may deliver a message twice.
+        if key in self._seen:
+            return
+        if topic.name in self._fallbacks:
+            self._seen.add(key)
+        self.counts[topic.name] += 1
+        self.last_message_ns = time.time_ns()
+        if self.counts[topic.name] > self._limits.messages:
+            return
+        if len(data) > self._limits.message_bytes:
+            return
+        self.messages.append(
+            RawMessage(
+                topic=topic.name,
+                type=topic.type,
+                cdr=bytes(data),
+                stamp_ns=stamp_ns,
+                received_ns=info["received_timestamp"],
+                sequence=sequence or 0,
+            )
+        )
+
+

@@ -1,0 +1,142 @@
+"""The student's processes: started as ``ros2 run`` would, stopped in steps, none left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.recording.model import Process
+from grader.run.descendants import descendants, kill_descendants, reap
+from grader.run.output import OutputReader
+from grader.run.shared_memory import remove_orphaned_segments
+
+
+@dataclass
+class _Running:
+    name: str
+    popen: subprocess.Popen[bytes]
+    started_ns: int
+    exited_ns: int | None = None
+    stopped_by: str = "itself"
+    stop_s: float | None = None
+
+
+class StudentProcesses:
+    """All processes that a scenario launches."""
+
+    def __init__(self, output: OutputReader) -> None:
+        """Prepare; nothing is started yet."""
+        self._output = output
+        self._running: list[_Running] = []
+        self._pids: frozenset[int] = frozenset()
+        self._survivors: tuple[str, ...] = ()
+
+    def launch(
+        self, name: str, argv: tuple[str, ...], environment: Mapping[str, str], folder: Path
+    ) -> None:
+        """Start a process in a session of its own.
+
+        Args:
+            name: ``package/executable``.
+            argv: What to execute.
+            environment: Its variables; the tracer's pipe is added.
+            folder: Working directory.
+
+        Raises:
+            OSError: It cannot be executed.
+        """
+        tracer_read, tracer_write = os.pipe()
+        try:
+            popen = subprocess.Popen(
+                argv,
+                cwd=folder,
+                env={**environment, "ROSGRADE_TRACER_FD": str(tracer_write)},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                pass_fds=(tracer_write,),
+                start_new_session=True,
+            )
+        except OSError:
+            os.close(tracer_read)
+            raise
+        finally:
+            os.close(tracer_write)
+        self._running.append(_Running(name, popen, time.time_ns()))
+        for pipe, stream in ((popen.stdout, "stdout"), (popen.stderr, "stderr")):
+            assert pipe is not None
+            self._output.add(os.dup(pipe.fileno()), name, stream)
+            pipe.close()
+        self._output.add(tracer_read, name, "tracer")
+        self._pids |= {popen.pid}
+
+    @property
+    def pids(self) -> frozenset[int]:
+        """Every process that was launched or descends from one, ended ones too."""
+        return self._pids
+
+    def refresh(self) -> None:
+        """Look for descendants that are not known yet."""
+        self._pids |= frozenset(descendants(os.getpid()))
+
+    def poll(self) -> bool:
+        """Note ended processes; whether any is still running."""
+        for process in self._running:
+            if process.exited_ns is None and process.popen.poll() is not None:
+                process.exited_ns = time.time_ns()
+        return any(process.exited_ns is None for process in self._running)
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal to the process group of every process that still runs."""
+        for process in self._running:
+            if process.exited_ns is None:
+                process.stopped_by = number.name
+                try:
+                    os.killpg(process.popen.pid, number)
+                except ProcessLookupError:
+                    continue
+
+    def note_stop(self, stop_s: float) -> None:
+        """Date the end of the processes that ended since the last call.
+
+        Args:
+            stop_s: Seconds since SIGINT, less what the host took.
+        """
+        self.poll()
+        for process in self._running:
+            ended = process.exited_ns is not None
+            if ended and process.stopped_by != "itself" and process.stop_s is None:
+                process.stop_s = stop_s
+
+    def clean_up(self) -> None:
+        """Kill whatever is left and remove what it left in shared memory."""
+        self._survivors = tuple(
+            command
+            for pid, command in kill_descendants(os.getpid()).items()
+            if pid not in {process.popen.pid for process in self._running}
+        )
+        self.poll()
+        reap()
+        remove_orphaned_segments()
+
+    def records(self) -> tuple[Process, ...]:
+        """What became of each process; call after :meth:`clean_up`."""
+        return tuple(
+            Process(
+                name=process.name,
+                pid=process.popen.pid,
+                started_ns=process.started_ns,
+                exited_ns=process.exited_ns,
+                exit_code=process.popen.returncode,
+                stopped_by=process.stopped_by,
+                stop_s=process.stop_s,
+                survivors=self._survivors if number == 0 else (),
+                dropped_bytes=self._output.dropped_bytes(process.name),
+            )
+            for number, process in enumerate(self._running)
+        )

@@ -1,0 +1,234 @@
+"""The tracer: tells the cell what a student's process does that DDS does not carry.
+
+Python imports a module of this name at start, before the student's code. It wraps a few
+methods of rclpy when (and only if) the student imports them, reports each use as one JSON
+line on the pipe that the cell left open, and changes nothing else, with one exception: a
+publisher on a topic that the probe listens to is held until it is matched, because a
+volatile publisher that publishes in a constructor otherwise writes before discovery has
+matched anybody, and the message is lost.
+
+Only the standard library may be used here, as little as possible of it, and an error must
+never reach the student's program.
+"""
+
+import os
+import sys
+
+_FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
+_HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
+_HOLD_LIMIT_S = 2.0
+_HOLD_POLL_S = 0.002
+_FLUSH_LIMIT_S = 0.5
+_OWN_TOPICS = ("/parameter_events", "/rosout")
+# Writes up to PIPE_BUF (4096 bytes) are atomic, so lines of several processes do not mix.
+_LONGEST_LINE = 4000
+
+
+def _report(kind, **data):
+    """Send one line to the cell; without a listener nothing happens."""
+    try:
+        import json
+
+        line = json.dumps({"kind": kind, "pid": os.getpid(), **data}) + "\n"
+        if len(line) <= _LONGEST_LINE:
+            os.write(_FD, line.encode())
+    except Exception:
+        pass
+
+
+def _quietly(function, *args):
+    try:
+        return function(*args)
+    except Exception:
+        return None
+
+
+def _full_name(node):
+    return node.get_namespace().rstrip("/") + "/" + node.get_name()
+
+
+def _type_name(interface):
+    module = interface.__module__.split(".")
+    return "/".join([module[0], module[1] if len(module) > 1 else "msg", interface.__name__])
+
+
+def _qos(profile):
+    return {
+        "reliability": profile.reliability.name.lower(),
+        "durability": profile.durability.name.lower(),
+        "history": profile.history.name.lower(),
+        "depth": profile.depth,
+    }
+
+
+def _callback_name(callback):
+    return getattr(callback, "__qualname__", type(callback).__name__)
+
+
+def _group(group, node):
+    chosen = group if group is not None else node.default_callback_group
+    return {"type": type(chosen).__name__, "id": id(chosen)}
+
+
+def _endpoint(kind, node, endpoint):
+    if endpoint.topic_name in _OWN_TOPICS:
+        return
+    interface = endpoint.msg_type if kind == "publisher" else endpoint.msg_type
+    _report(
+        kind,
+        node=_full_name(node),
+        topic=endpoint.topic_name,
+        type=_type_name(interface),
+        **_qos(endpoint.qos_profile),
+    )
+
+
+def _hold(publisher):
+    """Wait until somebody is matched with a publisher that the probe listens to."""
+    if publisher.topic_name not in _HELD_TOPICS:
+        return
+    import time
+
+    began = time.monotonic()
+    while not publisher.get_subscription_count():
+        if time.monotonic() - began > _HOLD_LIMIT_S:
+            break
+        time.sleep(_HOLD_POLL_S)
+    _publishers.append(publisher)
+    _report(
+        "held",
+        topic=publisher.topic_name,
+        waited_s=time.monotonic() - began,
+        matched=publisher.get_subscription_count() > 0,
+    )
+
+
+_publishers = []
+
+
+def _flush():
+    """Let what was published arrive before the publisher goes away."""
+    from rclpy.duration import Duration
+
+    while _publishers:
+        publisher = _publishers.pop()
+        _quietly(publisher.wait_for_all_acked, Duration(seconds=_FLUSH_LIMIT_S))
+
+
+def _wrap(owner, name, before=None, after=None):
+    """Replace a method by one that calls ``before(self)`` and ``after(self, result, ...)``."""
+    import functools
+
+    original = getattr(owner, name)
+
+    @functools.wraps(original)
+    def wrapped(self, *args, **kwargs):
+        if before is not None:
+            _quietly(before, self)
+        result = original(self, *args, **kwargs)
+        if after is not None:
+            _quietly(after, self, result)
+        return result
+
+    setattr(owner, name, wrapped)
+
+
+def _patch_node(module):
+    node_class = module.Node
+
+    def published(node, publisher):
+        _endpoint("publisher", node, publisher)
+        _hold(publisher)
+
+    def timer_made(node, timer):
+        _report(
+            "timer",
+            node=_full_name(node),
+            period_s=timer.timer_period_ns / 1e9,
+            callback=_callback_name(timer.callback),
+            group=_group(timer.callback_group, node),
+        )
+
+    def subscribed(node, subscription):
+        _endpoint("subscription", node, subscription)
+
+    _wrap(node_class, "__init__", after=lambda node, _: _report("node", node=_full_name(node)))
+    _wrap(node_class, "create_publisher", after=published)
+    _wrap(node_class, "create_subscription", after=subscribed)
+    _wrap(node_class, "create_timer", after=timer_made)
+    _wrap(node_class, "destroy_node", before=lambda _: _flush())
+
+
+def _patch_context(module):
+    _wrap(module.Context, "init", after=lambda *_: _report("init"))
+    _wrap(module.Context, "shutdown", before=lambda _: _flush())
+    _wrap(module.Context, "try_shutdown", before=lambda _: _flush())
+
+
+def _patch_executors(module):
+    executor_class = module.Executor
+    original = executor_class.wait_for_ready_callbacks
+
+    def first_wait(self, *args, **kwargs):
+        # From the second call on the executor runs rclpy's own method again.
+        self.wait_for_ready_callbacks = original.__get__(self)
+        threads = getattr(getattr(self, "_executor", None), "_max_workers", 1)
+        _report("spin", executor=type(self).__name__, threads=threads)
+        return original(self, *args, **kwargs)
+
+    executor_class.wait_for_ready_callbacks = first_wait
+
+
+_PATCHES = {
+    "rclpy.node": _patch_node,
+    "rclpy.context": _patch_context,
+    "rclpy.executors": _patch_executors,
+}
+
+
+class _Finder:
+    """Finds the modules to patch as Python would, and patches them once they are loaded."""
+
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        patch = _PATCHES.get(name)
+        if patch is None:
+            return None
+        for finder in sys.meta_path:
+            spec = None if finder is cls else finder.find_spec(name, path, target)
+            if spec is not None:
+                break
+        else:
+            return None
+        execute = spec.loader.exec_module
+
+        def exec_module(module):
+            execute(module)
+            _quietly(patch, module)
+
+        spec.loader.exec_module = exec_module
+        return spec
+
+
+def _run_hidden_sitecustomize():
+    """Run the sitecustomize that this one hides, as Python would have."""
+    here = os.path.dirname(os.path.abspath(__file__))
+    paths = [path for path in sys.path if os.path.abspath(path or ".") != here]
+    for finder in sys.meta_path:
+        find = getattr(finder, "find_spec", None)
+        spec = find("sitecustomize", paths) if find and finder is not _Finder else None
+        if spec is not None and spec.origin and os.path.dirname(spec.origin) != here:
+            import importlib.util
+
+            module = importlib.util.module_from_spec(spec)
+            spec.loader.exec_module(module)
+            return
+
+
+if _FD >= 0:
+    sys.meta_path.insert(0, _Finder)
+    import atexit
+
+    atexit.register(lambda: "rclpy" in sys.modules and _quietly(_flush))
+    _report("started", executable=sys.argv[0] if hasattr(sys, "argv") else "")
+_quietly(_run_hidden_sitecustomize)

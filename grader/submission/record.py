@@ -1,0 +1,147 @@
+"""What is known of a submission before anything of it runs: plain facts, ready for judging.
+
+These facts travel inside every recording, so that a regrade needs neither the student's
+files nor ROS. All paths are relative to the submission, with forward slashes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SourceError:
+    """A mistake at a place in the student's files.
+
+    Attributes:
+        file: Path in the submission.
+        line: Line from 1, or None where none is known.
+        message: One line, as the tool that found it said it.
+    """
+
+    file: str
+    line: int | None
+    message: str
+
+    def __str__(self) -> str:
+        """Write ``file:line: message``."""
+        return f"{self.file}:{self.line}: {self.message}" if self.line else f"{self.file}: {self.message}"
+
+
+@dataclass(frozen=True)
+class Import:
+    """A Python module that a package's code imports.
+
+    Attributes:
+        module: Top-level module name, such as ``geometry_msgs``.
+        file: Path in the submission.
+        line: Line from 1.
+        optional: Guarded by ``try`` or ``if TYPE_CHECKING``: the code runs without it.
+    """
+
+    module: str
+    file: str
+    line: int
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class Dependency:
+    """An entry of package.xml (REP-149).
+
+    Attributes:
+        name: ROS package or rosdep key.
+        kind: The tag: ``depend``, ``exec_depend``, ``build_depend``, ``test_depend``, ...
+        line: Line in package.xml.
+        known: Whether the name is a ROS package or rosdep key as far as this machine can
+            tell; None where it cannot tell.
+    """
+
+    name: str
+    kind: str
+    line: int | None = None
+    known: bool | None = None
+
+
+@dataclass(frozen=True)
+class PackageRecord:
+    """One ament package of a submission.
+
+    Attributes:
+        name: Name in package.xml.
+        path: Folder in the submission (``.`` for the submission itself).
+        build_type: ``ament_python``, ``ament_cmake``, ...
+        manifest_error: Why package.xml cannot be used (broken XML, invalid e-mail), or None.
+        dependencies: What package.xml names.
+        imports: What its Python code imports, test and setup files left aside.
+        ros_imports: Those of ``imports`` that belong to a ROS package, with that package's
+            name in ``module``.
+        syntax_errors: Files that Python cannot parse.
+        entry_points: console_scripts of setup.py or setup.cfg: executable -> ``module:function``.
+        executables: What the build installed for ``ros2 run``, in ``lib/<package>/``.
+        misplaced_executables: What it installed in ``bin/`` instead, where ``ros2 run`` does
+            not look (a missing or wrong setup.cfg).
+        missing_targets: Executables whose ``module:function`` does not exist in the package,
+            with what is wrong.
+        files: Python files as installed (``bot_publisher/node.py``) -> path in the submission.
+    """
+
+    name: str
+    path: str
+    build_type: str = "ament_python"
+    manifest_error: SourceError | None = None
+    dependencies: tuple[Dependency, ...] = ()
+    imports: tuple[Import, ...] = ()
+    ros_imports: tuple[Import, ...] = ()
+    syntax_errors: tuple[SourceError, ...] = ()
+    entry_points: tuple[tuple[str, str], ...] = ()
+    executables: tuple[str, ...] = ()
+    misplaced_executables: tuple[str, ...] = ()
+    missing_targets: tuple[tuple[str, SourceError], ...] = ()
+    files: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class BuildRecord:
+    """What ``colcon build`` did.
+
+    Attributes:
+        succeeded: colcon's exit status was 0.
+        duration_s: Wall time of the build when it ran, also when taken from the cache now.
+        cached: Taken from the cache.
+        timed_out: Ended by us after the time limit.
+        failed_packages: Packages that colcon reported as failed or aborted.
+        culprit: The student's file and line that the log blames first, or None.
+        log: The end of colcon's output, student's paths mapped back, at most 64 KiB.
+    """
+
+    succeeded: bool
+    duration_s: float
+    cached: bool = False
+    timed_out: bool = False
+    failed_packages: tuple[str, ...] = ()
+    culprit: SourceError | None = None
+    log: str = ""
+
+
+@dataclass(frozen=True)
+class SubmissionRecord:
+    """Everything known of a submission before it runs.
+
+    Attributes:
+        id: Its name, for people: the folder's or archive's name.
+        sha256: Hash over the paths and contents of its files, as hex.
+        problem: Why nothing can be graded (empty, not a workspace, refused archive), or None.
+        packages: By name, sorted.
+        build: None where nothing was built.
+    """
+
+    id: str
+    sha256: str
+    problem: str | None = None
+    packages: tuple[PackageRecord, ...] = ()
+    build: BuildRecord | None = None
+
+    def package(self, name: str) -> PackageRecord | None:
+        """The package of that name, or None."""
+        return next((package for package in self.packages if package.name == name), None)

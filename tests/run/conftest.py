@@ -1,0 +1,78 @@
+"""Real nodes in real cells, without a build: the executable is written by the test."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from grader import ros
+from grader.assignment.model import Assignment
+from grader.recording.mcap_reader import read_recording
+from grader.recording.model import Recording
+from grader.run.runner import Runner
+from grader.submission.record import SubmissionRecord
+
+PACKAGE, EXECUTABLE = "bot_publisher", "bot_pub"
+SUBMISSION = SubmissionRecord(id="test", sha256="0" * 64)
+
+RunNode = Callable[..., Recording]
+
+
+def assignment(**scenario: Any) -> Assignment:
+    """An assignment with one scenario that launches the executable under test."""
+    return Assignment.model_validate(
+        {
+            "rosgrade": 1,
+            "id": "test",
+            "title": "Test",
+            "packages": [{"name": PACKAGE, "executables": [EXECUTABLE]}],
+            "scenarios": [
+                {
+                    "id": "run",
+                    "launch": [{"executable": EXECUTABLE}],
+                    "record": [{"topic": "/cmd_vel", "type": "geometry_msgs/msg/Twist"}],
+                    "until": {"messages": 3},
+                    "timeout": "5 s",
+                    **scenario,
+                }
+            ],
+            "checks": [{"id": "any", "uses": "node.alive", "points": 1}],
+        }
+    )
+
+
+def install(folder: Path, source: str) -> Path:
+    """An install space (merged layout) with one executable."""
+    file = folder / "install" / "lib" / PACKAGE / EXECUTABLE
+    file.parent.mkdir(parents=True)
+    file.write_text(f"#!{sys.executable}\n{source}", encoding="utf-8")
+    file.chmod(0o755)
+    return folder / "install"
+
+
+@pytest.fixture
+def run_node(tmp_path: Path) -> Iterator[RunNode]:
+    """Run a node's source in a cell and read what was recorded."""
+    runner = Runner(ros.find())
+    numbers = iter(range(1000))
+
+    def run(
+        source: str,
+        progress: Callable[[str, Mapping[str, Any]], None] | None = None,
+        **scenario: Any,
+    ) -> Recording:
+        folder = tmp_path / str(next(numbers))
+        course = assignment(**scenario)
+        runner.progress = progress or (lambda _scenario, _event: None)
+        file = folder / "run.mcap"
+        runner.run(
+            course, course.scenarios[0], SUBMISSION, install(folder, source), file, seed=1
+        )
+        return read_recording(file)
+
+    yield run
+    runner.abort()

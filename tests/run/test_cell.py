@@ -1,0 +1,262 @@
+"""What a cell observes of real student nodes, and that nothing of them is left behind."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from grader import ros
+from grader.recording.model import NS, Ending, Kind, Owner, Recording
+from grader.run.environment import cell_environment
+from tests.run import nodes
+from tests.run.conftest import RunNode
+
+pytestmark = pytest.mark.ros
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process runs."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+    return stat[stat.rindex(")") + 2] not in "ZX"
+
+
+def is_running(fragment: str) -> bool:
+    """Whether any process has a text in its command line."""
+    for file in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if fragment.encode() in file.read_bytes():
+                return True
+        except OSError:
+            continue
+    return False
+
+
+def values(recording: Recording) -> list[float]:
+    """linear.x of all messages on /cmd_vel."""
+    return [message.value["linear"]["x"] for message in recording.on("/cmd_vel")]
+
+
+def test_a_message_published_in_the_constructor_is_received(run_node: RunNode) -> None:
+    for _ in range(5):
+        recording = run_node(nodes.ONE_SHOT, until={"quiet": "300 ms"})
+        assert values(recording) == [1.0]
+
+
+def test_a_message_published_just_before_the_process_ends_is_received(run_node: RunNode) -> None:
+    for _ in range(5):
+        recording = run_node(nodes.ONE_SHOT_THEN_EXIT, until={"quiet": "2 s"})
+        assert values(recording) == [1.0]
+        assert recording.ending is Ending.EXITED
+        assert recording.processes[0].exit_code == 0
+
+
+def test_a_timer_is_recorded_with_its_source_timestamps(run_node: RunNode) -> None:
+    recording = run_node(
+        nodes.timed(period_s=0.1),
+        until={"messages": 11},
+        stimuli=[{"call": "list_parameters", "every": "200 ms"}],
+    )
+    stamps = [message.stamp_ns for message in recording.on("/cmd_vel")]
+    periods = sorted((b - a) / NS for a, b in zip(stamps, stamps[1:], strict=False))
+    assert recording.ending is Ending.UNTIL
+    assert periods[len(periods) // 2] == pytest.approx(0.1, abs=0.02)
+    assert recording.calls and all(call.answered_ns for call in recording.calls[:-1])
+    (publisher,) = recording.declared("publisher")
+    assert (publisher.data["topic"], publisher.data["depth"]) == ("/cmd_vel", 10)
+    (timer,) = recording.declared("timer")
+    assert timer.data["period_s"] == pytest.approx(0.1)
+    assert recording.processes[0].stopped_by == "SIGINT"
+    assert [node.name for node in recording.student_nodes] == ["/bot_publisher"]
+
+
+def test_messages_after_sigint_are_not_recorded(run_node: RunNode) -> None:
+    source = nodes.timed().replace(
+        "rclpy.spin(node)\n",
+        "try:\n    rclpy.spin(node)\nexcept KeyboardInterrupt:\n"
+        "    node.publisher.publish(twist(99.0))\n",
+    )
+    recording = run_node(source)
+    assert set(values(recording)) == {1.0}
+
+
+def test_a_blocked_executor_does_not_answer(run_node: RunNode) -> None:
+    recording = run_node(
+        nodes.BLOCKED,
+        until={"messages": 20},
+        stimuli=[{"call": "list_parameters", "every": "100 ms"}],
+    )
+    assert len(recording.on("/cmd_vel")) >= 20
+    assert recording.calls and recording.calls[0].answered_ns is None
+    assert not recording.declared("spin")
+
+
+def test_a_publisher_that_does_not_match_the_probe_is_recorded_all_the_same(
+    run_node: RunNode,
+) -> None:
+    qos = "QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)"
+    recording = run_node(nodes.timed(qos=qos))
+    (publisher,) = recording.student_endpoints(Kind.PUBLISHER, "/cmd_vel")
+    assert publisher.qos.reliability == "best_effort"
+    sequences = [message.sequence for message in recording.on("/cmd_vel")]
+    assert len(sequences) >= 3 and len(set(sequences)) == len(sequences)
+
+
+def test_a_publisher_of_another_type_is_seen_but_not_recorded(run_node: RunNode) -> None:
+    recording = run_node(nodes.timed(interface="Vector3"))
+    assert recording.ending is Ending.NO_MATCH
+    (publisher,) = recording.student_endpoints(Kind.PUBLISHER, "/cmd_vel")
+    assert publisher.type == "geometry_msgs/msg/Vector3"
+    assert not recording.on("/cmd_vel")
+
+
+def test_code_that_hangs_at_import_ends_after_the_discovery_limit(run_node: RunNode) -> None:
+    recording = run_node(nodes.HANGS_AT_IMPORT, discovery="2 s")
+    assert recording.ending is Ending.NO_NODE
+    assert not recording.student_nodes
+    assert not is_alive(recording.processes[0].pid)
+
+
+def test_a_segfault_is_recorded_with_its_signal(run_node: RunNode) -> None:
+    recording = run_node(nodes.SEGFAULT)
+    assert recording.ending is Ending.EXITED
+    assert (recording.processes[0].exit_code, recording.processes[0].stopped_by) == (-11, "itself")
+
+
+def test_an_exception_is_recorded_with_its_traceback(run_node: RunNode) -> None:
+    recording = run_node(nodes.RAISES)
+    errors = [line.text for line in recording.log if line.stream == "stderr"]
+    assert errors[0] == "Traceback (most recent call last):"
+    assert errors[-1] == "RuntimeError: no robot here"
+    assert recording.processes[0].exit_code == 1
+
+
+def test_an_executable_that_does_not_exist_is_recorded(run_node: RunNode) -> None:
+    recording = run_node(nodes.ONE_SHOT, launch=[{"executable": "bot_pubb"}])
+    assert recording.ending is Ending.NOT_STARTED
+    assert not recording.faults
+
+
+@pytest.mark.slow
+def test_a_gigabyte_of_output_is_drained_and_bounded(run_node: RunNode) -> None:
+    recording = run_node(nodes.FLOOD)
+    kept = sum(len(line.text) for line in recording.log)
+    assert recording.processes[0].exit_code == 0
+    assert kept < 2**18
+    assert recording.processes[0].dropped_bytes + kept > 2**30 - 2**20
+
+
+@pytest.mark.parametrize(
+    ("ignored", "needed"),
+    [("signal.SIGINT", "SIGTERM"), ("signal.SIGINT, signal.SIGTERM", "SIGKILL")],
+)
+def test_a_node_that_ignores_signals_is_stopped_in_steps(
+    run_node: RunNode, ignored: str, needed: str
+) -> None:
+    own_segments = (
+        "import glob\nfor fd in glob.glob('/proc/self/fd/*'):\n"
+        "    path = os.path.realpath(fd)\n"
+        "    if '/dev/shm/fastrtps_' in path and 'port' not in path:\n"
+        "        print('segment', path)\n"
+    )
+    handler = (
+        own_segments + "for number in (" + ignored + ",):\n    signal.signal(number, signal.SIG_IGN)\n"
+        "while True:\n    rclpy.spin_once(node, timeout_sec=0.1)\n"
+    )
+    recording = run_node(
+        nodes.timed(before_spin=handler), shutdown="500 ms", until={"elapsed": "1 s"}
+    )
+    assert recording.processes[0].stopped_by == needed
+    assert not is_alive(recording.processes[0].pid)
+    held = [line.text.split()[1] for line in recording.log if line.text.startswith("segment ")]
+    assert held
+    assert not [path for path in held if Path(path).exists()]
+
+
+def test_a_child_that_leaves_the_session_is_killed_and_named(run_node: RunNode) -> None:
+    spawn = (
+        "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(86399)'],"
+        " start_new_session=True)"
+    )
+    recording = run_node(nodes.timed(before_spin=spawn))
+    assert any("86399" in command for command in recording.processes[0].survivors)
+    assert not is_running("sleep(86399)")
+
+
+def test_a_foreign_node_ends_the_run_as_our_fault_by_name(run_node: RunNode) -> None:
+    foreign: list[subprocess.Popen[bytes]] = []
+    source = "import rclpy\nrclpy.init()\nrclpy.spin(rclpy.create_node('neighbour'))\n"
+
+    def join(_scenario: str, event: object) -> None:
+        assert isinstance(event, dict)
+        if event["event"] == "domain":
+            environment = {**cell_environment(ros.find()), "ROS_DOMAIN_ID": str(event["id"])}
+            foreign.append(subprocess.Popen([sys.executable, "-c", source], env=environment))
+
+    try:
+        recording = run_node(
+            nodes.timed(), progress=join, until={"elapsed": "15 s"}, timeout="15 s"
+        )
+    finally:
+        for process in foreign:
+            process.kill()
+            process.wait()
+    assert recording.ending is Ending.FAULT
+    assert "/neighbour belongs neither to rosgrade nor to the submission" in recording.faults[0]
+    assert {n.name for n in recording.nodes if n.owner is Owner.FOREIGN} == {"/neighbour"}
+
+
+def test_a_second_process_of_the_student_is_not_foreign(run_node: RunNode) -> None:
+    second = (
+        "child = subprocess.Popen([sys.executable, '-c', 'import rclpy; rclpy.init();"
+        ' rclpy.spin(rclpy.create_node("second"))\'])'
+    )
+    recording = run_node(
+        nodes.timed(before_spin=second), until={"elapsed": "2 s"}, timeout="8 s"
+    )
+    assert not recording.faults
+    assert {n.name for n in recording.student_nodes} == {"/bot_publisher", "/second"}
+
+
+@pytest.mark.slow
+def test_ten_at_once_never_hear_each_other(tmp_path: Path) -> None:
+    script = Path(__file__).with_name("one_run.py")
+    environment = {**cell_environment(ros.find()), "PYTHONPATH": str(Path.cwd())}
+    processes = [
+        subprocess.Popen(
+            [sys.executable, str(script), str(tmp_path / str(number)), f"{number}.0"],
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for number in range(1, 11)
+    ]
+    heard = [process.communicate()[0].split() for process in processes]
+    assert heard == [[f"{number}.0"] for number in range(1, 11)]
+
+
+def test_nothing_survives_the_death_of_whoever_ordered_the_run(tmp_path: Path) -> None:
+    script = Path(__file__).with_name("one_run.py")
+    marker = str(tmp_path / "1")
+    environment = {**cell_environment(ros.find()), "PYTHONPATH": str(Path.cwd())}
+    process = subprocess.Popen(
+        [sys.executable, str(script), marker, "1.0", "forever"],
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().strip() == "recording"
+    assert is_running(marker)
+    process.kill()
+    process.communicate()
+    deadline = time.monotonic() + 20.0
+    while is_running(marker):
+        assert time.monotonic() < deadline, "the student's process is still there"
+        time.sleep(0.05)
