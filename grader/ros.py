@@ -50,7 +50,9 @@ class RosInstallation:
     @cached_property
     def python_modules(self) -> frozenset[str]:
         """Names of the packages in the ament index that can be imported in Python."""
-        roots = [Path(path) for path in dict(self.inherited).get("PYTHONPATH", "").split(":") if path]
+        roots = [
+            Path(path) for path in dict(self.inherited).get("PYTHONPATH", "").split(":") if path
+        ]
         roots += self._site_packages()
         return frozenset(
             name for name in self.packages if any((root / name).is_dir() for root in roots)
@@ -85,7 +87,9 @@ class RosInstallation:
         python_path: list[str] = []
         library_path: list[str] = []
         for overlay in overlays:
-            python_path.extend(str(path) for path in sorted(overlay.glob("lib/python3.*/site-packages")))
+            python_path.extend(
+                str(path) for path in sorted(overlay.glob("lib/python3.*/site-packages"))
+            )
             library_path.append(str(overlay / "lib"))
         if self.source == "wheels":
             library_path.extend(self._wheel_libraries())

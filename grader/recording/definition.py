@@ -13,8 +13,8 @@ from pathlib import Path
 _SEPARATOR = "=" * 80
 _FIELD = re.compile(r"^\s*((?:[A-Za-z]\w*/)*[A-Za-z]\w*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[A-Za-z]\w*")
 _PRIMITIVES = frozenset(
-    "bool byte char float32 float64 int8 uint8 int16 uint16 int32 uint32 int64 uint64 "
-    "string wstring".split()
+    {"bool", "byte", "char", "float32", "float64", "string", "wstring"}
+    | {f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)}
 )
 
 
@@ -66,7 +66,7 @@ def concatenated_definition(interface: str, find: Callable[[str], str]) -> str:
 
 
 def _contained(interface: str, text: str) -> list[str]:
-    package = interface.split("/")[0]
+    package = interface.split("/", maxsplit=1)[0]
     names = []
     for line in text.splitlines():
         match = _FIELD.match(line.split("#")[0])

@@ -10,10 +10,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from grader.errors import UsageError
 from grader.recording.mcap_writer import CHANNELS, FORMAT
@@ -65,8 +64,9 @@ def read_recording(file: Path) -> Recording:
         raise UsageError(f"{file}: {error.strerror or error}") from error
     except _NotARecording as error:
         raise UsageError(f"{file}: {error}") from error
-    except (McapError, ValidationError, ValueError, KeyError, EOFError) as error:
-        reason = str(error).partition("\n")[0]
+    except Exception as error:
+        # The readers of MCAP, its compressions and CDR raise whatever damage makes them raise.
+        reason = str(error).partition("\n")[0] or type(error).__name__
         raise UsageError(f"{file}: damaged recording: {reason}") from error
 
 
@@ -104,7 +104,7 @@ def _read(stream: Any) -> Recording:
         name: tuple(fact for _, fact in sorted(items, key=lambda item: item[0]))
         for name, items in facts.items()
     }
-    return _adapter(Recording).validate_python(
+    recording: Recording = _adapter(Recording).validate_python(
         {
             **frame,
             **ordered,
@@ -115,6 +115,7 @@ def _read(stream: Any) -> Recording:
             },
         }
     )
+    return recording
 
 
 def _frame(reader: Any) -> dict[str, Any]:

@@ -78,7 +78,11 @@ def write_recording(
     try:
         with temporary.open("wb") as stream:
             _write(
-                stream, recording, messages, definitions, submission or to_json(recording.submission)
+                stream,
+                recording,
+                messages,
+                definitions,
+                submission or to_json(recording.submission),
             )
         temporary.replace(file)
     finally:
@@ -112,7 +116,7 @@ def _write(
         "application/json",
         submission,
     )
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _write_messages(
@@ -127,9 +131,7 @@ def _write_messages(
                 schemas[message.type] = writer.register_schema(
                     message.type, "ros2msg", definitions[message.type].encode()
                 )
-            channels[key] = writer.register_channel(
-                message.topic, "cdr", schemas[message.type]
-            )
+            channels[key] = writer.register_channel(message.topic, "cdr", schemas[message.type])
         writer.add_message(
             channels[key], message.received_ns, message.cdr, message.stamp_ns, message.sequence
         )

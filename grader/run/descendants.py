@@ -30,7 +30,7 @@ def descendants(of: int) -> dict[int, str]:
         Process id -> command line (or name), zombies left out.
     """
     children: dict[int, list[int]] = {}
-    for entry in os.listdir("/proc"):
+    for entry in os.listdir("/proc"):  # noqa: PTH208  names only, and often
         if entry.isdigit():
             parent = _living_parent(entry)
             if parent is not None:

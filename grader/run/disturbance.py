@@ -82,7 +82,7 @@ def run_delays(pid: int) -> dict[int, int]:
     """Run delay of each thread of a process so far, in nanoseconds; empty where unknown."""
     found: dict[int, int] = {}
     try:
-        threads = os.listdir(f"/proc/{pid}/task")
+        threads = os.listdir(f"/proc/{pid}/task")  # noqa: PTH208  names only, and often
     except OSError:
         return found
     for thread in threads:

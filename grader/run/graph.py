@@ -57,7 +57,10 @@ class GraphObserver:
     """Polls the graph and dates every appearance and disappearance."""
 
     def __init__(
-        self, node: RclpyNode, student_pids: Callable[[], Collection[int]], rescan: Callable[[], None]
+        self,
+        node: RclpyNode,
+        student_pids: Callable[[], Collection[int]],
+        rescan: Callable[[], None],
     ) -> None:
         """Prepare the observer.
 
@@ -111,9 +114,7 @@ class GraphObserver:
             self.changed_ns = now_ns
         return key
 
-    def _see_endpoint(
-        self, kind: Kind, topic: str, info: TopicEndpointInfo, now_ns: int
-    ) -> str:
+    def _see_endpoint(self, kind: Kind, topic: str, info: TopicEndpointInfo, now_ns: int) -> str:
         gid = bytes(info.endpoint_gid)
         key = gid.hex()
         if key not in self._endpoints:
@@ -130,9 +131,7 @@ class GraphObserver:
             self.changed_ns = now_ns
         return key
 
-    def _note_vanished(
-        self, nodes: set[tuple[str, str]], gids: set[str], now_ns: int
-    ) -> None:
+    def _note_vanished(self, nodes: set[tuple[str, str]], gids: set[str], now_ns: int) -> None:
         for key, node in self._nodes.items():
             if node.vanished_ns is None and key not in nodes:
                 self._nodes[key] = dataclasses.replace(node, vanished_ns=now_ns)

@@ -50,6 +50,7 @@ def meet(ros: RosInstallation) -> Meeting:
                 capture_output=True,
                 text=True,
                 timeout=2 * _LIMIT_S,
+                check=False,
             )
         finally:
             if first.stdin is not None:
@@ -65,7 +66,7 @@ def _last_line(text: str) -> str:
     return lines[-1] if lines else ""
 
 
-def _listen() -> None:
+def _listen() -> int:
     import rclpy
     from std_msgs.msg import String
 
@@ -75,6 +76,7 @@ def _listen() -> None:
     print("listening", flush=True)
     sys.stdin.read()
     rclpy.shutdown()
+    return 0
 
 
 def _publish() -> int:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -59,7 +60,7 @@ class Probe:
             ImportError: An interface of a topic does not exist.
         """
         self._limits = limits
-        self._context = rclpy.Context()
+        self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id)
         self.node = Node(
             NAME,
@@ -158,7 +159,11 @@ class Probe:
             self._receive(topic, data, info)
 
         self.node.create_subscription(
-            import_interface(topic.type), topic.name, receive, profile, raw=True
+            import_interface(topic.type),
+            topic.name,
+            receive,  # type: ignore[arg-type]  # with raw=True the info comes too
+            profile,
+            raw=True,
         )
 
     def _receive(self, topic: Topic, data: bytes, info: Any) -> None:
@@ -187,5 +192,3 @@ class Probe:
                 sequence=sequence or 0,
             )
         )
-
-

@@ -157,7 +157,9 @@ class Runner:
                 Command(
                     name=f"{launch.package or default_package}/{launch.executable}",
                     argv=(
-                        str(install / "lib" / (launch.package or default_package) / launch.executable),
+                        *self._program(
+                            install / "lib" / (launch.package or default_package), launch.executable
+                        ),
                         *ros_arguments(launch),
                     ),
                 )
@@ -188,6 +190,21 @@ class Runner:
             },
             avoid_domains=(int(avoid),) if avoid.isdigit() else (),
         )
+
+    def _program(self, folder: Path, executable: str) -> tuple[str, ...]:
+        """What `ros2 run` would execute.
+
+        A Python script is given to the interpreter by name, because its first line cannot
+        hold a path with a space in it.
+        """
+        file = folder / executable
+        try:
+            with file.open("rb") as stream:
+                first = stream.readline(256)
+        except OSError:
+            first = b""
+        is_python = first.startswith(b"#!") and b"python" in first
+        return (str(self.ros.python), str(file)) if is_python else (str(file),)
 
     def _run_cell(self, scenario: str, folder: Path, started: Callable[[], None]) -> None:
         errors = (folder / "stderr.txt").open("w+", encoding="utf-8", errors="replace")

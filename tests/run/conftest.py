@@ -69,9 +69,7 @@ def run_node(tmp_path: Path) -> Iterator[RunNode]:
         course = assignment(**scenario)
         runner.progress = progress or (lambda _scenario, _event: None)
         file = folder / "run.mcap"
-        runner.run(
-            course, course.scenarios[0], SUBMISSION, install(folder, source), file, seed=1
-        )
+        runner.run(course, course.scenarios[0], SUBMISSION, install(folder, source), file, seed=1)
         return read_recording(file)
 
     yield run

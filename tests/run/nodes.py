@@ -47,6 +47,8 @@ def timed(
     callback: str = "",
 ) -> str:
     """A node that publishes from a timer."""
+    message = f"twist({value})" if interface == "Twist" else f"{interface}()"
+    callback = callback or f"self.publisher.publish({message})"
     return (
         HEADER
         + f"""
@@ -57,7 +59,7 @@ class BotPublisher(Node):
         self.timer = self.create_timer({period_s}, self.publish)
 
     def publish(self):
-        {callback or f"self.publisher.publish(twist({value}) if {interface} is Twist else {interface}())"}
+        {callback}
 
 rclpy.init()
 node = BotPublisher()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 import time
@@ -64,7 +65,7 @@ def test_a_timer_is_recorded_with_its_source_timestamps(run_node: RunNode) -> No
         stimuli=[{"call": "list_parameters", "every": "200 ms"}],
     )
     stamps = [message.stamp_ns for message in recording.on("/cmd_vel")]
-    periods = sorted((b - a) / NS for a, b in zip(stamps, stamps[1:], strict=False))
+    periods = sorted((b - a) / NS for a, b in itertools.pairwise(stamps))
     assert recording.ending is Ending.UNTIL
     assert periods[len(periods) // 2] == pytest.approx(0.1, abs=0.02)
     assert recording.calls and all(call.answered_ns for call in recording.calls[:-1])
@@ -166,7 +167,10 @@ def test_a_node_that_ignores_signals_is_stopped_in_steps(
         "        print('segment', path)\n"
     )
     handler = (
-        own_segments + "for number in (" + ignored + ",):\n    signal.signal(number, signal.SIG_IGN)\n"
+        own_segments
+        + "for number in ("
+        + ignored
+        + ",):\n    signal.signal(number, signal.SIG_IGN)\n"
         "while True:\n    rclpy.spin_once(node, timeout_sec=0.1)\n"
     )
     recording = run_node(
@@ -217,9 +221,7 @@ def test_a_second_process_of_the_student_is_not_foreign(run_node: RunNode) -> No
         "child = subprocess.Popen([sys.executable, '-c', 'import rclpy; rclpy.init();"
         ' rclpy.spin(rclpy.create_node("second"))\'])'
     )
-    recording = run_node(
-        nodes.timed(before_spin=second), until={"elapsed": "2 s"}, timeout="8 s"
-    )
+    recording = run_node(nodes.timed(before_spin=second), until={"elapsed": "2 s"}, timeout="8 s")
     assert not recording.faults
     assert {n.name for n in recording.student_nodes} == {"/bot_publisher", "/second"}
 

@@ -11,8 +11,14 @@ Only the standard library may be used here, as little as possible of it, and an 
 never reach the student's program.
 """
 
+from __future__ import annotations
+
 import os
 import sys
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
 
 _FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
 _HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
@@ -24,7 +30,7 @@ _OWN_TOPICS = ("/parameter_events", "/rosout")
 _LONGEST_LINE = 4000
 
 
-def _report(kind, **data):
+def _report(kind: str, **data: Any) -> None:
     """Send one line to the cell; without a listener nothing happens."""
     try:
         import json
@@ -36,23 +42,23 @@ def _report(kind, **data):
         pass
 
 
-def _quietly(function, *args):
+def _quietly(function: Any, *args: Any) -> Any:
     try:
         return function(*args)
     except Exception:
         return None
 
 
-def _full_name(node):
-    return node.get_namespace().rstrip("/") + "/" + node.get_name()
+def _full_name(node: Any) -> str:
+    return str(node.get_namespace().rstrip("/") + "/" + node.get_name())
 
 
-def _type_name(interface):
+def _type_name(interface: Any) -> str:
     module = interface.__module__.split(".")
     return "/".join([module[0], module[1] if len(module) > 1 else "msg", interface.__name__])
 
 
-def _qos(profile):
+def _qos(profile: Any) -> dict[str, Any]:
     return {
         "reliability": profile.reliability.name.lower(),
         "durability": profile.durability.name.lower(),
@@ -61,29 +67,28 @@ def _qos(profile):
     }
 
 
-def _callback_name(callback):
-    return getattr(callback, "__qualname__", type(callback).__name__)
+def _callback_name(callback: Any) -> str:
+    return str(getattr(callback, "__qualname__", type(callback).__name__))
 
 
-def _group(group, node):
+def _group(group: Any, node: Any) -> dict[str, Any]:
     chosen = group if group is not None else node.default_callback_group
     return {"type": type(chosen).__name__, "id": id(chosen)}
 
 
-def _endpoint(kind, node, endpoint):
+def _endpoint(kind: str, node: Any, endpoint: Any) -> None:
     if endpoint.topic_name in _OWN_TOPICS:
         return
-    interface = endpoint.msg_type if kind == "publisher" else endpoint.msg_type
     _report(
         kind,
         node=_full_name(node),
         topic=endpoint.topic_name,
-        type=_type_name(interface),
+        type=_type_name(endpoint.msg_type),
         **_qos(endpoint.qos_profile),
     )
 
 
-def _hold(publisher):
+def _hold(publisher: Any) -> None:
     """Wait until somebody is matched with a publisher that the probe listens to."""
     if publisher.topic_name not in _HELD_TOPICS:
         return
@@ -103,10 +108,10 @@ def _hold(publisher):
     )
 
 
-_publishers = []
+_publishers: list[Any] = []
 
 
-def _flush():
+def _flush() -> None:
     """Let what was published arrive before the publisher goes away."""
     from rclpy.duration import Duration
 
@@ -115,14 +120,14 @@ def _flush():
         _quietly(publisher.wait_for_all_acked, Duration(seconds=_FLUSH_LIMIT_S))
 
 
-def _wrap(owner, name, before=None, after=None):
+def _wrap(owner: Any, name: str, before: Any = None, after: Any = None) -> None:
     """Replace a method by one that calls ``before(self)`` and ``after(self, result, ...)``."""
     import functools
 
     original = getattr(owner, name)
 
     @functools.wraps(original)
-    def wrapped(self, *args, **kwargs):
+    def wrapped(self: Any, *args: Any, **kwargs: Any) -> Any:
         if before is not None:
             _quietly(before, self)
         result = original(self, *args, **kwargs)
@@ -133,14 +138,14 @@ def _wrap(owner, name, before=None, after=None):
     setattr(owner, name, wrapped)
 
 
-def _patch_node(module):
+def _patch_node(module: Any) -> None:
     node_class = module.Node
 
-    def published(node, publisher):
+    def published(node: Any, publisher: Any) -> None:
         _endpoint("publisher", node, publisher)
         _hold(publisher)
 
-    def timer_made(node, timer):
+    def timer_made(node: Any, timer: Any) -> None:
         _report(
             "timer",
             node=_full_name(node),
@@ -149,7 +154,7 @@ def _patch_node(module):
             group=_group(timer.callback_group, node),
         )
 
-    def subscribed(node, subscription):
+    def subscribed(node: Any, subscription: Any) -> None:
         _endpoint("subscription", node, subscription)
 
     _wrap(node_class, "__init__", after=lambda node, _: _report("node", node=_full_name(node)))
@@ -159,17 +164,17 @@ def _patch_node(module):
     _wrap(node_class, "destroy_node", before=lambda _: _flush())
 
 
-def _patch_context(module):
+def _patch_context(module: Any) -> None:
     _wrap(module.Context, "init", after=lambda *_: _report("init"))
     _wrap(module.Context, "shutdown", before=lambda _: _flush())
     _wrap(module.Context, "try_shutdown", before=lambda _: _flush())
 
 
-def _patch_executors(module):
+def _patch_executors(module: Any) -> None:
     executor_class = module.Executor
     original = executor_class.wait_for_ready_callbacks
 
-    def first_wait(self, *args, **kwargs):
+    def first_wait(self: Any, *args: Any, **kwargs: Any) -> Any:
         # From the second call on the executor runs rclpy's own method again.
         self.wait_for_ready_callbacks = original.__get__(self)
         threads = getattr(getattr(self, "_executor", None), "_max_workers", 1)
@@ -190,33 +195,34 @@ class _Finder:
     """Finds the modules to patch as Python would, and patches them once they are loaded."""
 
     @classmethod
-    def find_spec(cls, name, path=None, target=None):
+    def find_spec(cls, name: str, path: Any = None, target: Any = None) -> Any:
         patch = _PATCHES.get(name)
         if patch is None:
             return None
-        for finder in sys.meta_path:
-            spec = None if finder is cls else finder.find_spec(name, path, target)
+        others: list[Any] = [finder for finder in sys.meta_path if finder is not cls]
+        for finder in others:
+            spec = finder.find_spec(name, path, target)
             if spec is not None:
-                break
-        else:
-            return None
-        execute = spec.loader.exec_module
+                spec.loader.exec_module = cls._patching(spec.loader.exec_module, patch)
+                return spec
+        return None
 
-        def exec_module(module):
+    @staticmethod
+    def _patching(execute: Any, patch: Any) -> Any:
+        def exec_module(module: Any) -> None:
             execute(module)
             _quietly(patch, module)
 
-        spec.loader.exec_module = exec_module
-        return spec
+        return exec_module
 
 
-def _run_hidden_sitecustomize():
+def _run_hidden_sitecustomize() -> None:
     """Run the sitecustomize that this one hides, as Python would have."""
     here = os.path.dirname(os.path.abspath(__file__))
     paths = [path for path in sys.path if os.path.abspath(path or ".") != here]
-    for finder in sys.meta_path:
-        find = getattr(finder, "find_spec", None)
-        spec = find("sitecustomize", paths) if find and finder is not _Finder else None
+    others: list[Any] = [finder for finder in sys.meta_path if finder is not _Finder]
+    for finder in others:
+        spec = finder.find_spec("sitecustomize", paths)
         if spec is not None and spec.origin and os.path.dirname(spec.origin) != here:
             import importlib.util
 

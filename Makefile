@@ -1,0 +1,42 @@
+.PHONY: help setup demo test lint lock bench soak docs clean
+
+PYTHON ?= python3
+N ?= 100
+run := .venv/bin/python
+
+help: ## show this list
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
+
+setup: ## make .venv with everything in it; does nothing when it is up to date
+	@$(PYTHON) -m grader.bootstrap
+
+demo: setup ## grade the reference solution, then a broken one
+	@$(run) -m grader.demo
+
+test: lint ## lint, type-check and run every test
+	@$(run) -m pytest -q
+
+lint: setup ## check style and types
+	@.venv/bin/ruff check --quiet
+	@.venv/bin/ruff format --check --quiet
+	@$(run) -m mypy --no-error-summary
+
+lock: setup ## regenerate requirements.lock; UPGRADE=1 to newer versions
+	@$(run) -m pip install --quiet "uv>=0.8"
+	@.venv/bin/uv pip compile pyproject.toml --all-extras --universal --python-version 3.10 \
+		--generate-hashes --no-header --no-emit-index-url --quiet \
+		$(if $(UPGRADE),--upgrade) --output-file requirements.lock >/dev/null
+
+bench: setup ## measure rosgrade's own overhead
+	@$(run) -m grader.bench
+
+soak: setup ## grade the references N times (default 100) and look for a verdict that changes
+	@$(run) -m grader.soak --runs $(N)
+
+docs: setup ## regenerate docs/
+	@$(run) -m grader.docs
+
+clean: ## remove .venv, caches and reports
+	@rm -rf .venv .hypothesis .mypy_cache .pytest_cache .ruff_cache build dist rosgrade-report
+	@rm -f rosgrade-bench*.json
+	@find grader sim tests -name __pycache__ -prune -exec rm -rf {} +

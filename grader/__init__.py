@@ -1,0 +1,3 @@
+"""rosgrade, an autograder for ROS 2."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,379 @@
+"""Make rosgrade's environment: `python3 -m grader.bootstrap` in a checkout.
+
+Runs on the machine's own python3 before anything is installed, so it uses only the standard
+library and syntax that any python3 parses: one that is too old still says what to install.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Set, Tuple
+
+Version = Tuple[int, int]
+
+DISTRO = "jazzy"
+SUPPORTED = ((3, 13), (3, 12), (3, 11), (3, 10))
+WHEELS_PLATFORM = "linux-x86_64"
+VENV = ".venv"
+STAMP = "rosgrade-setup.json"
+
+# ROS's extensions are built against the system's numpy 1, which numpy 2 breaks, and its message
+# generators are written for the system's empy.
+_FROM_SYSTEM = {"numpy", "empy"}
+# One package of the lock has no wheel and is built by these, so they are installed before it.
+_BUILD_TOOLS = {"setuptools"}
+
+
+class SetupError(Exception):
+    """Something that whoever runs the set-up can put right; the text says how."""
+
+
+class Interpreter(NamedTuple):
+    """A Python of this machine."""
+
+    version: Version
+    path: str
+
+
+class Plan(NamedTuple):
+    """What environment is made.
+
+    Attributes:
+        ros: `wheels` from the package index, or the `system`'s, which was sourced.
+        interpreter: The Python that the environment is made from.
+    """
+
+    ros: str
+    interpreter: Interpreter
+
+
+class Locked(NamedTuple):
+    """One entry of the lock.
+
+    Attributes:
+        name: The distribution's name as the lock spells it.
+        text: Its lines, with hashes and annotations.
+        parents: What it was locked for: names of the lock, or of a file for rosgrade's own needs.
+    """
+
+    name: str
+    text: str
+    parents: Set[str]
+
+
+def plan(
+    environ: Mapping[str, str],
+    interpreters: Iterable[Interpreter],
+    platform: str,
+    ros_python: Optional[Version] = None,
+) -> Plan:
+    """Decide whose ROS is used, and which Python.
+
+    Args:
+        environ: The environment variables of the shell.
+        interpreters: The Pythons of the machine, the preferred first; read only as far as needed.
+        platform: As `sysconfig.get_platform()` names it.
+        ros_python: The Python version that the sourced ROS was built for; None if nothing is
+            sourced.
+
+    Raises:
+        SetupError: There is no way on this machine as it is.
+    """
+    distro = _sourced(environ)
+    ours = f"ROS 2 {DISTRO.title()}"
+    if distro and distro != DISTRO:
+        raise SetupError(
+            f"ROS 2 {distro.title()} is sourced in this shell and rosgrade is for {ours}: use a "
+            f"shell that sources nothing (rosgrade then installs its own ROS) or {ours}"
+        )
+    if distro and ros_python is None:
+        raise SetupError(
+            f"{ours} is sourced in this shell but holds no rclpy: sudo apt install "
+            f"ros-{DISTRO}-rclpy ros-{DISTRO}-common-interfaces"
+        )
+    if distro and ros_python not in SUPPORTED:
+        raise SetupError(
+            f"the sourced {ours} is built for Python {_dotted(ros_python)} and rosgrade needs "
+            f"{_supported()}: use a shell that sources nothing"
+        )
+    if not distro and platform != WHEELS_PLATFORM:
+        raise SetupError(
+            f"{ours} comes as wheels for {WHEELS_PLATFORM} only and this is {platform}: install "
+            f"{ours} here, source it and try again"
+        )
+    seen: List[str] = []
+    for interpreter in interpreters:
+        if interpreter.version == ros_python or (not distro and interpreter.version in SUPPORTED):
+            return Plan("system" if distro else "wheels", interpreter)
+        seen.append(_dotted(interpreter.version))
+    if distro:
+        raise SetupError(
+            f"the sourced {ours} is built for Python {_dotted(ros_python)}, which is not here: "
+            f"sudo apt install python{_dotted(ros_python)}-venv"
+        )
+    raise SetupError(
+        f"rosgrade needs Python {_supported()} and here is only {', '.join(seen) or 'none'}: "
+        f"install Python {_dotted(SUPPORTED[1])} with its venv module and put "
+        f"python{_dotted(SUPPORTED[1])} on PATH"
+    )
+
+
+def read_lock(lock_text: str) -> List[Locked]:
+    """Split a lock of `uv pip compile` into its entries, in their order."""
+    entries = []
+    for text in re.split(r"\n(?=[A-Za-z0-9])", lock_text.strip("\n")):
+        name = re.match(r"[A-Za-z0-9._-]+", text)
+        if name:
+            via = text.partition("# via")[2].replace("#", "").splitlines()
+            parents = {parent.strip() for parent in via if parent.strip()}
+            entries.append(Locked(name.group(), text + "\n", parents))
+    return entries
+
+
+def requirements(lock_text: str, plan: Plan) -> str:
+    """Return the part of the lock that is installed under this plan.
+
+    With the system's ROS that is everything but the ROS wheels, what only they need, and what
+    ROS was built against.
+    """
+    entries = read_lock(lock_text)
+    if plan.ros == "system":
+        # A package that has an entry for each of several Pythons has its parents in any of them.
+        parents: Dict[str, Set[str]] = {}
+        for entry in entries:
+            parents.setdefault(entry.name, set()).update(entry.parents)
+        dropped = {name for name in parents if name.startswith("ros-") or name in _FROM_SYSTEM}
+        before = 0
+        while len(dropped) > before:
+            before = len(dropped)
+            dropped |= {name for name, whose in parents.items() if whose and whose <= dropped}
+        entries = [entry for entry in entries if entry.name not in dropped]
+    return "".join(entry.text for entry in entries)
+
+
+def find_ros_python(ament_prefix_path: str) -> Optional[Version]:
+    """Return the Python version that the sourced rclpy was built for, None without an rclpy."""
+    for prefix in _prefixes(ament_prefix_path):
+        for rclpy in sorted(prefix.glob("lib/python3.*/*-packages/rclpy")):
+            version = re.fullmatch(r"python3\.(\d+)", rclpy.parent.parent.name)
+            if version:
+                return 3, int(version.group(1))
+    return None
+
+
+def find_interpreters(environ: Mapping[str, str]) -> Iterator[Interpreter]:
+    """Yield the Pythons of this machine, the preferred first."""
+    names = [f"python{_dotted(version)}" for version in SUPPORTED]
+    if _sourced(environ):
+        # The Python that ROS came with has its numpy and yaml; another of that version has not.
+        folders = [str(prefix / "bin") for prefix in _prefixes(environ["AMENT_PREFIX_PATH"])]
+        for folder in [*folders, "/usr/bin"]:
+            for name in names:
+                yield from _interpreter(shutil.which(name, path=folder))
+    yield from _interpreter(sys.executable)
+    for name in names:
+        yield from _interpreter(shutil.which(name))
+
+
+def set_up(root: Path, environ: Mapping[str, str]) -> None:
+    """Bring the environment in `root` up to date; quick when it already is.
+
+    Raises:
+        SetupError: It could not be made. Nothing half-made is left, only perhaps a whole
+            environment that waits for rosgrade itself.
+    """
+    lock_text = (root / "requirements.lock").read_text(encoding="utf-8")
+    chosen = plan(
+        environ,
+        find_interpreters(environ),
+        sysconfig.get_platform(),
+        find_ros_python(environ.get("AMENT_PREFIX_PATH", "")),
+    )
+    wanted = {
+        # A virtual environment does not survive being moved.
+        "root": str(root),
+        "ros": chosen.ros,
+        "python": _dotted(chosen.interpreter.version),
+        "lock": _digest(lock_text),
+        "pyproject": _digest((root / "pyproject.toml").read_text(encoding="utf-8")),
+    }
+    venv = root / VENV
+    with _alone(root):
+        installed = _read_stamp(venv)
+        if installed == wanted:
+            return
+        if venv.is_symlink() or (venv.exists() and not (venv / "pyvenv.cfg").is_file()):
+            raise SetupError(f"{venv} is not a virtual environment: move it away")
+        if {**installed, "pyproject": ""} != {**wanted, "pyproject": ""}:
+            _remove(venv)
+            try:
+                _create(venv, chosen)
+                _install_lock(venv, requirements(lock_text, chosen))
+                _check_imports(venv, environ)
+            except BaseException:
+                _remove(venv)
+                raise
+        # Only now, so that an interrupted set-up is not taken for a finished one.
+        _write_stamp(venv, {**wanted, "pyproject": ""})
+        _install_rosgrade(venv, root)
+        _write_stamp(venv, wanted)
+    _say(f"ready: {VENV}/bin/rosgrade --help")
+
+
+def main() -> int:
+    """Set up the checkout that this file lies in; return the exit code."""
+    try:
+        set_up(Path(__file__).resolve().parent.parent, os.environ)
+    except SetupError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def _create(venv: Path, chosen: Plan) -> None:
+    version = _dotted(chosen.interpreter.version)
+    python = chosen.interpreter.path
+    system = chosen.ros == "system"
+    if _run([python, "-I", "-c", "import ensurepip, venv"]).returncode:
+        raise SetupError(
+            f"rosgrade needs Python's venv module: sudo apt install python{version}-venv"
+        )
+    _say(f"creating {VENV} (Python {version}{', with the sourced ROS' * system})")
+    options = ["--system-site-packages"] if system else []
+    command = [python, "-I", "-m", "venv", *options, str(venv)]
+    _expect(command, "the virtual environment could not be made")
+
+
+def _install_lock(venv: Path, lock_text: str) -> None:
+    entries = read_lock(lock_text)
+    names = {entry.name for entry in entries}
+    ros = any(name.startswith("ros-") for name in names)
+    size = "about 140 MB" if ros else "about 80 MB"
+    _say(f"installing {len(names)} packages ({size}, about a minute)")
+    for stage, tools in enumerate((True, False)):
+        text = "".join(entry.text for entry in entries if (entry.name in _BUILD_TOOLS) == tools)
+        path = venv / f"requirements-{stage}.txt"
+        path.write_text(text, encoding="utf-8")
+        # Built without isolation, a source uses the locked tools: nothing unlocked is fetched.
+        options = ["--no-deps", "--no-build-isolation", "--use-pep517", "--require-hashes"]
+        problem = "the packages could not be installed; is the package index reachable?"
+        _pip(venv, [*options, "-r", str(path)], problem)
+
+
+def _install_rosgrade(venv: Path, root: Path) -> None:
+    _say("installing rosgrade itself")
+    options = ["--no-deps", "--no-build-isolation", "--editable", str(root)]
+    _pip(venv, options, "rosgrade itself could not be installed")
+
+
+def _check_imports(venv: Path, environ: Mapping[str, str]) -> None:
+    # The wheels' start-up hook leaves this to its children, which may be of another environment.
+    clean = {k: v for k, v in environ.items() if k != "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
+    command = [str(venv / "bin" / "python"), "-c", "import geometry_msgs.msg, rclpy, scipy"]
+    _expect(command, "what was installed does not work together", clean)
+
+
+def _pip(venv: Path, arguments: List[str], problem: str) -> None:
+    # -I: neither a sourced ROS nor the working directory gets among pip's own modules.
+    pip = [str(venv / "bin" / "python"), "-I", "-m", "pip", "--disable-pip-version-check"]
+    _expect([*pip, "install", "--quiet", "--no-input", *arguments], problem)
+
+
+def _run(
+    command: List[str], environ: Optional[Mapping[str, str]] = None
+) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        universal_newlines=True,
+        env=None if environ is None else dict(environ),
+        check=False,
+    )
+
+
+def _expect(command: List[str], problem: str, environ: Optional[Mapping[str, str]] = None) -> None:
+    done = _run(command, environ)
+    if done.returncode:
+        sys.stderr.write(done.stdout)
+        raise SetupError(problem)
+
+
+def _interpreter(path: Optional[str]) -> Iterator[Interpreter]:
+    """Yield the interpreter at `path` if it runs: a version manager's stand-in may not."""
+    # The real path, as `path` may lie in the very environment that is about to be replaced.
+    code = "import os, sys; print(*sys.version_info[:2], os.path.realpath(sys.executable))"
+    done = _run([path, "-I", "-c", code]) if path else None
+    found = re.fullmatch(r"(\d+) (\d+) (.+)\n", done.stdout) if done else None
+    if found:
+        yield Interpreter((int(found.group(1)), int(found.group(2))), found.group(3))
+
+
+def _sourced(environ: Mapping[str, str]) -> str:
+    """Return the distribution that is sourced; empty if none is."""
+    # Images of ROS export ROS_DISTRO without sourcing anything; other tools set the path alone.
+    return environ.get("ROS_DISTRO", "") if environ.get("AMENT_PREFIX_PATH") else ""
+
+
+def _prefixes(ament_prefix_path: str) -> List[Path]:
+    return [Path(prefix) for prefix in ament_prefix_path.split(os.pathsep) if prefix]
+
+
+@contextmanager
+def _alone(root: Path) -> Iterator[None]:
+    """Let a second set-up of the same checkout wait for the first."""
+    folder = os.open(str(root), os.O_RDONLY)
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(folder)
+
+
+def _read_stamp(venv: Path) -> Dict[str, str]:
+    """Return what the environment was made for; empty if it is unfinished or its Python is gone."""
+    try:
+        stamp = json.loads((venv / STAMP).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return stamp if isinstance(stamp, dict) and (venv / "bin" / "python").exists() else {}
+
+
+def _write_stamp(venv: Path, stamp: Mapping[str, str]) -> None:
+    (venv / STAMP).write_text(json.dumps(stamp, indent=1) + "\n", encoding="utf-8")
+
+
+def _remove(venv: Path) -> None:
+    if venv.exists():
+        shutil.rmtree(str(venv))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _dotted(version: Optional[Version]) -> str:
+    return ".".join(map(str, version or ()))
+
+
+def _supported() -> str:
+    return f"{_dotted(SUPPORTED[-1])} to {_dotted(SUPPORTED[0])}"
+
+
+def _say(text: str) -> None:
+    print(f"rosgrade: {text}", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,197 @@
+"""A recording survives its MCAP file, and any MCAP reader opens it."""
+
+from __future__ import annotations
+
+import dataclasses
+import struct
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from grader.errors import UsageError
+from grader.recording.mcap_reader import read_recording
+from grader.recording.mcap_writer import RawMessage, write_recording
+from grader.recording.model import (
+    Call,
+    Declaration,
+    Disturbance,
+    Ending,
+    Endpoint,
+    Kind,
+    LogLine,
+    Node,
+    Owner,
+    Process,
+    Qos,
+    Recording,
+    Wait,
+)
+from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
+
+TWIST = """\
+Vector3  linear
+Vector3  angular
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"""
+CDR_HEADER = b"\x00\x01\x00\x00"
+
+
+def twist(*fields: float) -> bytes:
+    """A Twist as CDR, little endian."""
+    return CDR_HEADER + struct.pack("<6d", *fields)
+
+
+def a_recording(**changes: object) -> Recording:
+    """A recording with one fact of each kind."""
+    recording = Recording(
+        scenario="run",
+        seed=7,
+        ending=Ending.UNTIL,
+        launched_ns=1_000,
+        matched_ns=2_000,
+        stop_ns=9_000,
+        end_ns=9_500,
+        submission=SubmissionRecord(
+            id="ada",
+            sha256="ab" * 32,
+            packages=(
+                PackageRecord(
+                    name="bot_publisher",
+                    path="src/bot_publisher",
+                    syntax_errors=(SourceError("node.py", 3, "invalid syntax"),),
+                    files=(("bot_publisher/node.py", "src/node.py"),),
+                ),
+            ),
+            build=BuildRecord(succeeded=True, duration_s=0.9, log="ok"),
+        ),
+        nodes=(Node("/bot_publisher", Owner.STUDENT, 1_500),),
+        endpoints=(
+            Endpoint(
+                kind=Kind.PUBLISHER,
+                topic="/cmd_vel",
+                type="geometry_msgs/msg/Twist",
+                node="/bot_publisher",
+                owner=Owner.STUDENT,
+                qos=Qos("reliable", "volatile", deadline_s=0.5),
+                gid="01" * 16,
+                appeared_ns=1_600,
+                vanished_ns=9_100,
+            ),
+        ),
+        processes=(Process("p/e", 42, 1_000, 9_400, -2, "SIGINT", 0.06, ("sleep 99",), 5),),
+        log=(LogLine(3_000, "p/e", "stdout", "<b>\x1b[31mred\u202e"),),
+        declarations=(Declaration(1_700, "p/e", "timer", {"period_s": 0.3, "group": {"id": 1}}),),
+        calls=(Call("/bot_publisher/list_parameters", "srv", 2_500, None),),
+        waits=(Wait("a node", 10.0, 1_000, 1_500),),
+        disturbance=(Disturbance(2_000, 30, 40),),
+        faults=("not alone",),
+        environment={"rmw": "rmw_fastrtps_cpp"},
+    )
+    return dataclasses.replace(recording, **changes)  # type: ignore[arg-type]
+
+
+def written(folder: Path, recording: Recording, *messages: RawMessage) -> Path:
+    file = folder / "run.mcap"
+    write_recording(file, recording, messages, {"geometry_msgs/msg/Twist": TWIST})
+    return file
+
+
+def raw(stamp_ns: int, *fields: float, sequence: int = 1) -> RawMessage:
+    return RawMessage(
+        "/cmd_vel", "geometry_msgs/msg/Twist", twist(*fields), stamp_ns, stamp_ns + 50, sequence
+    )
+
+
+def test_everything_comes_back(tmp_path: Path) -> None:
+    recording = a_recording()
+    again = read_recording(written(tmp_path, recording))
+    assert again == recording
+
+
+def test_messages_come_back_decoded_in_the_order_of_their_source_stamps(tmp_path: Path) -> None:
+    file = written(
+        tmp_path, a_recording(), raw(4_000, 1, 0, 0, 0, 0, 0.5, sequence=2), raw(3_000, *range(6))
+    )
+    first, second = read_recording(file).on("/cmd_vel")
+    assert (first.stamp_ns, first.received_ns, first.sequence) == (3_000, 3_050, 1)
+    assert first.value == {
+        "linear": {"x": 0.0, "y": 1.0, "z": 2.0},
+        "angular": {"x": 3.0, "y": 4.0, "z": 5.0},
+    }
+    assert second.value["angular"]["z"] == 0.5
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.text(max_size=40), max_size=20))
+def test_any_log_line_comes_back(
+    tmp_path_factory: pytest.TempPathFactory, lines: list[str]
+) -> None:
+    # Surrogates cannot come from decoding with errors="replace".
+    texts = [line.encode(errors="replace").decode() for line in lines]
+    log = tuple(LogLine(n, "p/e", "stdout", text) for n, text in enumerate(texts))
+    recording = a_recording(log=log)
+    folder = tmp_path_factory.mktemp("log")
+    assert read_recording(written(folder, recording)).log == log
+
+
+def test_any_mcap_reader_opens_it(tmp_path: Path) -> None:
+    file = written(tmp_path, a_recording(), raw(3_000, 1, 0, 0, 0, 0, 0.5))
+    with file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        assert summary is not None
+        topics = {channel.topic for channel in summary.channels.values()}
+        decoded = [m for _, _, _, m in reader.iter_decoded_messages(topics=["/cmd_vel"])]
+    assert {"/cmd_vel", "/rosgrade/nodes", "/rosgrade/log"} <= topics
+    assert decoded[0].angular.z == 0.5
+
+
+@pytest.mark.parametrize("size", [0, 1, 100, -50, -1])
+def test_a_damaged_file_is_one_clear_error(tmp_path: Path, size: int) -> None:
+    file = written(tmp_path, a_recording(), raw(3_000, *range(6)))
+    file.write_bytes(file.read_bytes()[:size])
+    with pytest.raises(UsageError, match=r"run\.mcap: "):
+        read_recording(file)
+
+
+def test_flipped_bytes_never_end_in_a_traceback(tmp_path: Path) -> None:
+    file = written(tmp_path, a_recording(), raw(3_000, *range(6)))
+    good = file.read_bytes()
+    for place in range(0, len(good), 7):
+        file.write_bytes(good[:place] + bytes([good[place] ^ 0xFF]) + good[place + 1 :])
+        try:
+            read_recording(file)
+        except UsageError as error:
+            assert str(file) in str(error)
+
+
+def test_a_file_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="No such file"):
+        read_recording(tmp_path / "none.mcap")
+
+
+def test_a_failed_write_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(KeyError):
+        write_recording(tmp_path / "run.mcap", a_recording(), [raw(1, *range(6))], {})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_host_s_share_is_what_overlaps_the_interval() -> None:
+    recording = a_recording(
+        disturbance=(
+            Disturbance(2_000, 10, 100),
+            Disturbance(3_000, 50, 200),
+            Disturbance(4_000, 20, 400),
+        )
+    )
+    assert recording.taken_s(2_500, 2_600) == pytest.approx(250e-9)
+    assert recording.taken_s(2_500, 3_500) == pytest.approx(650e-9)
+    assert recording.taken_s(5_000, 6_000) == 0.0

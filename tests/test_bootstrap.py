@@ -1,0 +1,208 @@
+"""The decisions of the set-up; none of these tests installs anything."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from grader import bootstrap
+from grader.bootstrap import Interpreter, Plan, SetupError
+
+ROOT = Path(bootstrap.__file__).resolve().parent.parent
+LINUX = "linux-x86_64"
+SOURCED = {"ROS_DISTRO": "jazzy", "AMENT_PREFIX_PATH": "/opt/ros/jazzy"}
+
+WHEELS = Plan("wheels", Interpreter((3, 13), "python3.13"))
+SYSTEM = Plan("system", Interpreter((3, 12), "python3.12"))
+
+LOCK = """\
+colcon-core==0.21 \\
+    --hash=sha256:aa
+    # via rosgrade (pyproject.toml)
+empy==4.2 \\
+    --hash=sha256:bb
+    # via
+    #   colcon-core
+    #   ros-rosidl-adapter
+lark-parser==0.12 \\
+    --hash=sha256:cc
+    # via ros-rosidl-parser
+needed-by-lark==1.0 \\
+    --hash=sha256:dd
+    # via lark-parser
+numpy==2.2 ; python_full_version < '3.11' \\
+    --hash=sha256:ee
+    # via
+    #   ros-rosidl-generator-py
+    #   scipy
+numpy==2.5 ; python_full_version >= '3.11' \\
+    --hash=sha256:ff
+    # via
+    #   rosgrade (pyproject.toml)
+    #   scipy
+pyyaml==6.0 \\
+    --hash=sha256:11
+    # via
+    #   colcon-core
+    #   ros-rclpy
+ros-rclpy==7.1.6 \\
+    --hash=sha256:22
+    # via rosgrade (pyproject.toml)
+ros-rosidl-parser==4.6 \\
+    --hash=sha256:33
+    # via ros-rclpy
+scipy==1.17 \\
+    --hash=sha256:44
+    # via rosgrade (pyproject.toml)
+"""
+
+
+def pythons(*versions: str) -> Iterator[Interpreter]:
+    for version in versions:
+        major, minor = version.split(".")
+        yield Interpreter((int(major), int(minor)), f"python{version}")
+
+
+@pytest.mark.parametrize("version", ["3.10", "3.11", "3.12", "3.13"])
+def test_without_ros_the_wheels_go_into_the_running_python(version: str) -> None:
+    running = next(pythons(version))
+    assert bootstrap.plan({}, [running, WHEELS.interpreter], LINUX) == Plan("wheels", running)
+
+
+@pytest.mark.parametrize("version", ["3.6", "3.9", "3.14"])
+def test_an_unsupported_python_gives_way_to_a_supported_one(version: str) -> None:
+    chosen = bootstrap.plan({}, pythons(version, "3.13", "3.11"), LINUX)
+    assert chosen.interpreter == Interpreter((3, 13), "python3.13")
+
+
+def test_interpreters_are_looked_for_only_as_far_as_needed() -> None:
+    found = pythons("3.11", "3.10")
+    bootstrap.plan({}, found, LINUX)
+    assert [interpreter.version for interpreter in found] == [(3, 10)]
+
+
+def test_no_supported_python_names_what_to_install() -> None:
+    expected = r"needs Python 3\.10 to 3\.13 and here is only 3\.9, 3\.14: install Python 3\.12"
+    with pytest.raises(SetupError, match=expected):
+        bootstrap.plan({}, pythons("3.9", "3.14"), LINUX)
+
+
+def test_sourced_jazzy_is_used_with_the_python_that_it_was_built_for() -> None:
+    chosen = bootstrap.plan(SOURCED, pythons("3.11", "3.12"), LINUX, ros_python=(3, 12))
+    assert chosen == SYSTEM
+
+
+def test_sourced_jazzy_is_used_where_there_are_no_wheels() -> None:
+    chosen = bootstrap.plan(SOURCED, pythons("3.12"), "linux-aarch64", ros_python=(3, 12))
+    assert chosen.ros == "system"
+
+
+@pytest.mark.parametrize(
+    "environ",
+    [
+        {"ROS_DISTRO": "jazzy"},
+        {"ROS_DISTRO": "humble", "AMENT_PREFIX_PATH": ""},
+        {"AMENT_PREFIX_PATH": "/somewhere"},
+    ],
+)
+def test_a_ros_that_is_not_sourced_does_not_count(environ: dict[str, str]) -> None:
+    assert bootstrap.plan(environ, pythons("3.11"), LINUX).ros == "wheels"
+
+
+def test_another_distribution_is_refused_by_name() -> None:
+    humble = {"ROS_DISTRO": "humble", "AMENT_PREFIX_PATH": "/opt/ros/humble"}
+    with pytest.raises(SetupError, match=r"^ROS 2 Humble is sourced .* for ROS 2 Jazzy"):
+        bootstrap.plan(humble, pythons("3.10"), LINUX, ros_python=(3, 10))
+
+
+def test_a_sourced_jazzy_without_rclpy_is_refused() -> None:
+    with pytest.raises(SetupError, match="no rclpy: sudo apt install ros-jazzy-rclpy"):
+        bootstrap.plan(SOURCED, pythons("3.12"), LINUX)
+
+
+def test_a_sourced_jazzy_for_an_unsupported_python_is_refused() -> None:
+    with pytest.raises(SetupError, match=r"built for Python 3\.9 and rosgrade needs 3\.10 to"):
+        bootstrap.plan(SOURCED, pythons("3.9"), LINUX, ros_python=(3, 9))
+
+
+def test_the_missing_python_of_a_sourced_jazzy_is_named() -> None:
+    with pytest.raises(SetupError, match=r"sudo apt install python3\.12-venv$"):
+        bootstrap.plan(SOURCED, pythons("3.11", "3.13"), LINUX, ros_python=(3, 12))
+
+
+def test_a_platform_without_wheels_needs_a_sourced_ros() -> None:
+    with pytest.raises(SetupError, match="this is linux-aarch64: install ROS 2 Jazzy"):
+        bootstrap.plan({}, pythons("3.11"), "linux-aarch64")
+
+
+def test_every_message_is_one_line() -> None:
+    with pytest.raises(SetupError) as caught:
+        bootstrap.plan({}, [], LINUX)
+    assert "\n" not in str(caught.value)
+
+
+def test_wheels_take_the_whole_lock() -> None:
+    assert bootstrap.requirements(LOCK, WHEELS) == LOCK
+
+
+def test_a_sourced_ros_takes_neither_its_own_packages_nor_what_it_is_built_against() -> None:
+    kept = bootstrap.read_lock(bootstrap.requirements(LOCK, SYSTEM))
+    assert [entry.name for entry in kept] == ["colcon-core", "pyyaml", "scipy"]
+    assert all("--hash=sha256:" in entry.text for entry in kept)
+
+
+def test_the_lock_of_this_checkout_holds_one_distribution_of_ros() -> None:
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    versions = {entry.name: entry.text.split()[0] for entry in bootstrap.read_lock(lock)}
+    # Each is a version of Jazzy; Kilted has another major or minor version of every one.
+    jazzy = {
+        "ros-rclpy": "7.1",
+        "ros-rcl": "9.2",
+        "ros-rcutils": "6.7",
+        "ros-rmw": "7.3",
+        "ros-rmw-fastrtps-cpp": "8.4",
+        "ros-fastrtps": "2.14",
+        "ros-rosidl-runtime-c": "4.6",
+        "ros-geometry-msgs": "5.3",
+        "ros-ament-cmake-core": "2.5",
+    }
+    assert {name: versions[name].split("==")[1].rsplit(".", 1)[0] for name in jazzy} == jazzy
+
+
+def test_the_lock_of_this_checkout_names_no_place() -> None:
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    assert not [line for line in lock.splitlines() if "://" in line or line.startswith("-")]
+
+
+def test_the_lock_of_this_checkout_leaves_ros_to_a_sourced_one() -> None:
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    kept = {entry.name for entry in bootstrap.read_lock(bootstrap.requirements(lock, SYSTEM))}
+    assert not {name for name in kept if name.startswith("ros-")}
+    assert kept.isdisjoint({"numpy", "empy", "lark-parser"})
+    assert kept >= {"colcon-ros", "hatchling", "mcap", "pytest", "pyyaml", "scipy", "setuptools"}
+
+
+def test_the_python_of_a_sourced_ros_is_read_from_where_rclpy_lies(tmp_path: Path) -> None:
+    (tmp_path / "overlay").mkdir()
+    (tmp_path / "jazzy/lib/python3.12/site-packages/rclpy").mkdir(parents=True)
+    path = f"{tmp_path}/overlay:{tmp_path}/jazzy"
+    assert bootstrap.find_ros_python(path) == (3, 12)
+    assert bootstrap.find_ros_python(f"{tmp_path}/overlay") is None
+    assert bootstrap.find_ros_python("") is None
+
+
+def test_the_running_python_is_found_first_outside_of_any_environment() -> None:
+    found = next(bootstrap.find_interpreters({}))
+    assert found == Interpreter(sys.version_info[:2], str(Path(sys.executable).resolve()))
+
+
+def test_it_needs_nothing_installed() -> None:
+    modules = "import sys, grader.bootstrap; print(*{name.split('.')[0] for name in sys.modules})"
+    command = [sys.executable, "-S", "-c", modules]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) - {"grader", "__main__"} <= {
+        *sys.stdlib_module_names,
+        "sitecustomize",
+    }
