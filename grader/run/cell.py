@@ -37,6 +37,8 @@ _CALM_TICK_S = 0.1
 _GRAPH_PERIOD_S = 0.1
 _PIPES_LIMIT_S = 1.0
 _LONGEST_STRETCH = 8.0
+# A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
+_SET_UP_S = 0.5
 
 
 class Abandoned(Exception):
@@ -292,12 +294,18 @@ class Cell:
 
     def _call_services(self, now: float) -> None:
         every_s = self._order.list_parameters_s
-        if every_s is None or self._matched_ns is None or now < self._next_call:
+        if every_s is None or now < self._next_call or not self._is_set_up():
             return
         self._next_call = now + every_s
         for node in self._graph.nodes:
             if node.owner is Owner.STUDENT and node.vanished_ns is None:
                 self._probe.call_list_parameters(node.name)
+
+    def _is_set_up(self) -> bool:
+        """Whether the student's nodes are past their constructors, as far as it shows."""
+        if self._probe.last_message_ns is not None:
+            return True
+        return (time.time_ns() - self._graph.changed_ns) / NS > _SET_UP_S
 
     def _find_foreign(self) -> None:
         names = sorted({n.name for n in self._graph.nodes if n.owner is Owner.FOREIGN})

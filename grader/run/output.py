@@ -172,8 +172,10 @@ class OutputReader:
         for line in lines:
             try:
                 data = json.loads(line.text)
-                kind = str(data.pop("kind"))
-            except (ValueError, KeyError, AttributeError, RecursionError):
+            except (ValueError, RecursionError):
                 continue
+            if not isinstance(data, dict) or "kind" not in data:
+                continue
+            kind = str(data.pop("kind"))
             if len(self._declarations) < _MOST_DECLARATIONS:
                 self._declarations.append(Declaration(line.time_ns, line.process, kind, data))

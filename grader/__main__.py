@@ -1,0 +1,5 @@
+"""``python -m grader`` is the command ``rosgrade``."""
+
+from grader.cli.app import main
+
+main()

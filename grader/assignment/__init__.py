@@ -1,0 +1,1 @@
+"""Assignments: YAML in, frozen typed models out."""

@@ -1,0 +1,75 @@
+"""The checks of an assignment, bound to the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.assignment.model import CheckSpec
+from grader.assignment.own_check import load_own_check
+from grader.assignment.source import Source
+from grader.checks.check import Check, Parameters
+from grader.errors import Problem
+from grader.nearest import did_you_mean
+
+
+@dataclass(frozen=True)
+class BoundCheck:
+    """A check of an assignment, ready to judge.
+
+    Attributes:
+        spec: The entry in the YAML.
+        check: What it uses: of the catalogue, or the author's own.
+        parameters: Its ``with``, validated by the check's own model.
+    """
+
+    spec: CheckSpec
+    check: Check
+    parameters: Parameters
+
+    @property
+    def title(self) -> str:
+        """One line for the student: the author's, or the check's own."""
+        return self.spec.title or self.check.title
+
+
+def bind(
+    source: Source, index: int, spec: CheckSpec, catalogue: Mapping[str, Check], folder: Path
+) -> tuple[BoundCheck | None, list[Problem]]:
+    """Find the check that an entry uses, and read its parameters.
+
+    Args:
+        source: The document.
+        index: Of the entry in ``checks``.
+        spec: The entry.
+        catalogue: Checks by name.
+        folder: Where own checks lie.
+
+    Returns:
+        The bound check and no problem, or None and at least one.
+    """
+    place = ("checks", index)
+    if spec.uses is not None and spec.python is not None:
+        return None, [source.problem(place, "give either 'uses' or 'python', not both")]
+    if spec.uses is not None:
+        found = catalogue.get(spec.uses)
+        if found is None:
+            return None, [source.problem((*place, "uses"), _unknown(spec.uses, catalogue))]
+    elif spec.python is not None:
+        try:
+            found = load_own_check(spec.python, folder)
+        except ValueError as error:
+            return None, [source.problem((*place, "python"), str(error))]
+    else:
+        text = "says neither what it 'uses' (a check of the catalogue) nor 'python' (an own check)"
+        return None, [source.problem(place, text)]
+    parameters, problems = source.examine(found.parameters, (*place, "with"))
+    if parameters is None:
+        return None, problems
+    return BoundCheck(spec, found, parameters), []
+
+
+def _unknown(name: str, catalogue: Mapping[str, Check]) -> str:
+    listed = f" The checks are: {', '.join(sorted(catalogue))}."
+    return f"there is no check {name!r}." + (did_you_mean(name, catalogue) or listed)

@@ -1,0 +1,209 @@
+"""YAML text to plain data with the line of every value.
+
+Scalars are read by the core schema of YAML 1.2, as editors do: ``on``, ``yes`` and ``12:30``
+are text, ``1e-3`` is a number, ``010`` is ten. (YAML 1.1, PyYAML's own, makes them true,
+true, 750, text and eight.)
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from grader.errors import AssignmentError, Problem
+
+Place = tuple[str | int, ...]
+
+MAX_VALUES = 20_000
+MAX_DEPTH = 50
+
+_TAG = "tag:yaml.org,2002:"
+_SCALARS = ("null", "bool", "int", "float", "str")
+
+
+class _Loader(yaml.SafeLoader):
+    """PyYAML's parser with the implicit types of YAML 1.2."""
+
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - a class variable of PyYAML
+
+
+for _name, _pattern, _first in (
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    ("int", r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+", list("-+0123456789")),
+    (
+        "float",
+        r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
+        list("-+.0123456789"),
+    ),
+):
+    _Loader.add_implicit_resolver(_TAG + _name, re.compile(rf"(?:{_pattern})\Z"), _first)
+
+
+def parse_yaml(text: str, file: Path) -> tuple[Any, dict[Place, int]]:
+    """Read YAML text.
+
+    Args:
+        text: One YAML document.
+        file: Only named in errors.
+
+    Returns:
+        Plain dicts, lists and scalars; and the line (from 1) of each value, for an entry of a
+        mapping the line of its key.
+
+    Raises:
+        AssignmentError: It is not YAML, has a key twice, uses types of its own, or is
+            absurdly large or deep.
+    """
+    try:
+        node = yaml.compose(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        raise AssignmentError(file, [_syntax(error, text)]) from error
+    except RecursionError as error:
+        raise AssignmentError(file, [Problem("nested too deeply")]) from error
+    if node is None:
+        raise AssignmentError(file, [Problem("the file is empty", 1)])
+    reader = _Reader(file)
+    data = reader.value(node, ())
+    if reader.problems:
+        raise AssignmentError(file, reader.problems)
+    return data, reader.lines
+
+
+def path(place: Place) -> str:
+    """Write a place as people do: ``checks[2].with.period``."""
+    text = ""
+    for step in place:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else str(step)
+    return text
+
+
+class _Reader:
+    """Turns composed YAML nodes into plain data and remembers where each stood."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self.lines: dict[Place, int] = {}
+        self.problems: list[Problem] = []
+        self.count = 0
+
+    def value(self, node: yaml.Node, place: Place) -> Any:
+        line = node.start_mark.line + 1
+        self.lines.setdefault(place, line)
+        self.count += 1
+        if self.count > MAX_VALUES:
+            text = f"more than {MAX_VALUES} values (do aliases multiply each other?)"
+            raise AssignmentError(self.file, [Problem(text)])
+        if len(place) > MAX_DEPTH:
+            text = f"more than {MAX_DEPTH} levels deep (does an alias contain itself?)"
+            raise AssignmentError(self.file, [Problem(text, line, path(place[:3]) + "…")])
+        if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
+            return self._mapping(node, place)
+        if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
+            return [self.value(item, (*place, i)) for i, item in enumerate(node.value)]
+        if isinstance(node, yaml.ScalarNode) and node.tag.removeprefix(_TAG) in _SCALARS:
+            return self._scalar(node, place)
+        tag = "!!" + node.tag.removeprefix(_TAG) if node.tag.startswith(_TAG) else node.tag
+        self.problems.append(Problem(f"the tag {tag} is not allowed here", line, path(place)))
+        return None
+
+    def _mapping(self, node: yaml.MappingNode, place: Place) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, yaml.ScalarNode):
+                self.problems.append(Problem("a key must be a plain word", line, path(place)))
+                continue
+            key = key_node.value
+            if not _is_text(key):
+                self.problems.append(Problem("a key has half a character", line, path(place)))
+                continue
+            if key == "<<":
+                text = "merging (<<) is not part of YAML 1.2: write the keys out"
+                self.problems.append(Problem(text, line, path(place)))
+                continue
+            if key in result:
+                first = self.lines[(*place, key)]
+                text = f"the key {key!r} stands twice (first in line {first})"
+                self.problems.append(Problem(text, line, path(place)))
+                continue
+            self.lines[(*place, key)] = line
+            result[key] = self.value(value_node, (*place, key))
+        return result
+
+    def _scalar(self, node: yaml.ScalarNode, place: Place) -> Any:
+        kind = node.tag.removeprefix(_TAG)
+        try:
+            return _SCALAR_READERS[kind](node.value)
+        except (ValueError, KeyError):
+            shown = node.value.encode("ascii", "backslashreplace").decode()
+            shown = shown if len(shown) <= 40 else f"{shown[:40]}…"
+            line = node.start_mark.line + 1
+            text = f"{shown!r} cannot be read as !!{kind}"
+            self.problems.append(Problem(text, line, path(place)))
+            return None
+
+
+def _is_text(text: str) -> bool:
+    # YAML can write half of a surrogate pair, which no file or terminal can hold.
+    return not any("\ud800" <= character <= "\udfff" for character in text)
+
+
+def _string(text: str) -> str:
+    if not _is_text(text):
+        raise ValueError("half a character")
+    return text
+
+
+def _integer(text: str) -> int:
+    base = {"0o": 8, "0x": 16}.get(text[:2], 10)
+    return int(text, base)
+
+
+def _floating(text: str) -> float:
+    lowered = text.lower()
+    if lowered.endswith(("inf", "nan")):
+        return float(lowered.replace(".", ""))
+    return float(text)
+
+
+_SCALAR_READERS: dict[str, Any] = {
+    "null": lambda _: None,
+    "bool": lambda text: {"true": True, "false": False}[text.lower()],
+    "int": _integer,
+    "float": _floating,
+    "str": _string,
+}
+
+_EMPTY_CONTEXT = "while scanning for the next token"
+_ADVICE = {
+    "found character '\\t'": "indent with spaces, not with tabs",
+    "mapping values are not allowed here": "a text with ': ' in it needs quotes, and a key "
+    "stands as far to the right as the keys beside it",
+    "but found '<block mapping start>'": "is a line indented further than those around it?",
+    "but found '-'": "is a list indented less than the list before?",
+    "but found '<scalar>'": "does a text with quotes, brackets or commas need quotes around it?",
+}
+
+
+def _syntax(error: yaml.YAMLError, text: str) -> Problem:
+    if isinstance(error, yaml.reader.ReaderError):
+        code = f"U+{ord(text[error.position]):04X}"
+        message = f"not valid YAML: the control character {code}"
+        return Problem(message, text.count("\n", 0, error.position) + 1)
+    message = str(error).splitlines()[0]
+    line: int | None = None
+    if isinstance(error, yaml.MarkedYAMLError):
+        context = error.context if error.context != _EMPTY_CONTEXT else None
+        message = ", ".join(filter(None, (context, error.problem)))
+        # What was never closed is mended where it was opened.
+        unclosed = "end of stream" in message or "<stream end>" in message
+        marks = (error.problem_mark, error.context_mark)
+        mark = next(filter(None, reversed(marks) if unclosed else marks), None)
+        line = mark.line + 1 if mark else None
+    advice = next((advice for sign, advice in _ADVICE.items() if sign in message), "")
+    return Problem(f"not valid YAML: {message}" + (f" ({advice})" if advice else ""), line)

@@ -1,0 +1,237 @@
+"""The models of ``mutants.yaml``: what an assignment's checks must notice, and what not.
+
+A mutant is the reference with one mistake of a student in it, and names the checks that must
+fail for it. A variant is another right solution, in an unusual style, and must keep every
+point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from grader.assignment.document import Place
+from grader.assignment.model import Assignment, Id
+from grader.assignment.source import Model
+from grader.checks.finding import Status
+
+
+def _inside(text: str) -> str:
+    """A path that stays in the folder it is relative to.
+
+    Raises:
+        ValueError: It is absolute, leads out of the folder, or is written in another way.
+    """
+    path = PurePosixPath(text)
+    if path.is_absolute() or ".." in path.parts or not path.parts or str(path) != text:
+        raise ValueError(f"{text!r} is not a path in the reference, such as 'package/setup.py'")
+    return text
+
+
+FilePath = Annotated[str, AfterValidator(_inside)]
+
+
+class Edit(Model):
+    """A text to replace in one file of the reference."""
+
+    file: FilePath = Field(description="Path in the reference, with forward slashes.")
+    replace: str = Field(
+        min_length=1, description="The text as it stands there; exactly `count` times."
+    )
+    with_: str = Field(alias="with", description="What stands there instead.")
+    count: int = Field(1, ge=1, description="How often the text stands in the file.")
+
+
+class Change(Model):
+    """What is different from the reference: `edits` first, then `files`, then `move`."""
+
+    id: Id = Field(description="Short name, unique in the file.")
+    title: str = Field(description="What was done, in the words of a student.")
+    edits: tuple[Edit, ...] = Field((), description="Texts to replace, one after the other.")
+    files: dict[FilePath, str | None] = Field(
+        default_factory=dict,
+        description="Whole files: path -> content; null deletes the file, or the folder.",
+    )
+    move: dict[FilePath, FilePath] = Field(
+        default_factory=dict, description="Files or folders to move: from -> to."
+    )
+    skip_reason: str = Field(
+        "", description="Why `rosgrade selftest` leaves it out; empty where it does not."
+    )
+
+
+class Mutant(Change):
+    """A mistake."""
+
+    loses: tuple[Id, ...] = Field(
+        min_length=1,
+        description="Checks that must fail. Those that require them are skipped; all others "
+        "must pass.",
+    )
+
+
+class Variant(Change):
+    """A right solution that looks different; every check must pass."""
+
+
+class MutantFile(Model):
+    """The mutants and variants of an assignment: `assignments/<id>/mutants.yaml`."""
+
+    rosgrade: Literal[1] = Field(description="Version of this format.")
+    mutants: tuple[Mutant, ...] = Field(min_length=1, description="Mistakes.")
+    variants: tuple[Variant, ...] = Field((), description="Right solutions in another style.")
+
+
+def mutate(
+    change: Change, files: Mapping[str, bytes]
+) -> tuple[dict[str, bytes], list[tuple[Place, str]]]:
+    """Change the files of a reference.
+
+    Args:
+        change: A mutant or a variant.
+        files: Content by path, with forward slashes.
+
+    Returns:
+        The changed files, and what could not be changed: the place in the change and why.
+    """
+    result = dict(files)
+    problems = [
+        *_edit(change, result),
+        *_replace(change, result),
+        *_move(change, result),
+    ]
+    if not problems and result == dict(files):
+        problems.append(((), "changes nothing"))
+    return result, problems
+
+
+def _edit(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
+    for index, edit in enumerate(change.edits):
+        if edit.file not in files:
+            yield ("edits", index, "file"), f"the reference has no file {edit.file!r}"
+            continue
+        old, new = edit.replace.encode(), edit.with_.encode()
+        found = files[edit.file].count(old)
+        if found != edit.count:
+            text = f"the text stands {_times(found)} in {edit.file}, not {_times(edit.count)}"
+            yield ("edits", index, "replace"), text
+            continue
+        files[edit.file] = files[edit.file].replace(old, new)
+
+
+def _times(count: int) -> str:
+    return {0: "never", 1: "once", 2: "twice"}.get(count, f"{count} times")
+
+
+def _replace(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
+    for name, content in change.files.items():
+        if content is not None:
+            files[name] = content.encode()
+            continue
+        gone = _below(name, files)
+        if not gone:
+            yield ("files", name), f"nothing to delete: the reference has no {name!r}"
+        for path in gone:
+            del files[path]
+
+
+def _move(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
+    for source, target in change.move.items():
+        moved = {path: files.pop(path) for path in _below(source, files)}
+        if not moved:
+            yield ("move", source), f"nothing to move: the reference has no {source!r}"
+        files.update({target + path[len(source) :]: moved[path] for path in moved})
+
+
+def _below(name: str, files: Mapping[str, bytes]) -> list[str]:
+    """The file of that name, or all in the folder of that name."""
+    return [path for path in files if path == name or path.startswith(f"{name}/")]
+
+
+def expected_statuses(assignment: Assignment, change: Change) -> dict[str, Status]:
+    """How each check must end for a mutant or a variant.
+
+    Args:
+        assignment: With valid ``requires``.
+        change: What was changed.
+
+    Returns:
+        By id of the check, in the author's order: ``failed`` for those that the mutant names,
+        ``skipped`` for those that require one of them, directly or not, else ``passed``.
+    """
+    loses = change.loses if isinstance(change, Mutant) else ()
+    requires = {spec.id: spec.requires for spec in assignment.checks}
+    lost = {spec.id for spec in assignment.checks if spec.id in loses}
+    statuses = {}
+    for check in requires:
+        status = Status.FAILED if check in lost else Status.PASSED
+        statuses[check] = Status.SKIPPED if required_by(check, requires) & lost else status
+    return statuses
+
+
+def required_by(check: str, requires: Mapping[str, tuple[str, ...]]) -> set[str]:
+    """Everything that a check requires, directly or not; without itself."""
+    found: set[str] = set()
+    waiting = list(requires.get(check, ()))
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting.extend(requires.get(name, ()))
+    return found - {check}
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A check that ended otherwise than it must.
+
+    Attributes:
+        check: Its id.
+        expected: How it must end.
+        actual: How it ended; None where it has no result.
+    """
+
+    check: str
+    expected: Status
+    actual: Status | None
+
+    def __str__(self) -> str:
+        """Write ``period: passed instead of failed``."""
+        actual = self.actual.value if self.actual else "no result"
+        return f"{self.check}: {actual} instead of {self.expected.value}"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the checks made of one mutant or variant.
+
+    Attributes:
+        differences: Checks that ended otherwise than they must; none if all is well.
+    """
+
+    differences: tuple[Difference, ...]
+
+    @property
+    def right(self) -> bool:
+        """Whether every check ended as it must."""
+        return not self.differences
+
+    @property
+    def judged(self) -> bool:
+        """Whether no check ended as ``error``: otherwise the machine failed, not a check."""
+        return all(one.actual is not Status.ERROR for one in self.differences)
+
+
+def verdict(expected: Mapping[str, Status], actual: Mapping[str, Status]) -> Verdict:
+    """Compare how checks ended with how they must end, by id of the check."""
+    return Verdict(
+        tuple(
+            Difference(check, status, actual.get(check))
+            for check, status in expected.items()
+            if actual.get(check) is not status
+        )
+    )

@@ -1,0 +1,144 @@
+"""Mutants on disk: reading ``mutants.yaml``, making a mutated submission of the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader import resources
+from grader.assignment.document import Place
+from grader.assignment.model import Assignment
+from grader.assignment.mutant import Change, Mutant, MutantFile, Variant, mutate, required_by
+from grader.assignment.source import Source, read_source
+from grader.errors import AssignmentError, Problem, UsageError
+from grader.nearest import did_you_mean
+
+MUTANTS_FILE = "mutants.yaml"
+
+_LEFT_OUT = {"__pycache__", "build", "install", "log"}
+
+
+@dataclass(frozen=True)
+class Mutants:
+    """The mutants and variants of an assignment, all of which apply to its reference.
+
+    Attributes:
+        file: The YAML file.
+        reference: Folder of the reference solution.
+        mutants: Mistakes.
+        variants: Right solutions in another style.
+    """
+
+    file: Path
+    reference: Path
+    mutants: tuple[Mutant, ...]
+    variants: tuple[Variant, ...]
+
+
+def reference_of(assignment: str) -> Path:
+    """The folder of an assignment's reference solution.
+
+    Raises:
+        UsageError: It has none.
+    """
+    folder = resources.reference() / assignment
+    if not folder.is_dir():
+        raise UsageError(f"the assignment {assignment!r} has no reference solution: {folder}")
+    return folder
+
+
+def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = None) -> Mutants:
+    """Read and check the mutants of an assignment.
+
+    Args:
+        assignment: Whose checks they name.
+        folder: The assignment's folder.
+        reference: Folder of the reference solution, by default rosgrade's own.
+
+    Raises:
+        UsageError: There is no such file, or no reference.
+        AssignmentError: With every mistake: an id twice, an unknown check, an edit that does
+            not apply to the reference.
+    """
+    reference = reference_of(assignment.id) if reference is None else reference
+    source = read_source(folder / MUTANTS_FILE)
+    content = source.read(MutantFile)
+    files = _read(reference)
+    problems = [*_duplicates(source), *_losses(source, content, assignment)]
+    for place, change in _changes(content):
+        _, found = mutate(change, files)
+        problems += [source.problem((*place, *inside), text) for inside, text in found]
+    if problems:
+        raise AssignmentError(source.file, sorted(problems, key=lambda one: one.line or 0))
+    return Mutants(source.file, reference, content.mutants, content.variants)
+
+
+def apply(change: Change, reference: Path, target: Path) -> None:
+    """Write a changed copy of the reference.
+
+    Args:
+        change: A mutant or a variant.
+        reference: Folder of the reference solution.
+        target: Folder to write; it may exist, but must be empty.
+
+    Raises:
+        UsageError: The target holds something.
+        AssignmentError: The change does not apply.
+    """
+    files, found = mutate(change, _read(reference))
+    if found:
+        raise AssignmentError(
+            reference, [Problem(f"{change.id!r} does not apply: {text}") for _, text in found]
+        )
+    target.mkdir(parents=True, exist_ok=True)
+    if any(target.iterdir()):
+        raise UsageError(f"{target}: is not empty")
+    for name, content in files.items():
+        file = target / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+
+
+def _read(folder: Path) -> dict[str, bytes]:
+    """All files of a folder by path, without what a build leaves."""
+    return {
+        inside.as_posix(): (folder / inside).read_bytes()
+        for inside in sorted(file.relative_to(folder) for file in folder.rglob("*"))
+        if (folder / inside).is_file() and not _LEFT_OUT.intersection(inside.parts)
+    }
+
+
+def _changes(content: MutantFile) -> Iterator[tuple[Place, Change]]:
+    for index, mutant in enumerate(content.mutants):
+        yield ("mutants", index), mutant
+    for index, variant in enumerate(content.variants):
+        yield ("variants", index), variant
+
+
+def _duplicates(source: Source) -> Iterator[Problem]:
+    seen: dict[object, Place] = {}
+    for key in ("mutants", "variants"):
+        for index, entry in enumerate(source.entries(key)):
+            place: Place = (key, index, "id")
+            first = seen.setdefault(entry["id"], place)
+            if first != place:
+                line = source.line(first)
+                text = f"{entry['id']!r} stands twice (first in line {line})"
+                yield source.problem(place, text)
+
+
+def _losses(source: Source, content: MutantFile, assignment: Assignment) -> Iterator[Problem]:
+    requires = {spec.id: spec.requires for spec in assignment.checks}
+    for index, mutant in enumerate(content.mutants):
+        for number, lost in enumerate(mutant.loses):
+            place = ("mutants", index, "loses", number)
+            if lost not in requires:
+                listed = f" The checks are: {', '.join(requires)}."
+                text = f"there is no check {lost!r}." + (did_you_mean(lost, requires) or listed)
+                yield source.problem(place, text)
+                continue
+            above = sorted(required_by(lost, requires) & set(mutant.loses))
+            if above:
+                text = f"{lost!r} requires {above[0]!r}, so it is skipped: leave it out"
+                yield source.problem(place, text)

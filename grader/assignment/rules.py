@@ -1,0 +1,207 @@
+"""What must fit together in an assignment, beyond the form of each value. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from grader.assignment.binding import BoundCheck
+from grader.assignment.document import Place
+from grader.assignment.draft import Draft
+from grader.assignment.model import Launch, Package, Scenario
+from grader.assignment.quantity import format_duration
+from grader.checks.check import Subject
+from grader.errors import Problem
+from grader.nearest import did_you_mean
+
+_MESSAGE_FAMILIES = ("messages", "timing")
+"""Families that judge received messages: what is not recorded looks like silence to them."""
+
+
+def problems(draft: Draft, bound: Sequence[BoundCheck | None]) -> Iterator[Problem]:
+    """Find everything that does not fit together.
+
+    Args:
+        draft: The document, as far as it could be read.
+        bound: One per entry of ``checks``; None where it could not be bound.
+    """
+    yield from _duplicates(draft, "packages", "name")
+    yield from _duplicates(draft, "scenarios", "id")
+    yield from _duplicates(draft, "checks", "id")
+    for index, scenario in enumerate(draft.scenarios):
+        if scenario is not None:
+            yield from _scenario(draft, index, scenario)
+    yield from _requirements(draft)
+    yield from _circles(draft)
+    yield from _points(draft)
+    for index, check in enumerate(bound):
+        if check is not None:
+            yield from _check(draft, index, check)
+
+
+def _duplicates(draft: Draft, key: str, name: str) -> Iterator[Problem]:
+    seen: dict[str, Place] = {}
+    for index, value in enumerate(draft.names(key, name)):
+        place = (key, index, name)
+        if value in seen:
+            line = draft.source.line(seen[value])
+            yield draft.source.problem(place, f"{value!r} stands twice (first in line {line})")
+        elif value is not None:
+            seen[value] = place
+
+
+def _scenario(draft: Draft, index: int, scenario: Scenario) -> Iterator[Problem]:
+    place: Place = ("scenarios", index)
+    problem = draft.source.problem
+    for number, launch in enumerate(scenario.launch):
+        yield from _launch(draft, (*place, "launch", number), launch)
+    topics = [recorded.topic for recorded in scenario.record]
+    for number, topic in enumerate(topics):
+        if topic in topics[:number]:
+            yield problem((*place, "record", number, "topic"), f"{topic!r} is recorded twice")
+    until = scenario.until
+    if not topics:
+        for key in ("messages", "quiet"):
+            if getattr(until, key) is not None:
+                yield problem((*place, "until", key), "no topic is recorded: 'record' is missing")
+    for key, limit in (("quiet", until.quiet), ("elapsed", until.elapsed)):
+        if limit is not None and limit >= scenario.timeout:
+            shown, timeout = format_duration(limit), format_duration(scenario.timeout)
+            yield problem(
+                (*place, "until", key),
+                f"{shown} can never pass before the timeout of {timeout} ends the scenario",
+            )
+
+
+def _launch(draft: Draft, place: Place, launch: Launch) -> Iterator[Problem]:
+    names = [name for name in draft.names("packages", "name") if name is not None]
+    if launch.package is None and len(names) != 1:
+        listed = ", ".join(names) or "none"
+        text = f"the key 'package' is missing: there is not exactly one package ({listed})"
+        yield draft.source.problem(place, text)
+        return
+    package = _package(draft, launch.package or names[0])
+    if launch.package is not None and launch.package not in names:
+        yield draft.source.problem((*place, "package"), _no_package(launch.package, names))
+    elif package is not None and launch.executable not in package.executables:
+        yield draft.source.problem(
+            (*place, "executable"), _no_executable(launch.executable, package)
+        )
+
+
+def _package(draft: Draft, name: str) -> Package | None:
+    return next((one for one in draft.packages if one is not None and one.name == name), None)
+
+
+def _no_package(name: str, names: Sequence[str]) -> str:
+    listed = f" The packages are: {', '.join(names)}."
+    return f"{name!r} is not among 'packages'." + (did_you_mean(name, names) or listed)
+
+
+def _no_executable(name: str, package: Package) -> str:
+    listed = f" It has: {', '.join(package.executables) or 'none'}."
+    advice = did_you_mean(name, package.executables) or listed
+    return f"the package {package.name!r} has no executable {name!r} in 'packages'.{advice}"
+
+
+def _requirements(draft: Draft) -> Iterator[Problem]:
+    names = draft.names("checks")
+    known = [name for name in names if name is not None]
+    for index, spec in enumerate(draft.checks):
+        for number, required in enumerate(spec.requires if spec else ()):
+            place = ("checks", index, "requires", number)
+            if required == names[index]:
+                yield draft.source.problem(place, "a check cannot require itself")
+            elif required not in known:
+                listed = f" The checks are: {', '.join(known)}."
+                advice = did_you_mean(required, known) or listed
+                yield draft.source.problem(place, f"there is no check {required!r}.{advice}")
+
+
+def _circles(draft: Draft) -> Iterator[Problem]:
+    requires = {
+        spec.id: {other for other in spec.requires if other != spec.id}
+        for spec in draft.checks
+        if spec is not None
+    }
+    waiting = {check: others & requires.keys() for check, others in requires.items()}
+    while waiting:
+        ready = [check for check, others in waiting.items() if not others & waiting.keys()]
+        if not ready:
+            circle = _circle(waiting)
+            place = ("checks", draft.names("checks").index(circle[0]), "requires")
+            text = f"never judged, because it requires itself: {' -> '.join(circle)}"
+            yield draft.source.problem(place, text)
+            ready = circle
+        waiting = {check: others for check, others in waiting.items() if check not in ready}
+
+
+def _circle(waiting: dict[str, set[str]]) -> list[str]:
+    path = [next(iter(waiting))]
+    while path.count(path[-1]) == 1:
+        path.append(min(waiting[path[-1]] & waiting.keys()))
+    circle = path[path.index(path[-1]) : -1]
+    # Told from the check that the author wrote first.
+    first = min(circle, key=list(waiting).index)
+    at = circle.index(first)
+    return [*circle[at:], *circle[:at], first]
+
+
+def _points(draft: Draft) -> Iterator[Problem]:
+    if draft.checks and all(spec is not None and spec.points == 0.0 for spec in draft.checks):
+        yield draft.source.problem(("checks",), "the points of all checks add up to 0")
+
+
+def _check(draft: Draft, index: int, bound: BoundCheck) -> Iterator[Problem]:
+    place: Place = ("checks", index)
+    problem = draft.source.problem
+    name, spec = bound.check.name, bound.spec
+    known = [one for one in draft.names("scenarios") if one is not None]
+    if bound.check.subject is Subject.SUBMISSION:
+        if spec.scenarios:
+            text = f"{name!r} judges what was handed in, not a run: leave 'scenarios' out"
+            yield problem((*place, "scenarios"), text)
+    elif not draft.scenarios:
+        yield problem(place, f"{name!r} judges a run, but the assignment has no scenarios")
+    else:
+        for number, scenario in enumerate(spec.scenarios):
+            if scenario not in known:
+                advice = did_you_mean(scenario, known)
+                text = f"there is no scenario {scenario!r}."
+                listed = f" The scenarios are: {', '.join(known)}."
+                yield problem((*place, "scenarios", number), text + (advice or listed))
+        yield from _topic(draft, place, bound)
+    yield from _package_of(draft, place, bound)
+
+
+def _topic(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
+    """A check of messages needs its topic recorded, by each of its scenarios, as its type."""
+    family = bound.check.name.partition(".")[0]
+    topic = getattr(bound.parameters, "topic", None)
+    interface = getattr(bound.parameters, "type", None)
+    if topic is None or (family not in _MESSAGE_FAMILIES and interface is None):
+        return
+    for scenario in draft.scenarios_of(bound.spec) or ():
+        recorded = {one.topic: one.type for one in scenario.record}
+        if topic not in recorded:
+            advice = did_you_mean(topic, recorded)
+            listed = f" It records: {', '.join(recorded) or 'nothing'}."
+            text = f"the scenario {scenario.id!r} does not record {topic!r}."
+            yield draft.source.problem((*place, "with", "topic"), text + (advice or listed))
+        elif interface is not None and interface != recorded[topic]:
+            text = f"the scenario {scenario.id!r} records {topic!r} as {recorded[topic]!r}"
+            yield draft.source.problem((*place, "with", "type"), text)
+
+
+def _package_of(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
+    """A check of a package must name one that is handed in."""
+    name = getattr(bound.parameters, "package", None)
+    if not isinstance(name, str):
+        return
+    names = [one for one in draft.names("packages", "name") if one is not None]
+    package = _package(draft, name)
+    executable = getattr(bound.parameters, "executable", None)
+    if name not in names:
+        yield draft.source.problem((*place, "with", "package"), _no_package(name, names))
+    elif package and isinstance(executable, str) and executable not in package.executables:
+        text = _no_executable(executable, package)
+        yield draft.source.problem((*place, "with", "executable"), text)

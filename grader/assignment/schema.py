@@ -1,0 +1,78 @@
+"""JSON Schemas of the YAML files, for editors that complete and check while one types.
+
+An editor finds a schema by a comment at the top of the file::
+
+    # yaml-language-server: $schema=assignment.schema.json
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic.json_schema import models_json_schema
+
+from grader.assignment.model import Assignment, CheckSpec
+from grader.assignment.mutant import MutantFile
+from grader.assignment.source import Model
+from grader.checks.catalogue import CATALOGUE
+from grader.checks.check import Check
+
+_DRAFT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, Any]:
+    """The schema of ``assignment.yaml``, with the parameters of every check.
+
+    Args:
+        catalogue: Checks by name.
+    """
+    models: list[type[Model]] = [Assignment, CheckSpec]
+    models += [check.parameters for check in catalogue.values()]
+    references, schema = _schemas(models)
+    entry = schema["$defs"][_name(references[CheckSpec])]
+    entry["properties"]["uses"] = {
+        "description": entry["properties"]["uses"]["description"],
+        "oneOf": [
+            {"const": check.name, "description": check.title}
+            for check in sorted(catalogue.values(), key=lambda check: check.name)
+        ],
+    }
+    entry["properties"]["python"] = {
+        "description": entry["properties"]["python"]["description"],
+        "type": "string",
+        "pattern": r"^[A-Za-z_]\w*\.py:[A-Za-z_]\w*$",
+    }
+    entry["oneOf"] = [{"required": ["uses"]}, {"required": ["python"]}]
+    entry["allOf"] = [
+        _parameters_of(check, references[check.parameters]) for check in catalogue.values()
+    ]
+    return {"$schema": _DRAFT, **references[Assignment], **schema}
+
+
+def mutants_schema() -> dict[str, Any]:
+    """The schema of ``mutants.yaml``."""
+    references, schema = _schemas([MutantFile])
+    return {"$schema": _DRAFT, **references[MutantFile], **schema}
+
+
+def _schemas(
+    models: list[type[Model]],
+) -> tuple[dict[type[Model], dict[str, Any]], dict[str, Any]]:
+    """A reference to each model, and the definitions that they refer to."""
+    unique = list(dict.fromkeys(models))
+    found, schema = models_json_schema([(model, "validation") for model in unique], by_alias=True)
+    return {model: found[model, "validation"] for model in unique}, schema
+
+
+def _name(reference: Mapping[str, Any]) -> str:
+    return str(reference["$ref"]).rpartition("/")[2]
+
+
+def _parameters_of(check: Check, reference: Mapping[str, Any]) -> dict[str, Any]:
+    """If an entry uses this check, its ``with`` has the parameters of this check."""
+    then: dict[str, Any] = {"properties": {"with": reference}}
+    if any(field.is_required() for field in check.parameters.model_fields.values()):
+        then["required"] = ["with"]
+    condition = {"properties": {"uses": {"const": check.name}}, "required": ["uses"]}
+    return {"if": condition, "then": then}

@@ -1,0 +1,163 @@
+"""The pipeline from a submission to a grade: prepare, run, judge, and again if disturbed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.assignment.load import LoadedAssignment
+from grader.errors import GraderFault
+from grader.grade import Grade, grade
+from grader.recording.mcap_reader import read_recording
+from grader.recording.mcap_writer import to_json
+from grader.recording.model import Recording
+from grader.report.files import write_whole
+from grader.run.runner import Runner, scenario_seed
+from grader.submission.prepare import Prepared, prepare
+
+RECORDINGS_FOLDER = "recordings"
+SUBMISSION_FILE = "submission.json"
+MOST_RUNS = 3
+"""Runs of a scenario before it is given up as disturbed."""
+
+
+@dataclass(frozen=True)
+class Graded:
+    """A graded submission with all that its grade rests on.
+
+    Attributes:
+        grade: The grade.
+        prepared: The submission, built.
+        recordings: By scenario.
+        files: Recording files by scenario.
+        runs: How often each scenario was run.
+        faults: Why a scenario has no recording, by scenario; ours or the machine's.
+    """
+
+    grade: Grade
+    prepared: Prepared
+    recordings: Mapping[str, Recording]
+    files: Mapping[str, Path]
+    runs: Mapping[str, int]
+    faults: Mapping[str, str]
+
+
+class Grading:
+    """Grades submissions of one assignment."""
+
+    def __init__(
+        self,
+        loaded: LoadedAssignment,
+        runner: Runner,
+        cache: Path,
+        *,
+        seed: int | None = None,
+    ) -> None:
+        """Set up.
+
+        Args:
+            loaded: The assignment.
+            runner: Runs the cells.
+            cache: Folder of cached builds.
+            seed: Base of all seeds instead of the submission's hash.
+        """
+        self._loaded = loaded
+        self._runner = runner
+        self._cache = cache
+        self._seed = seed
+        self._scenarios = loaded.assignment.scenarios
+
+    def grade(
+        self, path: Path, folder: Path, on_build: Callable[[str], None] = lambda _: None
+    ) -> Graded:
+        """Grade one submission.
+
+        Args:
+            path: What was handed in.
+            folder: Where the recordings go, ``<scenario>.mcap``.
+            on_build: Told the progress of the build.
+
+        Raises:
+            UsageError: There is nothing at ``path``.
+            GraderFault: The build could not be tried.
+        """
+        prepared = prepare(path, self._runner.ros, cache=self._cache, on_progress=on_build)
+        return self.grade_prepared(prepared, folder)
+
+    def abort(self) -> None:
+        """End every cell that runs; what is being graded ends as interrupted."""
+        self._runner.abort()
+
+    def grade_prepared(self, prepared: Prepared, folder: Path) -> Graded:
+        """Run and judge a submission that is built already.
+
+        Args:
+            prepared: The submission.
+            folder: Where the recordings and the submission's facts go; recordings of an
+                earlier run are removed.
+        """
+        for old in folder.glob("*.mcap"):
+            old.unlink()
+        write_whole(folder / SUBMISSION_FILE, to_json(prepared.record))
+        runs: dict[str, int] = {}
+        faults: dict[str, str] = {}
+        recordings: dict[str, Recording] = {}
+        again = [scenario.id for scenario in self._scenarios] if prepared.install else []
+        for attempt in range(1, MOST_RUNS + 1):
+            self._run_all(prepared, folder, again, recordings, faults, alone=attempt > 1)
+            runs.update(dict.fromkeys(again, attempt))
+            result = grade(self._loaded, prepared.record, recordings)
+            again = sorted(
+                set(result.disturbed_scenarios())
+                | {name for name, recording in recordings.items() if recording.faults}
+                | set(faults)
+            )
+            if not again:
+                break
+        files = {name: folder / f"{name}.mcap" for name in recordings}
+        return Graded(result, prepared, recordings, files, runs, faults)
+
+    def _run_all(
+        self,
+        prepared: Prepared,
+        folder: Path,
+        names: list[str],
+        recordings: dict[str, Recording],
+        faults: dict[str, str],
+        *,
+        alone: bool,
+    ) -> None:
+        if not names:
+            return
+        with ThreadPoolExecutor(max_workers=1 if alone else len(names)) as pool:
+            futures = {
+                name: pool.submit(self._run, name, prepared, folder, alone) for name in names
+            }
+            try:
+                for name, future in futures.items():
+                    faults.pop(name, None)
+                    try:
+                        recordings[name] = future.result()
+                    except GraderFault as fault:
+                        faults[name] = str(fault)
+            except BaseException:
+                self._runner.abort()
+                raise
+
+    def _run(self, name: str, prepared: Prepared, folder: Path, alone: bool) -> Recording:
+        assert prepared.install is not None
+        assignment = self._loaded.assignment
+        scenario = next(item for item in self._scenarios if item.id == name)
+        file = folder / f"{name}.mcap"
+        self._runner.run(
+            assignment,
+            scenario,
+            prepared.record,
+            prepared.install,
+            file,
+            seed=scenario_seed(assignment.id, name, prepared.record.sha256, self._seed),
+            alone=alone,
+        )
+        return read_recording(file)

@@ -1,0 +1,200 @@
+"""The mutation score of an assignment: does it tell right from wrong?
+
+The reference and every variant (a right solution in another style) must get full points; every
+mutant must lose exactly the checks that it names.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from grader.assignment.load import LoadedAssignment
+from grader.assignment.mutant import Change, Mutant, Verdict, expected_statuses, verdict
+from grader.assignment.mutation import apply, load_mutants
+from grader.batch.grading import Graded, Grading
+from grader.checks.finding import Status
+
+REFERENCE = "reference"
+
+
+class Role(str, Enum):
+    """What a trial is."""
+
+    REFERENCE = "reference"
+    VARIANT = "variant"
+    MUTANT = "mutant"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One submission to grade, with the outcome that it must have.
+
+    Attributes:
+        role: Reference, variant or mutant.
+        id: ``reference``, or the id of the change.
+        title: One line for people.
+        change: What differs from the reference; None for the reference.
+    """
+
+    role: Role
+    id: str
+    title: str
+    change: Change | None
+
+
+@dataclass(frozen=True)
+class TrialResult:
+    """How a trial went.
+
+    Attributes:
+        trial: Which.
+        verdict: How the checks ended against how they must.
+        graded: Everything that was found.
+    """
+
+    trial: Trial
+    verdict: Verdict
+    graded: Graded
+
+
+def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Trial, ...]:
+    """The trials of an assignment: its reference, its variants, its mutants.
+
+    Raises:
+        UsageError: It has no reference or no mutants.
+        AssignmentError: Its mutants do not apply.
+    """
+    mutants = load_mutants(loaded.assignment, loaded.folder, reference)
+    changes = [*mutants.variants, *mutants.mutants]
+    return (
+        Trial(Role.REFERENCE, REFERENCE, "the reference solution", None),
+        *(
+            Trial(
+                Role.MUTANT if isinstance(change, Mutant) else Role.VARIANT,
+                change.id,
+                change.title,
+                change,
+            )
+            for change in changes
+            if not change.skip_reason
+        ),
+    )
+
+
+def write_submission(trial: Trial, reference: Path, folder: Path) -> Path:
+    """Make the submission of a trial.
+
+    Returns:
+        The reference itself, or the changed copy in ``folder``.
+    """
+    if trial.change is None:
+        return reference
+    target = folder / trial.id
+    apply(trial.change, reference, target)
+    return target
+
+
+def run_trial(
+    trial: Trial, loaded: LoadedAssignment, grading: Grading, reference: Path, folder: Path
+) -> TrialResult:
+    """Grade one trial.
+
+    Args:
+        trial: Which.
+        loaded: The assignment.
+        grading: Grades it.
+        reference: Folder of the reference solution.
+        folder: For the submission and its recordings.
+    """
+    submission = write_submission(trial, reference, folder / "submissions")
+    graded = grading.grade(submission, folder / "recordings" / trial.id)
+    actual = {result.id: result.status for result in graded.grade.results}
+    if trial.change is None:
+        expected = dict.fromkeys(actual, Status.PASSED)
+    else:
+        expected = expected_statuses(loaded.assignment, trial.change)
+    return TrialResult(trial, verdict(expected, actual), graded)
+
+
+def selftest(
+    loaded: LoadedAssignment,
+    grading: Grading,
+    *,
+    jobs: int,
+    reference: Path | None = None,
+    on_start: Callable[[Trial], None] = lambda _: None,
+) -> Iterator[TrialResult]:
+    """Run every trial of an assignment.
+
+    Args:
+        loaded: The assignment.
+        grading: Grades submissions of it.
+        jobs: Submissions at the same time; the cells are admitted by the runner.
+        reference: Folder of the reference solution, by default rosgrade's own.
+        on_start: Told when a trial begins.
+
+    Yields:
+        Results as they come.
+    """
+    base = load_mutants(loaded.assignment, loaded.folder, reference).reference
+    with tempfile.TemporaryDirectory(prefix="rosgrade-selftest-") as name:
+        folder = Path(name)
+
+        def work(trial: Trial) -> TrialResult:
+            on_start(trial)
+            return run_trial(trial, loaded, grading, base, folder)
+
+        with ThreadPoolExecutor(max_workers=jobs) as pool:
+            futures = [pool.submit(work, trial) for trial in trials(loaded, reference)]
+            try:
+                for future in as_completed(futures):
+                    yield future.result()
+            except BaseException:
+                for future in futures:
+                    future.cancel()
+                grading.abort()
+                raise
+
+
+@dataclass(frozen=True)
+class MutationScore:
+    """How well an assignment tells right from wrong.
+
+    Attributes:
+        killed: Mutants that lost exactly the checks that they name.
+        mutants: All mutants.
+        accepted: Right solutions (reference and variants) with full points.
+        right: All right solutions.
+    """
+
+    killed: int
+    mutants: int
+    accepted: int
+    right: int
+
+    @property
+    def perfect(self) -> bool:
+        """Whether nothing was judged wrongly."""
+        return self.killed == self.mutants and self.accepted == self.right
+
+    @property
+    def percent(self) -> float:
+        """Share of mutants that were judged as they must."""
+        return 100.0 * self.killed / self.mutants if self.mutants else 0.0
+
+
+def mutation_score(results: list[TrialResult]) -> MutationScore:
+    """Count the results of one assignment."""
+    mutants = [r for r in results if r.trial.role is Role.MUTANT]
+    right = [r for r in results if r.trial.role is not Role.MUTANT]
+    return MutationScore(
+        killed=sum(r.verdict.right for r in mutants),
+        mutants=len(mutants),
+        accepted=sum(r.verdict.right for r in right),
+        right=len(right),
+    )

@@ -1,0 +1,138 @@
+"""``make bench``: what rosgrade costs beyond the time that a scenario needs.
+
+Prints a table and writes ``rosgrade-bench.json``. Quote medians; compare only figures of one
+run on one machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import TypeVar
+
+from grader import ros
+from grader.assignment.load import load_assignment
+from grader.assignment.mutation import reference_of
+from grader.batch.files import write_graded
+from grader.batch.grading import Grading
+from grader.grade import grade
+from grader.recording.mcap_reader import read_recording
+from grader.recording.model import NS
+from grader.report.facts import Clock
+from grader.report.files import write_whole
+from grader.run.runner import Runner
+from grader.submission.prepare import prepare
+
+ASSIGNMENT = "timed_publisher"
+OUTPUT = Path("rosgrade-bench.json")
+T = TypeVar("T")
+
+
+class Samples:
+    """Figures of one kind each, over all runs."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self.values: dict[str, list[float]] = {}
+
+    def add(self, name: str, value: float) -> None:
+        """Add one figure."""
+        self.values.setdefault(name, []).append(value)
+
+    def timed(self, name: str, work: Callable[[], T]) -> T:
+        """Add the wall time of some work, in seconds."""
+        began_s = time.monotonic()
+        result = work()
+        self.add(name, time.monotonic() - began_s)
+        return result
+
+    def summary(self) -> dict[str, dict[str, float]]:
+        """Minimum, median and maximum of each figure."""
+        return {
+            name: {"min": min(values), "median": median(values), "max": max(values)}
+            for name, values in self.values.items()
+        }
+
+
+def main() -> int:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=20)
+    options = parser.parse_args()
+    samples = Samples()
+    with tempfile.TemporaryDirectory(prefix="rosgrade-bench-") as name:
+        for _ in range(options.runs):
+            _parts(samples, Path(name))
+            _whole(samples, Path(name), "warm")
+        for _ in range(3):
+            _whole(samples, Path(name), "cold")
+    summary = samples.summary()
+    print(f"{'figure (s)':<44} {'min':>7} {'median':>7} {'max':>7}")
+    for figure, row in summary.items():
+        print(f"{figure:<44} {row['min']:>7.3f} {row['median']:>7.3f} {row['max']:>7.3f}")
+    write_whole(OUTPUT, json.dumps({"runs": options.runs, "figures": summary}, indent=2) + "\n")
+    print(f"written to {OUTPUT}")
+    return 0
+
+
+def _parts(samples: Samples, folder: Path) -> None:
+    """The steps of one grade, in this process, with a build of its own."""
+    loaded = load_assignment(ASSIGNMENT)
+    installation = ros.find()
+    cache = folder / "cold-cache"
+    shutil.rmtree(cache, ignore_errors=True)
+    reference = reference_of(ASSIGNMENT)
+    samples.timed("build, cold", lambda: prepare(reference, installation, cache=cache))
+    prepared = samples.timed("build, cached", lambda: prepare(reference, installation, cache=cache))
+    grading = Grading(loaded, Runner(installation), cache)
+    graded = samples.timed(
+        "run and judge", lambda: grading.grade_prepared(prepared, folder / "recordings")
+    )
+    for scenario, file in graded.files.items():
+        recording = samples.timed("judge: read the recording", partial(read_recording, file))
+        recordings = {scenario: recording}
+        samples.timed("judge: all checks", partial(grade, loaded, prepared.record, recordings))
+        matched_ns = recording.matched_ns or recording.stop_ns
+        samples.add("start: launch to first match", (matched_ns - recording.launched_ns) / NS)
+        samples.add("observe: first match to SIGINT", (recording.stop_ns - matched_ns) / NS)
+        samples.add("stop: SIGINT to the end", (recording.end_ns - recording.stop_ns) / NS)
+    samples.timed("report", lambda: write_graded(graded, folder / "report", Clock()))
+
+
+def _whole(samples: Samples, folder: Path, build: str) -> None:
+    """`rosgrade check` as a user runs it: wall and CPU time of everything it starts."""
+    cache = folder / "whole-cache"
+    if build == "cold":
+        shutil.rmtree(cache, ignore_errors=True)
+    arguments = ["check", ASSIGNMENT, str(reference_of(ASSIGNMENT)), "--quiet"]
+    report = folder / "whole"
+    began_s = time.monotonic()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "grader", *arguments, "--report", str(report)],
+        env={**os.environ, "XDG_CACHE_HOME": str(cache)},
+        stdout=subprocess.DEVNULL,
+    )
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    wall_s = time.monotonic() - began_s
+    if process.returncode:
+        raise SystemExit(f"rosgrade check ended with {process.returncode}")
+    recording = read_recording(report / "recordings" / "publishing.mcap")
+    needed_s = (recording.stop_ns - (recording.matched_ns or recording.launched_ns)) / NS
+    samples.add(f"rosgrade check, {build} build: wall", wall_s)
+    samples.add(f"rosgrade check, {build} build: overhead", wall_s - needed_s)
+    samples.add(f"rosgrade check, {build} build: CPU", usage.ru_utime + usage.ru_stime)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

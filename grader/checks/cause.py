@@ -1,0 +1,38 @@
+"""Why something that was expected is not there: one cause, the deepest that can be seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from grader.checks.finding import Evidence, Finding
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What several checks say in the same words when the same thing went wrong.
+
+    Attributes:
+        observed: What was seen instead.
+        hint: What to try next.
+        evidence: Where it can be seen.
+        ours: Not the student's fault, or it cannot be told: the finding is an error.
+        disturbed: For a cause of ours: the run is worth repeating.
+    """
+
+    observed: str
+    hint: str = ""
+    evidence: Evidence = field(default_factory=Evidence)
+    ours: bool = False
+    disturbed: bool = False
+
+    def finding(self, expected: str) -> Finding:
+        """The finding of a check that expected something else."""
+        if self.ours:
+            return Finding.error(
+                expected, self.observed, disturbed=self.disturbed, hint=self.hint
+            )
+        return Finding.failed(expected, self.observed, self.hint, self.evidence)
+
+    def after(self, beginning: str) -> Cause:
+        """The same cause with something said before it."""
+        return replace(self, observed=f"{beginning}: {self.observed}")

@@ -1,0 +1,173 @@
+"""Why a process ended before it was asked to: exit code, signal, exception, place."""
+
+from __future__ import annotations
+
+import signal
+
+from grader.checks import testimony
+from grader.checks.cause import Cause
+from grader.checks.failure import Failure, fatal_failure, student_place
+from grader.checks.finding import Evidence, Moment
+from grader.checks.wording import code
+from grader.recording.model import Ending, Process, Recording
+from grader.submission.record import SubmissionRecord
+
+_LOG_LINES = 15
+
+_SIGNALS = {
+    signal.SIGSEGV: "segmentation fault",
+    signal.SIGABRT: "abort",
+    signal.SIGBUS: "bus error",
+    signal.SIGILL: "illegal instruction",
+    signal.SIGFPE: "arithmetic error in native code",
+    signal.SIGKILL: "killed, usually for too much memory",
+    signal.SIGXCPU: "too much CPU time",
+    signal.SIGTERM: "asked to end by another process",
+    signal.SIGPIPE: "wrote to a closed pipe",
+}
+_SIGNAL_HINTS = {
+    signal.SIGSEGV: "Native code crashed: look at the last call before it, such as one on a node "
+    "or publisher that was destroyed already.",
+    signal.SIGABRT: "A C++ exception or an assertion ended it: the last lines of output name it.",
+    signal.SIGKILL: "Look for a list or an image that grows without end.",
+    signal.SIGTERM: "Look for os.kill, os.killpg or subprocess calls that end their own group.",
+}
+
+_HINTS = {
+    "ModuleNotFoundError": "Python does not find this module: check its spelling, that it lies in "
+    "the package's folder, that setup.py installs it (packages=[...]), and that package.xml "
+    "declares the package it belongs to.",
+    "ImportError": "The module is there, but not that name in it: check the spelling and the "
+    "module, as in `from geometry_msgs.msg import Twist`.",
+    "SyntaxError": "Python cannot read this line or the one before it.",
+    "IndentationError": "Indent the lines of a block by the same four spaces.",
+    "TabError": "Indent with spaces only.",
+    "NameError": "The name is used before it is defined, misspelt, or not imported.",
+    "NotInitializedException": "Call rclpy.init() before you create the node.",
+    "ParameterNotDeclaredException": "Call self.declare_parameter(name, default) before "
+    "self.get_parameter(name).",
+    "InvalidTopicNameException": "A topic name has letters, digits, `_` and `/` only.",
+    "InvalidNodeNameException": "A node name has letters, digits and `_` only.",
+    "EOFError": "A launched node has no keyboard, so input() cannot read: take the value from a "
+    "ROS parameter.",
+    "RecursionError": "A function calls itself without end.",
+    "MemoryError": "Look for a list or an image that grows without end.",
+}
+
+
+def ended_early(recording: Recording, process: Process) -> bool:
+    """Whether a process ended by itself before the end of the observation."""
+    if process.stopped_by != "itself" or process.exited_ns is None:
+        return False
+    return recording.ending is Ending.EXITED or process.exited_ns < recording.stop_ns
+
+
+def dead(recording: Recording) -> tuple[Process, ...]:
+    """Processes that ended early; those that failed before those that just returned."""
+    ended = [process for process in recording.processes if ended_early(recording, process)]
+    return tuple(sorted(ended, key=lambda process: process.exit_code == 0))
+
+
+def exit_words(exit_code: int | None) -> str:
+    """Say how a process ended: ``exit code 1`` or ``SIGSEGV (segmentation fault)``."""
+    if exit_code is None:
+        return "an unknown exit code"
+    number = signal_of(exit_code)
+    if number is None:
+        return f"exit code {exit_code}"
+    words = f" ({_SIGNALS[number]})" if number in _SIGNALS else ""
+    through_shell = f", reported as exit code {exit_code}" if exit_code > 0 else ""
+    return f"{number.name}{words}{through_shell}"
+
+
+def signal_of(exit_code: int) -> signal.Signals | None:
+    """The signal that ended a process, also where a shell between reported 128 + signal."""
+    number = -exit_code if exit_code < 0 else exit_code - 128
+    try:
+        found = signal.Signals(number)
+    except ValueError:
+        return None
+    return found if exit_code < 0 or found in _SIGNALS else None
+
+
+def cause_of_death(recording: Recording, process: Process) -> Cause:
+    """Why a process ended early, with its exception and the student's line if there is one.
+
+    Args:
+        recording: Where it ran.
+        process: One that :func:`ended_early`.
+    """
+    when_s = recording.since_launch_s(process.exited_ns or recording.stop_ns)
+    ended = f"the process {code(process.name)} ended {when_s:.2f} s after launch"
+    evidence = Evidence(
+        moments=(Moment(f"{process.name} ended", when_s),), log=_last_lines(recording, process)
+    )
+    if process.exit_code == 0:
+        return _returned(recording, process, ended, evidence)
+    killed = process.exit_code is not None and signal_of(process.exit_code)
+    failure = None if killed else fatal_failure(recording, process.name)
+    if failure is None:
+        hint = _SIGNAL_HINTS.get(killed, "") if killed else ""
+        hint = hint or "Run it by hand with `ros2 run` and look at its last lines of output."
+        return Cause(f"{ended} with {exit_words(process.exit_code)}", hint, evidence)
+    place = student_place(failure, recording.submission)
+    where = f" ({place.file}:{place.line})" if place else ""
+    return Cause(
+        observed=f"{ended} with {failure}{where}",
+        hint=_exception_hint(failure, recording.submission),
+        evidence=Evidence(
+            moments=evidence.moments, places=(place,) if place else (), log=evidence.log
+        ),
+    )
+
+
+def _returned(recording: Recording, process: Process, ended: str, evidence: Evidence) -> Cause:
+    if testimony.traced(recording, process.name) and not testimony.said(
+        recording, "node", process.name
+    ):
+        return Cause(
+            f"{ended} with exit code 0: main() returned before a node was created",
+            "The function that setup.py names in console_scripts must call rclpy.init(), create "
+            "the node and call rclpy.spin(node).",
+            evidence,
+        )
+    if testimony.never_spun(recording, process.name):
+        return Cause(
+            f"{ended} with exit code 0: main() returned without rclpy.spin()",
+            "rclpy.spin(node) keeps a node alive and runs its callbacks until Ctrl-C: call it in "
+            "main() after the node was created.",
+            evidence,
+        )
+    return Cause(
+        f"{ended} with exit code 0: main() returned",
+        "rclpy.spin(node) keeps a node alive until Ctrl-C. Look for what ends it: spin_once() "
+        "handles one round only, rclpy.shutdown() and sys.exit() end everything.",
+        evidence,
+    )
+
+
+def _exception_hint(failure: Failure, submission: SubmissionRecord) -> str:
+    if failure.type in _HINTS:
+        return _HINTS[failure.type]
+    if failure.type == "AttributeError" and "'str' has no attribute '_TYPE_SUPPORT'" in (
+        failure.message
+    ):
+        return "Give the class of the message, imported from geometry_msgs.msg, not its name."
+    if failure.type == "AttributeError" and "'_default_callback_group'" in failure.message:
+        return "Call super().__init__('node_name') first in the node's constructor."
+    if failure.type == "AttributeError" and failure.message.startswith("module "):
+        return "setup.py's console_scripts names a function that the module does not have."
+    if failure.type == "TypeError" and "'qos_profile'" in failure.message:
+        return "The third argument is the queue depth: self.create_publisher(Twist, 'cmd_vel', 10)."
+    if student_place(failure, submission):
+        return "Mend the line that is named here."
+    return "Read the traceback from its last line upwards."
+
+
+def _last_lines(recording: Recording, process: Process) -> tuple[str, ...]:
+    lines = [
+        line.text
+        for line in recording.log
+        if line.process == process.name and line.stream in ("stdout", "stderr")
+    ]
+    return tuple(lines[-_LOG_LINES:])

@@ -1,0 +1,219 @@
+"""Checks of the executor: whether callbacks let it come round."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from grader.assignment.quantity import Duration, Ratio, format_duration
+from grader.checks import testimony
+from grader.checks.cause import Cause
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.death import cause_of_death, dead, ended_early
+from grader.checks.failure import interrupted_place
+from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.node_absence import why_no_node, why_not_node
+from grader.checks.node_name import node_name
+from grader.checks.wording import code, codes, counted
+from grader.recording.model import NS, Call, Kind, Process, Recording
+
+_FORGIVING_FROM = 3
+_SERVICE = "/list_parameters"
+
+
+class Responsive(Parameters):
+    """Parameters of executor.responsive."""
+
+    within: Duration = Field(1.0, description="How long an answer may take, by default 1 s.")
+    share: Ratio = Field(
+        0.9,
+        le=1.0,
+        description="Share of the calls that must be answered in time. Of three calls or more "
+        "one may be late, unless it is 100 %.",
+    )
+    node: Annotated[str, AfterValidator(node_name)] | None = Field(
+        None, description="Name of the node; by default every node of the student."
+    )
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """Calls to one node.
+
+    Attributes:
+        node: Fully qualified name.
+        judged: Calls that count.
+        late: Those that were not answered in time.
+    """
+
+    node: str
+    judged: tuple[Call, ...]
+    late: tuple[Call, ...]
+
+    def enough(self, share: float, late: int) -> bool:
+        """Whether so many late calls are allowed."""
+        number = len(self.judged)
+        one = 1 if number >= _FORGIVING_FROM and share < 1.0 else 0
+        # The small amount is float noise of (1 - share).
+        return late <= max(int((1.0 - share) * number + 1e-9), one)
+
+
+@check("executor.responsive", Subject.RECORDING, Responsive)
+def responsive(recording: Recording, parameters: Responsive) -> Finding:
+    """The executor keeps spinning while the node works.
+
+    The probe calls the service `list_parameters` that every node has; a node can answer only
+    while its executor spins. Calls count from the node's first message on (or, if it publishes
+    nothing, from its appearance); those that were sent too late to be answered before the end
+    do not count. A callback may be busy for a while, as long as answers come in time.
+
+    Explains a loop with `time.sleep()` in the constructor, in main() or in a callback, and
+    `rclpy.spin()` that was never called. For a node without parameter services it relies on
+    what the process declared: that it spins and has a timer.
+    """
+    expected = (
+        f"parameter services of the node answer within {format_duration(parameters.within)}"
+    )
+    if parameters.node:
+        missing = why_not_node(recording, parameters.node)
+    else:
+        missing = why_no_node(recording)
+    if missing is not None:
+        return missing.finding(expected)
+    names = [parameters.node] if parameters.node else [n.name for n in recording.student_nodes]
+    groups = [_answers(recording, name, parameters) for name in dict.fromkeys(names)]
+    groups = [group for group in groups if group.judged]
+    if not groups:
+        return _unasked(recording, names, expected)
+    bad = [group for group in groups if not group.enough(parameters.share, len(group.late))]
+    if not bad:
+        return Finding.passed(expected, _summary(groups, parameters), _evidence(recording, groups))
+    if all(_excused(recording, group, parameters) for group in bad):
+        return Finding.error(
+            expected,
+            f"{_summary(bad, parameters)}, but the machine took the time from the process",
+            disturbed=True,
+        )
+    worst = max(bad, key=lambda group: len(group.late) / len(group.judged))
+    return _blocked(recording, worst, parameters).finding(expected)
+
+
+def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answers:
+    within_ns = int(parameters.within * NS)
+    begin_ns = _working_from(recording, node)
+    judged, late = [], []
+    for call in recording.calls:
+        if call.service != node + _SERVICE:
+            continue
+        answered = call.answered_ns is not None and (
+            call.answered_ns - call.requested_ns <= within_ns
+        )
+        # An answer in time is one, however late or early it was asked for.
+        if answered or begin_ns <= call.requested_ns <= recording.stop_ns - within_ns:
+            judged.append(call)
+            if not answered:
+                late.append(call)
+    return _Answers(node, tuple(judged), tuple(late))
+
+
+def _working_from(recording: Recording, node: str) -> int:
+    """When a node began to publish, or when it appeared if it publishes nothing."""
+    topics = {
+        item.topic
+        for item in recording.student_endpoints(Kind.PUBLISHER)
+        if item.node == node
+    }
+    stamps = [recording.on(topic)[0].received_ns for topic in topics if recording.on(topic)]
+    appeared = [item.appeared_ns for item in recording.student_nodes if item.name == node]
+    return min(stamps or appeared or [recording.launched_ns])
+
+
+def _excused(recording: Recording, group: _Answers, parameters: Responsive) -> bool:
+    """Whether few enough calls were late for another reason than what the host took."""
+    unexcused = 0
+    for call in group.late:
+        end_ns = call.answered_ns or recording.stop_ns
+        excess_s = (end_ns - call.requested_ns) / NS - parameters.within
+        if recording.taken_s(call.requested_ns, end_ns) < excess_s:
+            unexcused += 1
+    return group.enough(parameters.share, unexcused)
+
+
+def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> Cause:
+    process = testimony.process_of(recording, group.node)
+    seen = _summary([group], parameters)
+    if process is not None and ended_early(recording, process):
+        return cause_of_death(recording, process).after(seen)
+    evidence = _evidence(recording, [group])
+    place = interrupted_place(recording, process.name) if process is not None else None
+    if place is not None:
+        evidence = Evidence(moments=evidence.moments, places=(place,), plots=evidence.plots)
+    where = f" ({place.file}:{place.line})" if place else ""
+    number = sum(len(found) for found in recording.messages.values())
+    meanwhile = f" while {counted(number, 'message was', 'messages were')} published"
+    seen += meanwhile if number else ""
+    if _never_spun(recording, process):
+        return Cause(
+            f"{seen}: rclpy.spin() was never called{where}",
+            "A loop such as `while True: publish(); time.sleep(0.3)` never gives way to the "
+            "executor. Create a timer with self.create_timer(0.3, self.callback), and call "
+            "rclpy.spin(node) in main().",
+            evidence,
+        )
+    return Cause(
+        f"{seen}: something keeps the executor from coming round{where}",
+        "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
+        "callback or in the constructor, and let a timer call again instead.",
+        evidence,
+    )
+
+
+def _never_spun(recording: Recording, process: Process | None) -> bool:
+    return testimony.never_spun(recording, process.name if process else None)
+
+
+def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
+    """No call that counts: what the process declared must do."""
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0]).finding(expected)
+    if testimony.said(recording, "spin") and testimony.said(recording, "timer"):
+        return Finding.passed(
+            expected,
+            f"{codes(names)} answered no call that could be judged; the process declared a timer "
+            "and that its executor spins",
+        )
+    return Finding.error(
+        expected,
+        f"no call to {codes(name + _SERVICE for name in names)} could be judged, of "
+        f"{counted(len(recording.calls), 'call')} that the probe sent",
+    )
+
+
+def _summary(groups: list[_Answers], parameters: Responsive) -> str:
+    return "; ".join(
+        f"{code(group.node)} answered {len(group.judged) - len(group.late)} of "
+        f"{counted(len(group.judged), 'call')} within {format_duration(parameters.within)}"
+        for group in groups
+    )
+
+
+def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
+    late = [call for group in groups for call in group.late]
+    answered = [call for group in groups for call in group.judged if call.answered_ns is not None]
+    plot = Plot(
+        title="Time until the parameter service answered",
+        x_label="time since launch (s)",
+        y_label="time to the answer (s)",
+        x=tuple(recording.since_launch_s(call.requested_ns) for call in answered),
+        y=tuple(((call.answered_ns or 0) - call.requested_ns) / NS for call in answered),
+    )
+    return Evidence(
+        moments=tuple(
+            Moment("call not answered in time", recording.since_launch_s(call.requested_ns))
+            for call in late[:5]
+        ),
+        plots=(plot,) if answered else (),
+    )

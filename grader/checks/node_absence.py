@@ -1,0 +1,133 @@
+"""Why no node of the student appeared: nothing launched, died, hangs, or has another name."""
+
+from __future__ import annotations
+
+from grader.checks import testimony
+from grader.checks.cause import Cause
+from grader.checks.death import cause_of_death, dead
+from grader.checks.failure import interrupted_place
+from grader.checks.finding import Evidence
+from grader.checks.wording import code, codes
+from grader.nearest import nearest
+from grader.recording.model import Ending, Process, Recording
+
+_LOG_LINES = 10
+
+
+def why_no_node(recording: Recording) -> Cause | None:
+    """Why the student has no node at all, or None if there is one."""
+    if recording.student_nodes:
+        return None
+    if recording.ending is Ending.NOT_STARTED or not recording.processes:
+        return _not_started(recording)
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0])
+    return _hangs(recording, recording.processes[0])
+
+
+def why_not_node(recording: Recording, name: str) -> Cause | None:
+    """Why a certain node did not appear, or None if it did.
+
+    Args:
+        recording: The run.
+        name: Fully qualified node name.
+    """
+    names = [node.name for node in recording.student_nodes]
+    if name in names:
+        return None
+    return why_no_node(recording) or _other_name(recording, name, names)
+
+
+def _not_started(recording: Recording) -> Cause:
+    build = recording.submission.build
+    if build is not None and not build.succeeded:
+        return Cause(
+            "nothing was launched, because the packages did not build",
+            "Mend the build first: `colcon build` names the line.",
+            Evidence(places=(build.culprit,) if build.culprit else ()),
+        )
+    installed = [
+        name for package in recording.submission.packages for name in package.executables
+    ]
+    there = f"; installed are {codes(installed)}" if installed else "; none was installed"
+    return Cause(
+        f"nothing was launched, because the executable does not exist{there}",
+        "The executable's name is the left side of an entry of console_scripts in setup.py.",
+    )
+
+
+def _hangs(recording: Recording, process: Process) -> Cause:
+    """A process that still ran, but showed no node."""
+    name, who = process.name, f"the process {code(process.name)}"
+    if testimony.said(recording, "node", name):
+        return Cause(
+            f"{who} declared a node, but it never appeared in the ROS graph",
+            "The node must stay in the ROS domain that it was started in: do not set "
+            "ROS_DOMAIN_ID or domain_id in the code.",
+            ours=True,
+            disturbed=True,
+        )
+    place = interrupted_place(recording, name)
+    evidence = Evidence(
+        places=(place,) if place else (),
+        log=tuple(line.text for line in recording.log if line.process == name)[-_LOG_LINES:],
+    )
+    where = f" ({place.file}:{place.line})" if place else ""
+    if place and "input(" in place.message:
+        return Cause(
+            f"{who} waits for input(){where}, and no node appeared",
+            "A launched node has no keyboard: take the value from a ROS parameter.",
+            evidence,
+        )
+    if testimony.said(recording, "init", name):
+        return Cause(
+            f"{who} called rclpy.init() but created no node until the end{where}",
+            "Create the node right after rclpy.init(): no loop and no sleep before it.",
+            evidence,
+        )
+    if testimony.traced(recording, name):
+        return Cause(
+            f"{who} ran until the end but never called rclpy.init(){where}",
+            "Look for a loop, a sleep or input() at the top level of a module or before "
+            "rclpy.init() in main().",
+            evidence,
+        )
+    return Cause(
+        f"{who} ran until the end, but no node appeared{where}",
+        "main() must call rclpy.init() and create the node; nothing may block before that.",
+        evidence,
+    )
+
+
+def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
+    there = f"found the node {codes(names)}"
+    base = wanted.rpartition("/")[2]
+    for name in names:
+        if name.lower() == wanted.lower():
+            return Cause(
+                f"{there}: upper and lower case differ",
+                f"Names in ROS are case-sensitive: super().__init__('{base}').",
+            )
+    for name in names:
+        if name.rpartition("/")[2] == base:
+            namespace = name.rpartition("/")[0] or "/"
+            return Cause(
+                f"{there}: the name is right, but the node is in the namespace {code(namespace)}",
+                "Leave out the namespace argument of Node.__init__ (and any `__ns` remapping) "
+                "unless the assignment asks for it.",
+            )
+    if nearest(wanted, names) is None:
+        ended = [process for process in dead(recording) if process.exit_code != 0]
+        if ended:
+            return cause_of_death(recording, ended[0])
+    if testimony.declares(recording, "node", "node", wanted):
+        return Cause(
+            f"the process declared the node {code(wanted)}, but it never appeared in the graph; "
+            f"{there}",
+            ours=True,
+            disturbed=True,
+        )
+    return Cause(
+        there, f"The node's name is the argument of super().__init__('{base}') in its constructor."
+    )

@@ -1,0 +1,192 @@
+"""Checks of a package as handed in: it is found, it builds, its executable is installed."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from grader.assignment.model import PackageName
+from grader.checks.cause import Cause
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding
+from grader.checks.unbuilt import existing_package, why_no_package, why_not_built
+from grader.checks.wording import code, codes
+from grader.nearest import nearest
+from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
+
+
+class Found(Parameters):
+    """Parameters of package.found."""
+
+    package: PackageName = Field(description="Name in package.xml.")
+    build_type: Literal["ament_python", "ament_cmake"] | None = Field(
+        None, description="Expected build type; by default any."
+    )
+
+
+@check("package.found", Subject.SUBMISSION, Found)
+def found(submission: SubmissionRecord, parameters: Found) -> Finding:
+    """The package is there, with a sound package.xml.
+
+    Judged by the files that were handed in: a package.xml with this name, which can be read,
+    and with the expected build type.
+
+    Explains a submission that cannot be read (empty, no package.xml, a refused archive, two
+    packages of one name), a misspelt name, broken XML (with its line), and a wrong build type.
+    """
+    expected = f"the package {code(parameters.package)}"
+    if parameters.build_type:
+        expected += f" with the build type {parameters.build_type}"
+    cause = why_no_package(submission, parameters.package)
+    if cause is not None:
+        return cause.finding(expected)
+    package = existing_package(submission, parameters.package)
+    if package.manifest_error is not None:
+        return Finding.failed(
+            expected,
+            f"package.xml cannot be used: {package.manifest_error}",
+            "Mend package.xml at the line that is named here.",
+            Evidence(places=(package.manifest_error,)),
+        )
+    if parameters.build_type not in (None, package.build_type):
+        manifest = _manifest(package)
+        return Finding.failed(
+            expected,
+            f"its build type is {package.build_type}",
+            f"Write <export><build_type>{parameters.build_type}</build_type></export> in "
+            "package.xml.",
+            Evidence(places=(SourceError(manifest, None, f"build type {package.build_type}"),)),
+        )
+    return Finding.passed(expected, f"found in {code(package.path)}")
+
+
+class Builds(Parameters):
+    """Parameters of package.builds."""
+
+    package: PackageName = Field(description="Name in package.xml.")
+
+
+@check("package.builds", Subject.SUBMISSION, Builds)
+def builds(submission: SubmissionRecord, parameters: Builds) -> Finding:
+    """The package builds with colcon.
+
+    Judged by `colcon build` on a copy of what was handed in.
+
+    Explains the first error with your file and line and the end of the build's output, a build
+    that never ends, and a package that was not built because another one failed.
+    """
+    expected = f"`colcon build` builds {code(parameters.package)}"
+    cause = why_not_built(submission, parameters.package)
+    if cause is not None:
+        return cause.finding(expected)
+    return Finding.passed(expected, "it builds")
+
+
+class Executable(Parameters):
+    """Parameters of package.executable."""
+
+    package: PackageName = Field(description="Name in package.xml.")
+    executable: str = Field(min_length=1, description="Name that `ros2 run` is given.")
+
+
+@check("package.executable", Subject.SUBMISSION, Executable)
+def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
+    """The executable is installed where `ros2 run` finds it.
+
+    Judged by what the build installed in lib/<package>, and by whether the function behind it
+    exists in the package.
+
+    Explains a missing or misspelt entry of console_scripts, a setup.cfg that is missing or
+    wrong (the script then lies in bin/, where `ros2 run` does not look), and an entry point
+    whose module or function does not exist.
+    """
+    package, name = parameters.package, parameters.executable
+    expected = f"the executable {code(name)}, for `ros2 run {package} {name}`"
+    cause = why_not_built(submission, package)
+    if cause is None:
+        cause = _why_no_executable(existing_package(submission, package), name)
+    if cause is not None:
+        return cause.finding(expected)
+    return Finding.passed(expected, f"installed in lib/{package}")
+
+
+def _why_no_executable(package: PackageRecord, name: str) -> Cause | None:
+    target = dict(package.missing_targets).get(name)
+    if target is not None:
+        points_to = dict(package.entry_points).get(name, "")
+        entry = f" = {points_to}" if points_to else ""
+        return Cause(
+            f"the entry point {code(name + entry)} leads nowhere: {target}",
+            "An entry of console_scripts is `name = module:function`: the module with its "
+            "package in front, the function as it is called there.",
+            Evidence(places=(target,)),
+        )
+    if name in package.executables:
+        return None
+    if name in package.misplaced_executables:
+        return _misplaced(package, name)
+    if package.build_type != "ament_python":
+        return _not_installed_by_cmake(package, name)
+    scripts = [script for script, _ in package.entry_points]
+    setup = Evidence(places=(SourceError(_beside(package, "setup.py"), None, "console_scripts"),))
+    if not scripts:
+        return Cause(
+            "setup.py defines no console_scripts",
+            f"Add to setup.py: {_entry_points(package, name)}.",
+            setup,
+        )
+    if name in scripts:
+        return Cause(
+            f"setup.py defines {code(name)}, but the build did not install it",
+            "Run `colcon build` again from a clean workspace (without build/ and install/).",
+            setup,
+        )
+    match = nearest(name, scripts)
+    defines = code(match) if match else codes(scripts)
+    return Cause(
+        f"setup.py defines {defines}",
+        f"The left side of an entry of console_scripts is the executable's name: write "
+        f"'{name} = ...'.",
+        setup,
+    )
+
+
+def _misplaced(package: PackageRecord, name: str) -> Cause:
+    lines = (
+        "[develop]",
+        f"script_dir=$base/lib/{package.name}",
+        "[install]",
+        f"install_scripts=$base/lib/{package.name}",
+    )
+    return Cause(
+        f"{code(name)} was installed in bin/, where `ros2 run` does not look",
+        f"setup.cfg beside setup.py must hold these four lines: {' / '.join(lines)}",
+        Evidence(places=(SourceError(_beside(package, "setup.cfg"), None, "script_dir"),)),
+    )
+
+
+def _not_installed_by_cmake(package: PackageRecord, name: str) -> Cause:
+    match = nearest(name, package.executables)
+    there = f"installed is {code(match)}" if match else "it was not installed"
+    if not match and package.executables:
+        there = f"installed are {codes(package.executables)}"
+    return Cause(
+        there,
+        f"CMakeLists.txt needs `install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})`, or "
+        "install(PROGRAMS ...) for a Python script.",
+        Evidence(places=(SourceError(_beside(package, "CMakeLists.txt"), None, "install"),)),
+    )
+
+
+def _entry_points(package: PackageRecord, name: str) -> str:
+    entry = f"{name} = {package.name}.<your module>:main"
+    return f"entry_points={{'console_scripts': ['{entry}']}}"
+
+
+def _manifest(package: PackageRecord) -> str:
+    return _beside(package, "package.xml")
+
+
+def _beside(package: PackageRecord, file: str) -> str:
+    return file if package.path in ("", ".") else f"{package.path}/{file}"

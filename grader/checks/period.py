@@ -1,0 +1,161 @@
+"""Periods of a stream of messages: intervals, their statistics, what the host explains.
+
+Two figures say whether messages come regularly:
+
+* the **median** of the intervals is the period; a few late messages do not move it;
+* an interval is **irregular** if it differs from the median by more than an allowed amount.
+  A message that comes late makes one interval too long and, if the next message is in time,
+  the following one as much too short: such a pair counts once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
+
+from grader.recording.model import NS, Message, Recording
+
+# A flood is judged by its beginning, which keeps a regrade fast.
+MOST_INTERVALS = 2000
+# Float noise of seconds made from nanoseconds.
+_EPSILON_S = 1e-9
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Time between two messages that one writer published one after the other.
+
+    Attributes:
+        begin_ns: Source timestamp of the earlier.
+        end_ns: Source timestamp of the later.
+        seconds: Their difference.
+        before_ns: Where the interval before began, or ``begin_ns`` for the first.
+    """
+
+    begin_ns: int
+    end_ns: int
+    seconds: float
+    before_ns: int
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is allowed.
+
+    Attributes:
+        period_s: Expected period.
+        median_s: How far the median may be from it.
+        spread_s: How far a single interval may be from the median.
+        outliers: Share of irregular intervals that is allowed; rounded down, but one at least
+            unless it is zero.
+    """
+
+    period_s: float
+    median_s: float
+    spread_s: float
+    outliers: float
+
+    def allowed(self, intervals: int) -> int:
+        """How many of so many intervals may be irregular."""
+        return max(1, int(self.outliers * intervals)) if self.outliers > 0.0 else 0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How intervals compare with limits.
+
+    Attributes:
+        median_s: Median interval.
+        irregular: Indices of irregular intervals, a pair by its first.
+        period_good: The median is within its tolerance.
+        regular: No more intervals are irregular than allowed.
+    """
+
+    median_s: float
+    irregular: tuple[int, ...]
+    period_good: bool
+    regular: bool
+
+    @property
+    def good(self) -> bool:
+        """Whether both hold."""
+        return self.period_good and self.regular
+
+
+def intervals(messages: Sequence[Message]) -> tuple[Interval, ...]:
+    """Intervals between consecutive messages by source timestamps, at most MOST_INTERVALS.
+
+    Where the writer's sequence numbers tell that a message between two was lost on its way,
+    the time between these two is no interval of the writer's, and is left out.
+    """
+    messages = messages[: MOST_INTERVALS + 1]
+    numbers = [message.sequence for message in messages]
+    # Numbers that do not grow come from several writers, or the middleware does not know them.
+    numbered = all(a < b for a, b in pairwise(numbers))
+    found = []
+    before_ns = messages[0].stamp_ns if messages else 0
+    for one, other in pairwise(messages):
+        if not numbered or other.sequence == one.sequence + 1:
+            seconds = (other.stamp_ns - one.stamp_ns) / NS
+            found.append(Interval(one.stamp_ns, other.stamp_ns, seconds, before_ns))
+        before_ns = one.stamp_ns
+    return tuple(found)
+
+
+def judge(seconds: Sequence[float], limits: Limits) -> Verdict:
+    """Judge intervals.
+
+    Args:
+        seconds: At least one interval, in their order.
+        limits: What is allowed.
+    """
+    middle = median(seconds)
+    irregular = _irregular([value - middle for value in seconds], limits.spread_s + _EPSILON_S)
+    return Verdict(
+        median_s=middle,
+        irregular=irregular,
+        period_good=abs(middle - limits.period_s) <= limits.median_s + _EPSILON_S,
+        regular=len(irregular) <= limits.allowed(len(seconds)),
+    )
+
+
+def _irregular(deviations: Sequence[float], allowed_s: float) -> tuple[int, ...]:
+    found = []
+    index = 0
+    while index < len(deviations):
+        if abs(deviations[index]) > allowed_s:
+            found.append(index)
+            following = deviations[index + 1] if index + 1 < len(deviations) else 0.0
+            # Too long, then as much too short: one message was late.
+            if deviations[index] > 0.0 > following and (
+                abs(deviations[index] + following) <= allowed_s
+            ):
+                index += 1
+        index += 1
+    return tuple(found)
+
+
+def forgiven(
+    recording: Recording, measured: Sequence[Interval], limits: Limits
+) -> tuple[float, ...]:
+    """The intervals as they could have been if the host had taken nothing.
+
+    Each is moved towards the expected period by at most what the host took: from a long one
+    what was taken during it, to a short one what was taken before it began, since then the
+    message before was late.
+
+    Returns:
+        Intervals in seconds, as many as given.
+    """
+    found = []
+    for item in measured:
+        deviation = item.seconds - limits.period_s
+        if deviation > 0.0:
+            taken_s = recording.taken_s(item.begin_ns, item.end_ns)
+            found.append(item.seconds - min(deviation, taken_s))
+        else:
+            taken_s = recording.taken_s(item.before_ns, item.end_ns)
+            found.append(item.seconds + min(-deviation, taken_s))
+    return tuple(found)

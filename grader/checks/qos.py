@@ -1,0 +1,279 @@
+"""Checks of quality of service: what publishers offer and subscriptions request."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from grader.assignment.model import Durability, Reliability, TopicName
+from grader.assignment.quantity import Duration
+from grader.checks import testimony
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.compatibility import duration_words, refusals
+from grader.checks.finding import Evidence, Finding, Table
+from grader.checks.topic_absence import why_no_endpoint
+from grader.checks.wording import code, counted
+from grader.recording.model import Endpoint, Kind, Qos, Recording
+
+# DDS carries durations as seconds and a fraction of 2**32.
+_SAME_DURATION = 1e-3
+_WORD_POLICIES = ("reliability", "durability", "liveliness")
+_DURATION_POLICIES = ("deadline", "lifespan")
+
+
+class Profile(Parameters):
+    """Parameters of qos.offered and qos.requested."""
+
+    topic: TopicName = Field(description="Fully qualified topic name.")
+    reliability: Reliability | None = Field(None, description="Expected reliability.")
+    durability: Durability | None = Field(None, description="Expected durability.")
+    deadline: Duration | None = Field(None, description="Expected deadline.")
+    lifespan: Duration | None = Field(None, description="Expected lifespan.")
+    liveliness: Literal["automatic", "manual_by_topic"] | None = Field(
+        None, description="Expected liveliness."
+    )
+
+    @model_validator(mode="after")
+    def _something(self) -> Profile:
+        if not self.policies:
+            raise ValueError(f"name a policy: {', '.join((*_WORD_POLICIES, *_DURATION_POLICIES))}")
+        return self
+
+    @property
+    def policies(self) -> dict[str, Any]:
+        """Policy -> expected value, those that are asked for only."""
+        names = (*_WORD_POLICIES, *_DURATION_POLICIES)
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+    @property
+    def qos(self) -> Qos:
+        """The expected profile, everything else unknown."""
+        return Qos(
+            reliability=self.reliability or "unknown",
+            durability=self.durability or "unknown",
+            liveliness=self.liveliness or "unknown",
+            deadline_s=self.deadline,
+            lifespan_s=self.lifespan,
+        )
+
+
+@dataclass(frozen=True)
+class _Side:
+    """The words and the rule for one end.
+
+    Attributes:
+        kind: Publisher or subscription.
+        has: ``offers`` or ``requests``.
+        did: ``offered`` or ``requested``.
+        partner: The other end, in words.
+        refusals: (found, expected) -> why a partner with the expected profile does not match.
+    """
+
+    kind: Kind
+    has: str
+    did: str
+    partner: str
+    refusals: Callable[[Qos, Qos], tuple[str, ...]]
+
+
+_PUBLISHER = _Side(
+    Kind.PUBLISHER,
+    "offers",
+    "offered",
+    "subscription that requests",
+    lambda found, expected: refusals(offered=found, requested=expected),
+)
+_SUBSCRIPTION = _Side(
+    Kind.SUBSCRIPTION,
+    "requests",
+    "requested",
+    "publisher that offers",
+    lambda found, expected: refusals(offered=expected, requested=found),
+)
+
+
+@check("qos.offered", Subject.RECORDING, Profile)
+def offered(recording: Recording, parameters: Profile) -> Finding:
+    """Publishers on the topic offer the expected QoS.
+
+    Judged by what DDS discovered of every publisher of the student's on the topic; only the
+    policies that are named in the parameters count. Queue depth is judged by qos.depth.
+
+    Explains by the rule "requested against offered" whether a subscription that requests the
+    expected profile would receive anything.
+    """
+    return _judge(recording, parameters, _PUBLISHER)
+
+
+@check("qos.requested", Subject.RECORDING, Profile)
+def requested(recording: Recording, parameters: Profile) -> Finding:
+    """Subscriptions to the topic request the expected QoS.
+
+    Judged by what DDS discovered of every subscription of the student's to the topic; only the
+    policies that are named in the parameters count.
+
+    Explains by the rule "requested against offered" whether it would receive anything from a
+    publisher that offers the expected profile.
+    """
+    return _judge(recording, parameters, _SUBSCRIPTION)
+
+
+def _judge(recording: Recording, parameters: Profile, side: _Side) -> Finding:
+    words = ", ".join(f"{name} {_words(item)}" for name, item in parameters.policies.items())
+    expected = f"the {side.kind.value} on {code(parameters.topic)} {side.has} {words}"
+    cause = why_no_endpoint(recording, side.kind, parameters.topic)
+    if cause is not None:
+        return cause.finding(expected)
+    endpoints = recording.student_endpoints(side.kind, parameters.topic)
+    for endpoint in endpoints:
+        wrong = _wrong(endpoint.qos, parameters)
+        if wrong:
+            return _mismatch(endpoint, wrong, parameters, expected, side)
+    hidden = [
+        name
+        for name in parameters.policies
+        if name in _WORD_POLICIES
+        and (not endpoints or any(getattr(item.qos, name) == "unknown" for item in endpoints))
+    ]
+    if hidden or not endpoints:
+        names = ", ".join(hidden) or "QoS"
+        return Finding.error(expected, f"{names} of the {side.kind.value} was not discovered")
+    return Finding.passed(
+        expected, f"{side.did} by {counted(len(endpoints), side.kind.value)}"
+    )
+
+
+def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
+    """Policy -> (expected, found) where they differ and are known."""
+    found: dict[str, tuple[Any, Any]] = {}
+    for name, wanted in parameters.policies.items():
+        if name in _WORD_POLICIES:
+            actual = getattr(qos, name)
+            if actual not in (wanted, "unknown"):
+                found[name] = wanted, actual
+        else:
+            actual_s = getattr(qos, f"{name}_s")
+            if actual_s is None or not math.isclose(actual_s, wanted, rel_tol=_SAME_DURATION):
+                found[name] = wanted, actual_s
+    return found
+
+
+def _mismatch(
+    endpoint: Endpoint,
+    wrong: dict[str, tuple[Any, Any]],
+    parameters: Profile,
+    expected: str,
+    side: _Side,
+) -> Finding:
+    refused = side.refusals(endpoint.qos, parameters.qos)
+    observed = f"the {side.kind.value} of {code(endpoint.node)} {side.has} " + ", ".join(
+        f"{name} {_words(actual)} instead of {_words(wanted)}"
+        for name, (wanted, actual) in wrong.items()
+    )
+    if refused:
+        observed += f": a {side.partner} the expected profile does not match it"
+    else:
+        observed += f"; a {side.partner} the expected profile would still match it"
+    rows = tuple(
+        (
+            name,
+            _words(wanted),
+            _words(actual),
+            "no" if any(reason.startswith(name) for reason in refused) else "yes",
+        )
+        for name, (wanted, actual) in wrong.items()
+    )
+    header = ("policy", "expected", side.did, "compatible")
+    return Finding.failed(
+        expected,
+        observed,
+        _hint(parameters, side),
+        Evidence(tables=(Table("Requested against offered", header, rows),)),
+    )
+
+
+def _hint(parameters: Profile, side: _Side) -> str:
+    asked = {name: item for name, item in parameters.policies.items() if name in _WORD_POLICIES}
+    default = {"reliability": "reliable", "durability": "volatile", "liveliness": "automatic"}
+    if len(asked) == len(parameters.policies) and all(
+        default[name] == item for name, item in asked.items()
+    ):
+        return (
+            "A number as QoS, such as 10, is the default profile: reliable and volatile. "
+            "qos_profile_sensor_data is best_effort."
+        )
+    arguments = ", ".join(
+        f"{name}={name.capitalize()}Policy.{item.upper()}"
+        if name in _WORD_POLICIES
+        else f"{name}=Duration(seconds={item:g})"
+        for name, item in parameters.policies.items()
+    )
+    create = "create_publisher" if side.kind is Kind.PUBLISHER else "create_subscription"
+    return f"Give {create} a profile: QoSProfile(depth=10, {arguments}), from rclpy.qos."
+
+
+def _words(value: Any) -> str:
+    return value if isinstance(value, str) else duration_words(value)
+
+
+class Depth(Parameters):
+    """Parameters of qos.depth."""
+
+    topic: TopicName = Field(description="Fully qualified topic name.")
+    depth: int = Field(ge=1, description="Expected queue depth (history keep_last).")
+    kind: Literal["publisher", "subscription"] = Field(
+        "publisher", description="Which end of the student's to judge."
+    )
+
+
+@check("qos.depth", Subject.RECORDING, Depth)
+def depth(recording: Recording, parameters: Depth) -> Finding:
+    """The queue has the expected depth.
+
+    DDS does not tell history and depth, so this is judged by what the process declared when it
+    created the endpoint.
+
+    Explains another depth and a history of keep_all, which has no depth.
+    """
+    kind = Kind(parameters.kind)
+    expected = f"queue depth {parameters.depth} of the {kind.value} on {code(parameters.topic)}"
+    cause = why_no_endpoint(recording, kind, parameters.topic)
+    if cause is not None:
+        return cause.finding(expected)
+    declared = testimony.queues(recording, kind, parameters.topic)
+    for queue in declared:
+        if queue.history == "keep_all":
+            return Finding.failed(
+                expected,
+                "history keep_all, declared by the process: the depth has no meaning then",
+                _depth_hint(parameters),
+            )
+        if queue.depth is not None and queue.depth != parameters.depth:
+            return Finding.failed(
+                expected,
+                f"depth {queue.depth}, declared by the process",
+                _depth_hint(parameters),
+            )
+    if not declared or any(queue.depth is None for queue in declared):
+        return Finding.error(
+            expected,
+            f"the depth cannot be seen: DDS does not tell it, and the process declared no "
+            f"{kind.value} on the topic",
+        )
+    return Finding.passed(expected, f"depth {parameters.depth}, declared by the process")
+
+
+def _depth_hint(parameters: Depth) -> str:
+    if parameters.kind == "publisher":
+        return (
+            "The third argument of create_publisher is the depth: "
+            f"self.create_publisher(Type, 'topic', {parameters.depth})."
+        )
+    return (
+        "The last argument of create_subscription is the depth: "
+        f"self.create_subscription(Type, 'topic', callback, {parameters.depth})."
+    )

@@ -1,0 +1,158 @@
+"""What a wrong rhythm of messages tells: a slip of units, two timers, sleeping, a slow callback."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import mean
+
+from grader.assignment.quantity import format_duration
+from grader.checks import testimony
+from grader.checks.period import Interval, Limits, Verdict
+from grader.recording.model import Kind, Recording
+
+_TENS = (10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
+_TENS_TOLERANCE = 0.1
+_MOST_TIMES = 5
+_TIMES_TOLERANCE = 0.08
+_SAME = 0.05
+_WORDS = {2: "twice", 3: "three times", 4: "four times", 5: "five times"}
+_ONE_TIMER = "Create one timer in the constructor, once, and publish once in its callback."
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What stands behind it.
+
+    Attributes:
+        words: A clause to follow the figures, or empty.
+        hint: What to try.
+    """
+
+    words: str
+    hint: str
+
+
+def explain(
+    recording: Recording,
+    topic: str,
+    measured: tuple[Interval, ...],
+    verdict: Verdict,
+    limits: Limits,
+) -> Explanation:
+    """Explain why the rhythm is not the expected one.
+
+    Args:
+        recording: The run.
+        topic: Where the messages were published.
+        measured: Intervals, at least one.
+        verdict: That is not good.
+        limits: What was allowed.
+    """
+    declared = [timer.period_s for timer in testimony.timers(recording)]
+    often = _too_often(recording, topic, measured, limits, declared)
+    if often:
+        return often
+    if verdict.period_good:
+        return _irregular(measured, verdict)
+    return _wrong_period(recording, topic, verdict, limits, declared)
+
+
+def _too_often(
+    recording: Recording,
+    topic: str,
+    measured: tuple[Interval, ...],
+    limits: Limits,
+    declared: list[float],
+) -> Explanation | None:
+    """Several messages in each expected period, evenly spaced or not."""
+    average_s = mean(item.seconds for item in measured)
+    if average_s <= 0.0:
+        return None
+    ratio = limits.period_s / average_s
+    times = round(ratio)
+    if not 2 <= times <= _MOST_TIMES or abs(ratio - times) > _TIMES_TOLERANCE * times:
+        return None
+    words = f"messages come {_WORDS[times]} as often as expected"
+    publishers = len(recording.student_endpoints(Kind.PUBLISHER, topic))
+    if publishers > 1:
+        return Explanation(
+            f"{words}, from {publishers} publishers on the topic",
+            "Create one publisher and launch the node once.",
+        )
+    if len(declared) > 1:
+        return Explanation(f"{words}, and the process declared {len(declared)} timers", _ONE_TIMER)
+    if declared and math.isclose(declared[0], average_s, rel_tol=_SAME):
+        return Explanation(
+            f"{words}: the process declared a timer of {format_duration(declared[0])}",
+            _seconds_hint(limits),
+        )
+    return Explanation(words, _ONE_TIMER)
+
+
+def _wrong_period(
+    recording: Recording, topic: str, verdict: Verdict, limits: Limits, declared: list[float]
+) -> Explanation:
+    wanted_s, median_s = limits.period_s, verdict.median_s
+    wanted, found = format_duration(wanted_s), format_duration(median_s)
+    same = next((item for item in declared if math.isclose(item, median_s, rel_tol=_SAME)), None)
+    said = f"; the process declared a timer of {format_duration(same)}" if same else ""
+    for factor in _TENS:
+        for ratio, words in ((factor, "times"), (1.0 / factor, "of")):
+            if median_s > 0.0 and math.isclose(
+                median_s / wanted_s, ratio, rel_tol=_TENS_TOLERANCE
+            ):
+                amount = f"{factor:g} times" if words == "times" else f"1/{factor:g} of"
+                return Explanation(f"{amount} the expected period{said}", _seconds_hint(limits))
+    if same:
+        return Explanation(said.removeprefix("; "), _seconds_hint(limits))
+    if median_s < wanted_s:
+        return _too_fast(recording, topic)
+    longer = format_duration(median_s - wanted_s)
+    if any(math.isclose(item, wanted_s, rel_tol=_SAME) for item in declared):
+        return Explanation(
+            f"{longer} too long: the process declared a timer of {wanted}, but the executor "
+            "cannot call it again before the callbacks are done",
+            "Keep callbacks short: no sleep, no loop that waits, no long computation in them.",
+        )
+    if median_s < 2.0 * wanted_s and verdict.regular:
+        no_timer = testimony.traced(recording) and not testimony.said(recording, "timer")
+        beginning = "the process declared no timer: " if no_timer else ""
+        return Explanation(
+            f"{beginning}it looks like {wanted} of sleeping plus {longer} of work",
+            f"Use a timer: self.create_timer({wanted_s:g}, self.callback) keeps its period "
+            "whatever the callback needs.",
+        )
+    return Explanation(f"{found} instead of {wanted}", _seconds_hint(limits))
+
+
+def _too_fast(recording: Recording, topic: str) -> Explanation:
+    if recording.student_endpoints(Kind.SUBSCRIPTION, topic):
+        return Explanation(
+            "the node subscribes to the topic that it publishes on, so it may answer itself",
+            "Do not publish in the callback of a subscription to the same topic.",
+        )
+    return Explanation("messages come too often", _ONE_TIMER)
+
+
+def _irregular(measured: tuple[Interval, ...], verdict: Verdict) -> Explanation:
+    ratios = [
+        measured[index].seconds / verdict.median_s if verdict.median_s else 0.0
+        for index in verdict.irregular
+    ]
+    if all(ratio > 1.5 and abs(ratio - round(ratio)) < 0.1 for ratio in ratios):
+        return Explanation(
+            "messages are left out", "Publish in every call of the callback, without a condition."
+        )
+    return Explanation(
+        "",
+        "Let a timer call the callback: self.create_timer(...) keeps its period, while sleeping "
+        "and waiting in a loop do not.",
+    )
+
+
+def _seconds_hint(limits: Limits) -> str:
+    return (
+        f"create_timer takes its period in seconds: {format_duration(limits.period_s)} is "
+        f"{limits.period_s:g}."
+    )

@@ -1,0 +1,250 @@
+"""Why no message arrived on a topic: one cause, the deepest that can be seen."""
+
+from __future__ import annotations
+
+from grader.assignment.quantity import format_duration
+from grader.checks import compatibility, testimony
+from grader.checks.cause import Cause
+from grader.checks.death import cause_of_death, dead
+from grader.checks.failure import interrupted_place
+from grader.checks.finding import Evidence, Moment
+from grader.checks.topic_absence import why_no_endpoint
+from grader.checks.wording import code, codes, counted, listing
+from grader.recording.model import NS, Endpoint, Kind, LogLine, Owner, Recording
+from grader.submission.record import SourceError
+
+_LOG_LINES = 5
+_SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
+# Share of the observation that the host may take before silence says nothing any more.
+_STARVED = 0.5
+_COMPLAINT_WORDS = ("error", "exception", "traceback", "warn")
+
+
+def why_silent(recording: Recording, topic: str) -> Cause:
+    """Why nothing was recorded on a topic.
+
+    Args:
+        recording: A run without a message on the topic.
+        topic: Fully qualified topic name.
+    """
+    cause = why_no_endpoint(recording, Kind.PUBLISHER, topic)
+    if cause is not None:
+        return cause
+    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
+    readers = [
+        item
+        for item in recording.endpoints
+        if item.owner is Owner.PROBE and item.kind is Kind.SUBSCRIPTION and item.topic == topic
+    ]
+    cause = (
+        _other_type(topic, publishers, readers)
+        or _unmatched(topic, publishers, readers)
+        or _held_in_vain(recording, topic)
+    )
+    if cause is not None:
+        return cause
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0]).after(f"no message on {code(topic)}")
+    return (
+        _slow(recording, topic)
+        or _starved(recording, topic)
+        or _never_spins(recording, topic)
+        or _prints(recording, topic)
+        or _idle(recording, topic)
+    )
+
+
+def why_few(recording: Recording, topic: str, needed: int) -> Cause:
+    """Why fewer messages than needed were recorded on a topic.
+
+    Args:
+        recording: The run.
+        topic: Fully qualified topic name.
+        needed: How many messages there should have been, more than there are.
+    """
+    messages = recording.on(topic)
+    if not messages:
+        return why_silent(recording, topic)
+    begin_ns = recording.matched_ns or recording.launched_ns
+    watched_s = (recording.stop_ns - begin_ns) / NS
+    seen = f"{counted(len(messages), 'message')} on {code(topic)} in {format_duration(watched_s)}"
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0]).after(seen)
+    moments = tuple(
+        Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
+        for index, message in enumerate(messages[:10], start=1)
+    )
+    taken_s = recording.taken_s(begin_ns, recording.stop_ns)
+    # With the time that was taken from it, the node may have come to as many as are needed.
+    if taken_s > 0.0 and len(messages) * watched_s >= needed * (watched_s - taken_s):
+        return Cause(
+            f"{seen}, but the machine took {format_duration(taken_s)} of them from the process",
+            ours=True,
+            disturbed=True,
+        )
+    periods = [format_duration(timer.period_s) for timer in testimony.timers(recording)]
+    timers = f"; the process declared a timer of {listing(periods)}" if periods else ""
+    return Cause(
+        seen + timers,
+        _SECONDS_HINT
+        if periods
+        else "Publish from the callback of a timer, which goes on as long as the node spins.",
+        Evidence(moments=moments),
+    )
+
+
+def _slow_timer(recording: Recording) -> testimony.DeclaredTimer | None:
+    """A declared timer that could not fire before the end of the observation, if all are such."""
+    timers = testimony.timers(recording)
+    if not timers or any(_fires(recording, timer) for timer in timers):
+        return None
+    return min(timers, key=lambda timer: timer.period_s)
+
+
+def _fires(recording: Recording, timer: testimony.DeclaredTimer) -> bool:
+    return timer.declared_ns + timer.period_s * NS <= recording.stop_ns
+
+
+def _other_type(
+    topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
+) -> Cause | None:
+    wanted = {item.type for item in readers}
+    found = {item.type for item in publishers}
+    if not wanted or not found or wanted & found:
+        return None
+    return Cause(
+        f"no message could be read: {code(topic)} has the type {codes(sorted(found))}, "
+        f"not {codes(sorted(wanted), last='or')}",
+        "A publisher and a subscription meet only if their types are the same.",
+    )
+
+
+def _unmatched(
+    topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
+) -> Cause | None:
+    """No reader of ours could match: each refuses a policy."""
+    if not publishers or not readers:
+        return None
+    reasons = [
+        compatibility.refusals(offered=publisher.qos, requested=reader.qos)
+        for publisher in publishers
+        for reader in readers
+    ]
+    if not all(reasons):
+        return None
+    return Cause(
+        f"no message on {code(topic)}: the publisher's QoS does not match its reader "
+        f"({', '.join(reasons[0])})",
+        "A subscription receives nothing from a publisher that offers less than it requests.",
+    )
+
+
+def _held_in_vain(recording: Recording, topic: str) -> Cause | None:
+    """A publisher that our tracer held for its match, and that found none: its message is lost."""
+    if not any(
+        item.data.get("topic") == topic and item.data.get("matched") is False
+        for item in recording.declared("held")
+    ):
+        return None
+    return Cause(
+        f"the publisher on {code(topic)} was not matched by the probe in time, so a message could "
+        "be lost",
+        ours=True,
+        disturbed=True,
+    )
+
+
+def _starved(recording: Recording, topic: str) -> Cause | None:
+    begin_ns = recording.matched_ns or recording.launched_ns
+    taken_s = recording.taken_s(begin_ns, recording.stop_ns)
+    watched_s = (recording.stop_ns - begin_ns) / NS
+    if taken_s < _STARVED * watched_s:
+        return None
+    return Cause(
+        f"no message on {code(topic)}, but the machine took {format_duration(taken_s)} of "
+        f"{format_duration(watched_s)} from the process",
+        ours=True,
+        disturbed=True,
+    )
+
+
+def _slow(recording: Recording, topic: str) -> Cause | None:
+    timer = _slow_timer(recording)
+    if timer is None:
+        return None
+    watched_s = recording.since_launch_s(recording.stop_ns)
+    return Cause(
+        f"no message on {code(topic)} in {format_duration(watched_s)}: the process declared a "
+        f"timer of {format_duration(timer.period_s)}",
+        _SECONDS_HINT,
+    )
+
+
+def _never_spins(recording: Recording, topic: str) -> Cause | None:
+    process = next(
+        (item for item in recording.processes if testimony.never_spun(recording, item.name)), None
+    )
+    if process is None:
+        return None
+    place = interrupted_place(recording, process.name)
+    where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
+    return Cause(
+        f"no message on {code(topic)}: rclpy.spin() was never called, so no callback runs{where}",
+        "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
+        Evidence(places=(place,) if place else ()),
+    )
+
+
+def _prints(recording: Recording, topic: str) -> Cause | None:
+    about = [line for line in recording.log if _tells_of_publishing(recording, line)]
+    if not about:
+        return None
+    return Cause(
+        f"no message on {code(topic)}, although the process prints {code(about[0].text.strip())}: "
+        "printing and logging send nothing",
+        "Call self.publisher.publish(msg) with the message in the callback.",
+        Evidence(log=tuple(line.text for line in about[:_LOG_LINES])),
+    )
+
+
+def _tells_of_publishing(recording: Recording, line: LogLine) -> bool:
+    text = line.text.lower()
+    # Indented lines are code in a traceback, which names publish() too.
+    return (
+        "publish" in text
+        and line.stream != "rosout"
+        and line.time_ns <= recording.stop_ns
+        and not text[:1].isspace()
+        and not any(word in text for word in _COMPLAINT_WORDS)
+    )
+
+
+def _idle(recording: Recording, topic: str) -> Cause:
+    complaints = [
+        line.text
+        for line in recording.log
+        if line.level in ("WARN", "ERROR", "FATAL") or line.stream == "stderr"
+    ]
+    evidence = Evidence(places=_interrupted(recording), log=tuple(complaints[-_LOG_LINES:]))
+    traced = testimony.traced(recording)
+    if traced and not testimony.said(recording, "timer"):
+        return Cause(
+            f"the publisher on {code(topic)} is there but silent, and the process declared no "
+            "timer that would call it",
+            "Call self.create_timer(period_in_seconds, self.callback) in the constructor, or "
+            "publish from a callback that runs.",
+            evidence,
+        )
+    return Cause(
+        f"the publisher on {code(topic)} is there but silent",
+        "Is publish(msg) reached in the callback? An `except: pass` hides the error that would "
+        "tell why not.",
+        evidence,
+    )
+
+
+def _interrupted(recording: Recording) -> tuple[SourceError, ...]:
+    places = (interrupted_place(recording, process.name) for process in recording.processes)
+    return tuple(place for place in places if place)

@@ -1,0 +1,116 @@
+"""The classic slips behind a wrong message: swapped fields, wrong sign, wrong unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+from grader.checks.value import Difference, same
+from grader.checks.wording import value_text
+
+_FACTORS = {1000.0: "1000 times", 100.0: "100 times", 10.0: "10 times"}
+_FACTOR_TOLERANCE = 1e-6
+
+
+def explain(
+    wrong: tuple[Difference, ...], observed: Mapping[str, Any], tolerance: float
+) -> str:
+    """Say which slip explains the differences, or nothing.
+
+    Args:
+        wrong: At least one difference.
+        observed: All leaves of the message.
+        tolerance: As for the comparison.
+
+    Returns:
+        A clause such as ``linear.x and angular.z are swapped``, or an empty text.
+    """
+    numbers = [item for item in wrong if _is_number(item.expected) and _is_number(item.observed)]
+    if not numbers:
+        return ""
+    wanted = [item for item in numbers if item.expected != 0]
+    return (
+        _not_a_number(numbers)
+        or _swapped(numbers, tolerance)
+        or _all_zero(wanted, observed)
+        or _moved(wanted, numbers, tolerance)
+        or _scaled(wanted, tolerance)
+    )
+
+
+def accumulates(expected: Any, series: list[Any]) -> bool:
+    """Whether a field that should stay the same grows by the same step in every message."""
+    if not _is_number(expected) or len(series) < 3 or not all(map(_is_number, series)):
+        return False
+    steps = [after - before for before, after in pairwise(series)]
+    step = steps[0]
+    if not math.isfinite(step) or step == 0:
+        return False
+    return all(math.isclose(other, step, rel_tol=1e-6) for other in steps)
+
+
+def _not_a_number(numbers: list[Difference]) -> str:
+    bad = next((item for item in numbers if not math.isfinite(item.observed)), None)
+    if bad is None or not math.isfinite(bad.expected):
+        return ""
+    if math.isnan(bad.observed):
+        return f"{bad.field} is not a number: look for 0/0 or the root of a negative number"
+    return f"{bad.field} is infinite: look for a division by zero or a range that sees nothing"
+
+
+def _swapped(numbers: list[Difference], tolerance: float) -> str:
+    for index, one in enumerate(numbers):
+        for other in numbers[index + 1 :]:
+            if same(one.expected, other.observed, tolerance) and same(
+                other.expected, one.observed, tolerance
+            ):
+                if one.expected and other.expected:
+                    return f"{one.field} and {other.field} are swapped"
+                full, empty = (one, other) if one.expected else (other, one)
+                return _stands_in(full, empty.field)
+    return ""
+
+
+def _moved(wanted: list[Difference], numbers: list[Difference], tolerance: float) -> str:
+    for item in wanted:
+        for other in numbers:
+            if other is not item and same(item.expected, other.observed, tolerance):
+                return _stands_in(item, other.field)
+    return ""
+
+
+def _stands_in(item: Difference, field: str) -> str:
+    return f"the {value_text(item.expected)} stands in {field} instead of {item.field}"
+
+
+def _all_zero(wanted: list[Difference], observed: Mapping[str, Any]) -> str:
+    numbers = [value for value in observed.values() if _is_number(value)]
+    if wanted and numbers and not any(numbers):
+        return "every number in it is zero: the message was published before its fields were set"
+    return ""
+
+
+def _scaled(wanted: list[Difference], tolerance: float) -> str:
+    for item in wanted:
+        if not item.observed:
+            continue
+        ratio = item.observed / item.expected
+        if same(item.expected, -item.observed, tolerance):
+            return f"the sign of {item.field} is wrong"
+        for factor, words in _FACTORS.items():
+            if math.isclose(ratio, factor, rel_tol=_FACTOR_TOLERANCE):
+                return f"{item.field} is {words} too large: a slip of units or of the point"
+            if math.isclose(ratio, 1.0 / factor, rel_tol=_FACTOR_TOLERANCE):
+                return f"{item.field} is {words} too small: a slip of units or of the point"
+        # Three digits, for people type 57.3 and 3.14.
+        if math.isclose(ratio, math.degrees(1.0), rel_tol=2e-3):
+            return f"{item.field} is in degrees: ROS has angles in radians (REP-103)"
+        if math.isclose(ratio, math.radians(1.0), rel_tol=2e-3):
+            return f"{item.field} was taken for degrees and converted, but is in radians already"
+    return ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,114 @@
+"""What the student's processes said of themselves through the tracer.
+
+All of it is *declared by the process*. Nothing here may be used where the wire can tell,
+absence means something only in a process that the tracer was in (:func:`traced`), and every
+value is read as hostile: the student's process could have written the line itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from grader.recording.model import Kind, Process, Recording
+
+
+@dataclass(frozen=True)
+class DeclaredTimer:
+    """A timer as the process created it.
+
+    Attributes:
+        period_s: Its period.
+        declared_ns: When the probe read of it.
+    """
+
+    period_s: float
+    declared_ns: int
+
+
+@dataclass(frozen=True)
+class DeclaredQueue:
+    """History of an endpoint as the process asked for it.
+
+    Attributes:
+        history: ``keep_last``, ``keep_all`` or another word of the process's.
+        depth: Queue depth, or None where the process gave no number.
+    """
+
+    history: str
+    depth: int | None
+
+
+def traced(recording: Recording, process: str | None = None) -> bool:
+    """Whether the tracer was in the process (or, without a name, in all of them)."""
+    started = {item.process for item in recording.declared("started")}
+    if process is not None:
+        return process in started
+    return bool(started) and all(item.name in started for item in recording.processes)
+
+
+def said(recording: Recording, kind: str, process: str | None = None) -> bool:
+    """Whether the process (or any) declared something of a kind, such as ``spin``."""
+    return any(process in (None, item.process) for item in recording.declared(kind))
+
+
+def never_spun(recording: Recording, process: str | None = None) -> bool:
+    """Whether the tracer was there and no executor ever waited for work."""
+    return traced(recording, process) and not said(recording, "spin", process)
+
+
+def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
+    """Timers that the processes declared, in the order of their declaration."""
+    found = []
+    for item in recording.declared("timer"):
+        period_s = _number(item.data, "period_s")
+        if period_s is not None and period_s > 0.0:
+            found.append(DeclaredTimer(period_s, item.time_ns))
+    return tuple(found)
+
+
+def queues(recording: Recording, kind: Kind, topic: str) -> tuple[DeclaredQueue, ...]:
+    """History and depth of the endpoints that the processes declared on a topic."""
+    found = []
+    for item in recording.declared(kind.value):
+        if _text(item.data, "topic") == topic:
+            depth = _number(item.data, "depth")
+            found.append(
+                DeclaredQueue(
+                    history=_text(item.data, "history") or "unknown",
+                    depth=int(depth) if depth is not None else None,
+                )
+            )
+    return tuple(found)
+
+
+def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
+    """Whether a declaration of a kind holds a text, such as a ``publisher`` on a ``topic``."""
+    return any(_text(item.data, key) == value for item in recording.declared(kind))
+
+
+def process_of(recording: Recording, node: str) -> Process | None:
+    """The process that declared a node, or the only one there is, or None."""
+    if len(recording.processes) == 1:
+        return recording.processes[0]
+    for item in recording.declared("node"):
+        if _text(item.data, "node") == node:
+            return next((p for p in recording.processes if p.name == item.process), None)
+    return None
+
+
+def _number(data: Mapping[str, Any], key: str) -> float | None:
+    value = data.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    # An integer of the process's may be too long for a float.
+    if isinstance(value, int) and abs(value) > 2**63:
+        return None
+    return float(value) if math.isfinite(value) else None
+
+
+def _text(data: Mapping[str, Any], key: str) -> str | None:
+    value = data.get(key)
+    return value if isinstance(value, str) else None

@@ -1,0 +1,168 @@
+"""Checks of when messages were published."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from grader.assignment.model import TopicName
+from grader.assignment.quantity import Duration, Ratio, format_duration
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.period import (
+    MOST_INTERVALS,
+    Interval,
+    Limits,
+    Verdict,
+    forgiven,
+    intervals,
+    judge,
+)
+from grader.checks.rhythm import explain
+from grader.checks.silence import why_few
+from grader.checks.stamps import why_not_believed
+from grader.checks.tolerance import TimeTolerance, Tolerance
+from grader.checks.wording import code, counted
+from grader.recording.model import Message, Recording
+
+_MS = 1e3
+
+
+class Period(Parameters):
+    """Parameters of timing.period."""
+
+    topic: TopicName = Field(description="Fully qualified topic name.")
+    period: Duration = Field(description="Expected time between two messages.")
+    tolerance: Tolerance = Field(
+        TimeTolerance(0.05, relative=True),
+        description="How far the median of the intervals may be from the period: a share of it "
+        "or a time.",
+    )
+    spread: Tolerance = Field(
+        TimeTolerance(0.10, relative=True),
+        description="How far a single interval may be from the median before it counts as "
+        "irregular: a share of the period or a time.",
+    )
+    outliers: Ratio = Field(
+        0.10,
+        description="Share of the intervals that may be irregular: rounded down, but one at "
+        "least, unless it is 0 %.",
+    )
+    at_least: int = Field(5, ge=1, description="Intervals that are needed to judge.")
+
+    @property
+    def limits(self) -> Limits:
+        """The same in seconds."""
+        return Limits(
+            period_s=self.period,
+            median_s=self.tolerance.of(self.period),
+            spread_s=self.spread.of(self.period),
+            outliers=self.outliers,
+        )
+
+
+@check("timing.period", Subject.RECORDING, Period)
+def period(recording: Recording, parameters: Period) -> Finding:
+    """Messages come at the expected period.
+
+    Judged by source timestamps, which the publisher's process sets in `publish()`, so that a
+    slow grader or network does not count. The median of the intervals must be the period
+    within `tolerance`; an interval that differs from the median by more than `spread` is
+    irregular, and only few may be (`outliers`). One late message makes an interval too long
+    and the next one too short: that counts once. What the machine took from the process is
+    measured, and never costs a point.
+
+    Explains a period in milliseconds where seconds are meant (300 or 0.003 instead of 0.3),
+    factors of ten, two timers or two publishers, sleeping instead of a timer (the work is
+    added to each period), callbacks that take longer than the period, messages left out, and
+    a publisher that is silent.
+    """
+    limits = parameters.limits
+    expected = (
+        f"a message on {code(parameters.topic)} every {format_duration(parameters.period)} "
+        f"(median within {parameters.tolerance}, intervals within {parameters.spread})"
+    )
+    messages = recording.on(parameters.topic)[: MOST_INTERVALS + 1]
+    if len(messages) <= parameters.at_least and not _too_slow(messages, limits):
+        cause = why_few(recording, parameters.topic, parameters.at_least + 1)
+        return cause.finding(expected)
+    unbelievable = why_not_believed(recording, messages)
+    if unbelievable is not None:
+        return unbelievable.finding(expected)
+    measured = intervals(messages)
+    if len(measured) < min(parameters.at_least, len(messages) - 1):
+        return Finding.error(
+            expected,
+            f"of {counted(len(messages), 'message')} so many neighbours were lost on their way to "
+            f"the probe that only {counted(len(measured), 'interval')} can be judged",
+            disturbed=True,
+        )
+    verdict = judge([item.seconds for item in measured], limits)
+    if verdict.good:
+        return Finding.passed(
+            expected, _figures(measured, verdict), _evidence(recording, parameters, measured)
+        )
+    if judge(forgiven(recording, measured, limits), limits).good:
+        taken_s = recording.taken_s(measured[0].begin_ns, measured[-1].end_ns)
+        return Finding.error(
+            expected,
+            f"{_figures(measured, verdict)}; the machine took up to {format_duration(taken_s)} "
+            "from the process meanwhile, which may explain it",
+            disturbed=True,
+        )
+    explanation = explain(recording, parameters.topic, measured, verdict, limits)
+    observed = _figures(measured, verdict)
+    if verdict.period_good:
+        observed += (
+            f"; {counted(len(verdict.irregular), 'interval')} of {len(measured)} "
+            f"{'differs' if len(verdict.irregular) == 1 else 'differ'} from the median by more "
+            f"than {format_duration(limits.spread_s)}"
+        )
+    observed += f": {explanation.words}" if explanation.words else ""
+    return Finding.failed(
+        expected, observed, explanation.hint, _evidence(recording, parameters, measured)
+    )
+
+
+def _too_slow(messages: tuple[Message, ...], limits: Limits) -> bool:
+    """Whether there are few messages because their period is too long."""
+    measured = intervals(messages)
+    if not measured:
+        return False
+    verdict = judge([item.seconds for item in measured], limits)
+    return not verdict.period_good and verdict.median_s > limits.period_s
+
+
+def _figures(measured: tuple[Interval, ...], verdict: Verdict) -> str:
+    worst_s = max(abs(item.seconds - verdict.median_s) for item in measured)
+    return (
+        f"median {format_duration(verdict.median_s)}, largest deviation from it "
+        f"{format_duration(worst_s)}, over {counted(len(measured), 'interval')}"
+    )
+
+
+def _evidence(
+    recording: Recording, parameters: Period, measured: tuple[Interval, ...]
+) -> Evidence:
+    limits = parameters.limits
+    worst = max(measured, key=lambda item: abs(item.seconds - limits.period_s))
+    return Evidence(
+        moments=(
+            Moment(
+                f"worst interval: {format_duration(worst.seconds)}",
+                recording.since_launch_s(worst.end_ns),
+            ),
+        ),
+        plots=(
+            Plot(
+                title=f"Time between messages on {parameters.topic}",
+                x_label="time since launch (s)",
+                y_label="time between messages (ms)",
+                x=tuple(recording.since_launch_s(item.end_ns) for item in measured),
+                y=tuple(item.seconds * _MS for item in measured),
+                band=(
+                    (limits.period_s - limits.spread_s) * _MS,
+                    (limits.period_s + limits.spread_s) * _MS,
+                ),
+            ),
+        ),
+    )

@@ -1,0 +1,179 @@
+"""Why the student has no publisher or subscription on a topic, near misses first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from grader.checks import testimony
+from grader.checks.cause import Cause
+from grader.checks.death import cause_of_death, dead
+from grader.checks.finding import Evidence, Moment, Table
+from grader.checks.node_absence import why_no_node
+from grader.checks.wording import code, codes
+from grader.nearest import nearest
+from grader.recording.model import Endpoint, Kind, Owner, Recording
+
+# Every rclpy node has these by itself; they say nothing of what the student wrote.
+OWN_TOPICS = frozenset({"/rosout", "/parameter_events", "/clock"})
+
+_CREATE = {Kind.PUBLISHER: "create_publisher", Kind.SUBSCRIPTION: "create_subscription"}
+_DOES = {Kind.PUBLISHER: "publishes on", Kind.SUBSCRIPTION: "subscribes to"}
+_DOES_NOTHING = {Kind.PUBLISHER: "publishes nothing", Kind.SUBSCRIPTION: "subscribes to nothing"}
+_OTHER = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.SUBSCRIPTION: Kind.PUBLISHER}
+
+
+def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | None:
+    """Why the student has no such endpoint on a topic, or None if there is one.
+
+    Args:
+        recording: The run.
+        kind: Publisher or subscription.
+        topic: Fully qualified topic name.
+    """
+    if recording.student_endpoints(kind, topic):
+        return None
+    if kind is Kind.PUBLISHER and recording.on(topic):
+        return None
+    cause = why_no_node(recording)
+    if cause is not None:
+        return cause
+    own = [item for item in recording.student_endpoints(kind) if item.topic not in OWN_TOPICS]
+    evidence = Evidence(moments=_moments(recording, own), tables=_endpoints_table(recording))
+    near = _near_miss(kind, topic, own, evidence)
+    if near is not None:
+        return near
+    ended = [process for process in dead(recording) if process.exit_code != 0]
+    if ended:
+        return cause_of_death(recording, ended[0])
+    if testimony.declares(recording, kind.value, "topic", topic):
+        return Cause(
+            f"the process declared a {kind.value} on {code(topic)}, but it never appeared in the "
+            "ROS graph",
+            ours=True,
+            disturbed=True,
+        )
+    if recording.student_endpoints(_OTHER[kind], topic):
+        other = _OTHER[kind]
+        return Cause(
+            f"the node {_DOES[other]} {code(topic)} instead: found a {other.value} there, "
+            f"no {kind.value}",
+            f"Use self.{_CREATE[kind]}(...) where the node has self.{_CREATE[other]}(...).",
+            evidence,
+        )
+    return _elsewhere(recording, kind, topic, own, evidence)
+
+
+def _near_miss(
+    kind: Kind, topic: str, own: list[Endpoint], evidence: Evidence
+) -> Cause | None:
+    base = topic.rpartition("/")[2]
+    for item in own:
+        found = f"the node {_DOES[kind]} {code(item.topic)} instead"
+        if item.topic.lower() == topic.lower():
+            return Cause(
+                f"{found}: upper and lower case differ",
+                f"Names in ROS are case-sensitive: write '{base}'.",
+                evidence,
+            )
+        if item.topic == item.node + topic:
+            return Cause(
+                f"{found}: a private name, below the node's own name",
+                f"`~/{base}` puts the node's name in front: write '{base}', without `~/`.",
+                evidence,
+            )
+        if item.topic.endswith(topic):
+            return _prefixed(item, topic, found, evidence)
+        if topic.endswith(item.topic):
+            return Cause(
+                f"{found}: an absolute name, which stays outside of the node's namespace",
+                f"Begin the name without `/`: '{item.topic.lstrip('/')}' is relative, and ROS "
+                "puts the node's namespace in front of it.",
+                evidence,
+            )
+    match = nearest(topic, [item.topic for item in own])
+    if match is None:
+        return None
+    return Cause(
+        f"the node {_DOES[kind]} {code(match)} instead of {code(topic)}",
+        f"Write the topic's name as '{base}' in self.{_CREATE[kind]}(...).",
+        evidence,
+    )
+
+
+def _prefixed(item: Endpoint, topic: str, found: str, evidence: Evidence) -> Cause:
+    prefix = item.topic[: -len(topic)]
+    namespace = item.node.rpartition("/")[0]
+    if namespace == prefix:
+        return Cause(
+            f"{found}: the node is in the namespace {code(namespace)}, and a relative topic name "
+            "goes there with it",
+            f"Create the node without namespace, or write the absolute name '{topic}'.",
+            evidence,
+        )
+    if prefix == item.node or prefix.lstrip("/") == item.node.rpartition("/")[2]:
+        return Cause(
+            f"{found}: the node's name stands in front of the topic's",
+            f"Write '{topic.lstrip('/')}', without `~/` and without the node's name.",
+            evidence,
+        )
+    return Cause(
+        f"{found}: {code(prefix)} stands in front of the name",
+        f"Write '{topic.lstrip('/')}' in the code.",
+        evidence,
+    )
+
+
+def _elsewhere(
+    recording: Recording, kind: Kind, topic: str, own: list[Endpoint], evidence: Evidence
+) -> Cause:
+    """Nothing near: name what there is, or that there is nothing."""
+    create = f"self.{_CREATE[kind]}(...)"
+    if not own:
+        return Cause(
+            f"the node {codes(node.name for node in recording.student_nodes)} "
+            f"{_DOES_NOTHING[kind]} (/rosout and /parameter_events belong to every node)",
+            f"Call {create} in the node's constructor.",
+            evidence,
+        )
+    wanted = {item.type for item in _probe_endpoints(recording, topic)}
+    same = [item.topic for item in own if item.type in wanted]
+    if same:
+        return Cause(
+            f"the right type of message, but on another topic: the node {_DOES[kind]} "
+            f"{codes(same)}",
+            f"Write the topic's name as '{topic.lstrip('/')}' in {create}.",
+            evidence,
+        )
+    return Cause(
+        f"the node {_DOES[kind]} {codes(item.topic for item in own)} only",
+        f"Call {create} with the topic '{topic.lstrip('/')}'.",
+        evidence,
+    )
+
+
+def _probe_endpoints(recording: Recording, topic: str) -> Iterable[Endpoint]:
+    return (
+        item for item in recording.endpoints if item.owner is Owner.PROBE and item.topic == topic
+    )
+
+
+def _moments(recording: Recording, endpoints: list[Endpoint]) -> tuple[Moment, ...]:
+    return tuple(
+        Moment(
+            f"{item.kind.value} on {item.topic} appeared",
+            recording.since_launch_s(item.appeared_ns),
+        )
+        for item in endpoints[:5]
+    )
+
+
+def _endpoints_table(recording: Recording) -> tuple[Table, ...]:
+    rows = [
+        (item.node, item.kind.value, item.topic, item.type)
+        for item in recording.endpoints
+        if item.owner is Owner.STUDENT and item.topic not in OWN_TOPICS
+    ]
+    if not rows:
+        return ()
+    header = ("node", "endpoint", "topic", "type")
+    return (Table("What the student's nodes publish and subscribe to", header, tuple(rows[:50])),)

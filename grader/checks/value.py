@@ -1,0 +1,176 @@
+"""Values of messages, field by field, against what an assignment expects of them."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from grader.nearest import did_you_mean
+
+FLOAT32_MAX = 3.4028234663852886e38
+
+
+class NoSuchField(ValueError):
+    """The expected value names a field that the message does not have, or of another kind."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A field that has not the expected value.
+
+    Attributes:
+        field: Path such as ``linear.x`` or ``data[2]``.
+        expected: What it should be.
+        observed: What it is.
+    """
+
+    field: str
+    expected: Any
+    observed: Any
+
+
+def leaves(value: Any, path: str = "") -> dict[str, Any]:
+    """Flatten a message: path of every leaf -> its value. An empty list is a leaf."""
+    if isinstance(value, Mapping):
+        found: dict[str, Any] = {}
+        for name, item in value.items():
+            found.update(leaves(item, f"{path}.{name}" if path else str(name)))
+        return found
+    items = _items(value)
+    if items:
+        found = {}
+        for index, item in enumerate(items):
+            found.update(leaves(item, f"{path}[{index}]"))
+        return found
+    return {path: value}
+
+
+def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> dict[str, Any]:
+    """Flatten an expected value by the fields that a message has.
+
+    Args:
+        expected: Nested (``{linear: {x: 1.0}}``) or by path (``{linear.x: 1.0}``).
+        message: Any message of the type.
+
+    Returns:
+        Path -> expected value. A list stays one value, for its length is expected too.
+
+    Raises:
+        NoSuchField: A name is not a field of the message, or its value has another kind.
+    """
+    found: dict[str, Any] = {}
+    for key, item in expected.items():
+        _expect(str(key).split("."), item, message, "", found)
+    return found
+
+
+def _expect(
+    names: list[str], item: Any, message: Any, path: str, found: dict[str, Any]
+) -> None:
+    if names:
+        name, here = names[0], path or "the message"
+        if not isinstance(message, Mapping):
+            raise NoSuchField(f"{here} has no field {name!r}: it is a plain value")
+        if name not in message:
+            raise NoSuchField(
+                f"{here} has no field {name!r}; it has {', '.join(sorted(message))}."
+                + did_you_mean(name, message)
+            )
+        _expect(names[1:], item, message[name], f"{path}.{name}" if path else name, found)
+        return
+    if isinstance(item, Mapping):
+        for key, inner in item.items():
+            _expect(str(key).split("."), inner, message, path, found)
+        return
+    if isinstance(message, Mapping):
+        raise NoSuchField(f"{path} is a message: name its fields ({', '.join(message)})")
+    if _kind(item) != _kind(message):
+        raise NoSuchField(f"{path} is {_kind(message)}, but {_kind(item)} is expected of it")
+    found[path] = item
+
+
+def differences(
+    expected: Mapping[str, Any], message: Mapping[str, Any], *, rest_zero: bool, tolerance: float
+) -> tuple[Difference, ...]:
+    """Fields of a message that have not the expected value.
+
+    Args:
+        expected: From :func:`expected_leaves`.
+        message: The message.
+        rest_zero: Whether every field that is not expected to be something must be zero,
+            false or empty.
+        tolerance: Largest absolute difference of two numbers.
+    """
+    found = []
+    for path, wanted in expected.items():
+        observed = _at(message, path)
+        if not same(wanted, observed, tolerance):
+            found.append(Difference(path, wanted, observed))
+    if rest_zero:
+        for path, observed in leaves(message).items():
+            named = any(path == known or path.startswith(known + "[") for known in expected)
+            if not named and not _is_zero(observed, tolerance):
+                found.append(Difference(path, zero_of(observed), observed))
+    return tuple(found)
+
+
+def same(wanted: Any, observed: Any, tolerance: float) -> bool:
+    """Whether an observed value is the wanted one; NaN is the same as NaN.
+
+    A float32 field holds the float32 that is nearest to the wanted number: that is the same.
+    """
+    wanted_items, observed_items = _items(wanted), _items(observed)
+    if wanted_items is not None and observed_items is not None:
+        return len(wanted_items) == len(observed_items) and all(
+            same(a, b, tolerance) for a, b in zip(wanted_items, observed_items, strict=True)
+        )
+    if not (isinstance(wanted, int | float) and isinstance(observed, int | float)):
+        return bool(wanted == observed)
+    if math.isnan(wanted) or math.isnan(observed):
+        return math.isnan(wanted) and math.isnan(observed)
+    if wanted == observed or abs(wanted - observed) <= tolerance:
+        return True
+    return observed == _as_float32(wanted)
+
+
+def _as_float32(number: float) -> float:
+    if abs(number) > FLOAT32_MAX:
+        return number
+    nearest: float = struct.unpack("f", struct.pack("f", number))[0]
+    return nearest
+
+
+def zero_of(value: Any) -> Any:
+    """The zero of a value's kind: ``0.0``, ``0``, ``false``, an empty text or list."""
+    return [] if _items(value) is not None else type(value)()
+
+
+def _is_zero(value: Any, tolerance: float) -> bool:
+    if isinstance(value, int | float):
+        return abs(value) <= tolerance
+    return not value
+
+
+def _at(message: Any, path: str) -> Any:
+    for name in path.split("."):
+        message = message[name]
+    return message
+
+
+def _items(value: Any) -> Sequence[Any] | None:
+    """Items of an array field; None for anything else."""
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        return None
+    return value
+
+
+def _kind(value: Any) -> str:
+    if _items(value) is not None:
+        return "a list"
+    # A bool counts as a number, for a decoder may give 1 for true.
+    if isinstance(value, int | float):
+        return "a number"
+    return "a text" if isinstance(value, str) else type(value).__name__

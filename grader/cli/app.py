@@ -1,0 +1,72 @@
+"""The command ``rosgrade``: its commands, and how errors end it.
+
+Exit codes: 0 full points, 1 points lost, 2 wrong use or bad YAML, 3 not graded (our fault or
+the machine's), 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from grader import __version__
+from grader.cli import (
+    assignments,
+    catalogue,
+    check,
+    doctor,
+    regrade,
+    selftest,
+)
+from grader.cli.console import print_error
+from grader.errors import GraderFault, RosgradeError
+
+USAGE = 2
+NOT_GRADED = 3
+
+app = typer.Typer(
+    name="rosgrade",
+    help="Grade ROS 2 assignments: build the student's packages, run the real nodes, judge "
+    "what was recorded.",
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"rosgrade {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Show the version and exit."
+    ),
+) -> None:
+    """Options before the command."""
+
+
+app.command("list")(assignments.list_command)
+app.command("show")(assignments.show)
+app.command("check")(check.check)
+app.command("regrade")(regrade.regrade)
+app.command("selftest")(selftest.selftest)
+app.command("validate")(catalogue.validate)
+app.command("schema")(catalogue.schema)
+app.command("checks")(catalogue.checks)
+app.command("doctor")(doctor.doctor)
+
+
+def main() -> None:
+    """Entry point; a mistake of the user's ends with one message and no traceback."""
+    try:
+        app()
+    except RosgradeError as error:
+        print_error(str(error))
+        sys.exit(NOT_GRADED if isinstance(error, GraderFault) else USAGE)

@@ -1,0 +1,88 @@
+"""``rosgrade validate``, ``rosgrade schema`` and ``rosgrade checks``."""
+
+from __future__ import annotations
+
+import json
+from enum import Enum
+from typing import Annotated
+
+import typer
+
+from grader.cli.console import output_console, print_error
+from grader.errors import RosgradeError
+
+
+class Document(str, Enum):
+    """What a schema describes."""
+
+    ASSIGNMENT = "assignment"
+    MUTANTS = "mutants"
+    RESULT = "result"
+
+
+def validate(
+    files: Annotated[
+        list[str], typer.Argument(help="assignment.yaml files, folders, or ids of assignments.")
+    ],
+) -> None:
+    """Check assignments without running anything: file, line, and what is allowed."""
+    from grader.assignment.load import load_assignment
+    from grader.assignment.mutation import MUTANTS_FILE, load_mutants
+
+    broken = 0
+    for name in files:
+        try:
+            loaded = load_assignment(name)
+            has_mutants = (loaded.folder / MUTANTS_FILE).exists()
+            mutants = load_mutants(loaded.assignment, loaded.folder) if has_mutants else None
+        except RosgradeError as error:
+            print_error(str(error))
+            broken += 1
+            continue
+        tested = f", {len(mutants.mutants)} mutants" if mutants else ""
+        typer.echo(
+            f"{loaded.file}: {len(loaded.assignment.scenarios)} scenarios, "
+            f"{len(loaded.checks)} checks{tested}: valid"
+        )
+    if broken:
+        raise typer.Exit(2)
+
+
+def schema(
+    document: Annotated[Document, typer.Argument(help="Which schema.")] = Document.ASSIGNMENT,
+) -> None:
+    """Print the JSON Schema of a file, for editors."""
+    from grader.assignment.schema import assignment_schema, mutants_schema
+    from grader.report.result import result_schema
+
+    make = {
+        Document.ASSIGNMENT: assignment_schema,
+        Document.MUTANTS: mutants_schema,
+        Document.RESULT: result_schema,
+    }[document]
+    typer.echo(json.dumps(make(), indent=2))
+
+
+def checks(
+    name: Annotated[str | None, typer.Argument(help="One check; by default all.")] = None,
+) -> None:
+    """Show the catalogue of checks with their parameters."""
+    from rich.markdown import Markdown
+    from rich.table import Table
+
+    from grader.checks.catalogue import CATALOGUE
+    from grader.docs import check_markdown
+    from grader.errors import UsageError
+    from grader.nearest import did_you_mean
+
+    console = output_console()
+    if name is None:
+        table = Table("CHECK", "WHAT IT JUDGES", box=None, pad_edge=False)
+        for entry in CATALOGUE.values():
+            table.add_row(entry.name, entry.title)
+        console.print(table)
+        console.print("\nrosgrade checks NAME tells what a check looks at and its parameters.")
+        return
+    if name not in CATALOGUE:
+        raise UsageError(f"no check {name!r}." + did_you_mean(name, CATALOGUE))
+    console.print(Markdown(check_markdown(CATALOGUE[name])))

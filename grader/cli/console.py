@@ -1,0 +1,81 @@
+"""Where the commands write: results on standard output, progress and errors on the other."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def output_console() -> Console:
+    """Console on standard output."""
+    from rich.console import Console
+
+    return Console(highlight=False, emoji=False, markup=False)
+
+
+def print_error(message: str) -> None:
+    """One message on standard error."""
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
+    console.print(Text.assemble(("rosgrade: error: ", "bold red"), message))
+
+
+def cache_folder() -> Path:
+    """Folder for builds that may be deleted at any time (XDG Base Directory)."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "rosgrade"
+
+
+class Progress:
+    """What happens at the moment: a line that is overwritten on a terminal, else plain lines."""
+
+    def __init__(self, quiet: bool = False) -> None:
+        """Prepare.
+
+        Args:
+            quiet: Say nothing at all.
+        """
+        self._quiet = quiet
+        self._status: object | None = None
+        self._last = ""
+
+    @contextmanager
+    def shown(self) -> Iterator[Progress]:
+        """Show the line while the block runs."""
+        if self._quiet or not sys.stderr.isatty():
+            yield self
+            return
+        from rich.console import Console
+
+        with Console(stderr=True, highlight=False, emoji=False).status("") as status:
+            self._status = status
+            try:
+                yield self
+            finally:
+                self._status = None
+
+    def say(self, text: str, *, passing: bool = False) -> None:
+        """Say what happens now.
+
+        Args:
+            text: A few words.
+            passing: Not worth a line of its own where lines stay.
+        """
+        if self._quiet or text == self._last:
+            return
+        self._last = text
+        if self._status is not None:
+            from rich.text import Text
+
+            self._status.update(Text(text))  # type: ignore[attr-defined]
+        elif not passing:
+            print(f"rosgrade: {text}", file=sys.stderr, flush=True)

@@ -1,0 +1,79 @@
+"""``rosgrade selftest``: the mutation score of assignments."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from grader.cli.console import Progress, cache_folder, output_console
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from grader.batch.selftest import TrialResult
+
+
+def selftest(
+    assignments: Annotated[
+        list[str] | None, typer.Argument(help="Ids or folders; by default all.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Submissions at once; by default two per CPU.")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+) -> None:
+    """Grade the reference, the variants and the mutants of an assignment.
+
+    The reference and every variant must get full points, every mutant must lose exactly the
+    checks that it names. Ends with 0 only if all of that is so.
+    """
+    from grader import ros
+    from grader.assignment.load import list_assignments, load_assignment
+    from grader.batch.grading import Grading
+    from grader.batch.selftest import mutation_score
+    from grader.batch.selftest import selftest as run_selftest
+    from grader.run.admission import cpu_count
+    from grader.run.runner import Runner
+
+    console = output_console()
+    perfect = True
+    for name in assignments or list_assignments():
+        loaded = load_assignment(name)
+        runner = Runner(ros.find())
+        grading = Grading(loaded, runner, cache_folder())
+        results: list[TrialResult] = []
+        with Progress(quiet).shown() as progress:
+            for result in run_selftest(loaded, grading, jobs=jobs or 2 * cpu_count()):
+                results.append(result)
+                progress.say(
+                    f"{loaded.assignment.id}: {len(results)} graded, last {result.trial.id}",
+                    passing=True,
+                )
+        score = mutation_score(results)
+        perfect = perfect and score.perfect
+        _print(console, loaded.assignment.id, results)
+        console.print(
+            f"{loaded.assignment.id}: {score.accepted} of {score.right} right solutions with "
+            f"full points, {score.killed} of {score.mutants} mutants judged as they must: "
+            f"mutation score {score.percent:.0f} %"
+        )
+    raise typer.Exit(0 if perfect else 1)
+
+
+def _print(console: Console, assignment: str, results: list[TrialResult]) -> None:
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table("", assignment, "WHAT", "LOST", box=None, pad_edge=False)
+    order = ("reference", "variant", "mutant")
+    for result in sorted(results, key=lambda r: (order.index(r.trial.role.value), r.trial.id)):
+        lost = [r.id for r in result.graded.grade.results if r.status.value == "failed"]
+        wrong = "; ".join(str(difference) for difference in result.verdict.differences)
+        table.add_row(
+            "ok" if result.verdict.right else "WRONG",
+            result.trial.id,
+            escape(result.trial.title),
+            escape(wrong or ", ".join(lost) or "nothing"),
+        )
+    console.print(table)

@@ -1,0 +1,137 @@
+"""What this machine has of all that grading needs, and how to get the rest."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import metadata
+
+from grader import ros
+from grader.assignment.quantity import format_duration
+from grader.errors import GraderFault
+from grader.run.admission import cpu_count
+
+
+@dataclass(frozen=True)
+class Part:
+    """One thing that grading needs or profits from.
+
+    Attributes:
+        name: What it is.
+        present: Whether it is there and works.
+        found: What was found.
+        remedy: How to get it, where it is missing.
+        required: Nothing can be graded without it.
+    """
+
+    name: str
+    present: bool
+    found: str = ""
+    remedy: str = ""
+    required: bool = False
+
+
+def diagnose() -> Iterator[Part]:
+    """Look at every part; the slow ones (discovery) last."""
+    yield Part("Python", True, f"{platform.python_version()} on {platform.platform()}")
+    try:
+        installation = ros.find()
+    except GraderFault as fault:
+        yield Part("ROS 2", False, remedy=str(fault), required=True)
+        installation = None
+    if installation is not None:
+        where = ("wheels in " if installation.source == "wheels" else "sourced from ") + ", ".join(
+            str(prefix) for prefix in installation.prefixes
+        )
+        yield Part("ROS 2", True, f"{installation.distro}, {where}", required=True)
+        yield _rmw(installation)
+    yield _colcon()
+    yield _program("C++ compiler", "g++", "for packages with own interfaces", "g++")
+    yield _program("cmake", "cmake", "for ament_cmake packages", "cmake")
+    yield _sandbox()
+    yield _domain_id()
+    yield _load()
+    if installation is not None:
+        yield _discovery(installation)
+
+
+def _rmw(installation: ros.RosInstallation) -> Part:
+    present = "rmw_fastrtps_cpp" in installation.packages
+    chosen = os.environ.get("RMW_IMPLEMENTATION", "")
+    other = f"; RMW_IMPLEMENTATION={chosen} of this shell is not used" if chosen else ""
+    return Part(
+        "rmw",
+        present,
+        f"rmw_fastrtps_cpp{other}",
+        "install rmw_fastrtps_cpp: sudo apt install ros-jazzy-rmw-fastrtps-cpp",
+        required=True,
+    )
+
+
+def _colcon() -> Part:
+    try:
+        versions = [f"{name} {metadata.version(name)}" for name in ("colcon-core", "colcon-ros")]
+    except metadata.PackageNotFoundError as error:
+        return Part("colcon", False, remedy=f"pip install {error.name}", required=True)
+    return Part("colcon", True, ", ".join(versions), required=True)
+
+
+def _program(name: str, command: str, purpose: str, package: str) -> Part:
+    path = shutil.which(command)
+    if path is None:
+        return Part(name, False, remedy=f"sudo apt install {package} ({purpose})")
+    shown = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
+    return Part(name, True, shown.stdout.partition("\n")[0] or path)
+
+
+def _sandbox() -> Part:
+    path = shutil.which("bwrap")
+    if path is None:
+        return Part("sandbox", False, remedy="sudo apt install bubblewrap (for untrusted code)")
+    tried = subprocess.run(
+        [path, "--unshare-all", "--ro-bind", "/", "/", "true"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if tried.returncode == 0:
+        return Part("sandbox", True, f"bubblewrap works ({path}); this version does not use it yet")
+    reason = tried.stderr.strip().splitlines()[-1] if tried.stderr.strip() else "it failed"
+    return Part(
+        "sandbox",
+        False,
+        remedy=f"bubblewrap is there but may not make namespaces ({reason}): on Ubuntu 24.04 "
+        "sudo sysctl kernel.apparmor_restrict_unprivileged_userns=0",
+    )
+
+
+def _domain_id() -> Part:
+    chosen = os.environ.get("ROS_DOMAIN_ID")
+    shown = f"{chosen} in this shell" if chosen else "not set in this shell"
+    return Part("ROS_DOMAIN_ID", True, f"{shown}; every run gets a free one from 1 to 101")
+
+
+def _load() -> Part:
+    one_minute = os.getloadavg()[0]
+    return Part("load", True, f"{one_minute:.2f} on {cpu_count()} CPUs (1 min average)")
+
+
+def _discovery(installation: ros.RosInstallation) -> Part:
+    from grader.run.meeting import meet
+
+    meeting = meet(installation)
+    if meeting.met_s is None:
+        return Part(
+            "discovery",
+            False,
+            remedy=f"two nodes on this machine do not meet: {meeting.error}. Is a firewall "
+            "closing UDP on the loopback interface?",
+            required=True,
+        )
+    return Part(
+        "discovery", True, f"two nodes met after {format_duration(meeting.met_s)}", required=True
+    )

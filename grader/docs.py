@@ -1,0 +1,236 @@
+"""The documentation that is made from the code: ``python -m grader.docs [--check]``.
+
+``docs/assignment-yaml.md`` comes from the models of the YAML, ``docs/checks.md`` from the
+catalogue of checks. Nothing in them is typed twice; with ``--check`` a stale file is an error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from grader import resources
+from grader.assignment import model, mutant, own_check
+from grader.assignment.quantity import UNITS, Dimension, format_duration
+from grader.checks.catalogue import CATALOGUE
+from grader.checks.check import Check, Subject
+
+_MADE = "<!-- Made by `python -m grader.docs` from the code: change it there. -->"
+
+_ASSIGNMENT_MODELS: tuple[type[BaseModel], ...] = (
+    model.Assignment,
+    model.Package,
+    model.Scenario,
+    model.Launch,
+    model.RecordedTopic,
+    model.ListParameters,
+    model.Until,
+    model.CheckSpec,
+)
+_MUTANT_MODELS: tuple[type[BaseModel], ...] = (
+    mutant.MutantFile,
+    mutant.Mutant,
+    mutant.Variant,
+    mutant.Edit,
+)
+_EXAMPLES = {
+    Dimension.TIME: "300 ms",
+    Dimension.FREQUENCY: "10 Hz",
+    Dimension.LENGTH: "0.2 m",
+    Dimension.ANGLE: "5 deg",
+    Dimension.SPEED: "0.22 m/s",
+    Dimension.ANGULAR_SPEED: "90 deg/s",
+    Dimension.ACCELERATION: "0.5 m/s^2",
+    Dimension.ANGULAR_ACCELERATION: "1 rad/s^2",
+    Dimension.RATIO: "5 %",
+    Dimension.SIZE: "64 MiB",
+}
+_TYPES = {
+    "string": "text",
+    "number": "number",
+    "integer": "whole number",
+    "boolean": "`true` or `false`",
+    "object": "keys and values",
+}
+
+
+def assignment_markdown() -> str:
+    """The description of ``assignment.yaml`` and ``mutants.yaml``."""
+    example = resources.assignments() / "timed_publisher" / "assignment.yaml"
+    parts = [
+        "# assignment.yaml",
+        _MADE,
+        "An assignment is a folder `assignments/<id>/` with `assignment.yaml`, a handout "
+        "`README.md` and `mutants.yaml`. `rosgrade validate` checks the files and names the "
+        "line of every mistake; `rosgrade schema` prints a JSON Schema for editors.",
+        "Scalars are those of YAML 1.2: `on`, `yes` and `12:30` are text, `1e-3` is a number.",
+        *(_model_section(one) for one in _ASSIGNMENT_MODELS),
+        "## Quantities",
+        "A quantity is a number with its unit; zero may stand without, and so may a ratio "
+        "below one (`0.05` is `5 %`).",
+        _table(("quantity", "units", "example"), _quantity_rows()),
+        "## Own checks",
+        (inspect.getdoc(own_check) or "").partition("\n")[2].strip(),
+        "## Example",
+        f"```yaml\n{example.read_text(encoding='utf-8').strip()}\n```",
+        "# mutants.yaml",
+        *(_model_section(one) for one in _MUTANT_MODELS),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def checks_markdown(catalogue: Mapping[str, Check] = CATALOGUE) -> str:
+    """The catalogue of checks."""
+    rows = [
+        (f"[`{check.name}`](#{check.name.replace('.', '')})", check.title)
+        for check in catalogue.values()
+    ]
+    parts = [
+        "# Checks",
+        _MADE,
+        "What `uses` in an [assignment.yaml](assignment-yaml.md) may name, with the keys of "
+        "`with`. A check judges either what was handed in, before it runs, or the recording "
+        "of a run.",
+        _table(("check", "what it asks for"), rows),
+        *(check_markdown(check) for check in catalogue.values()),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def check_markdown(check: Check) -> str:
+    """One check: what it asks for, what it explains, its parameters."""
+    judged = {
+        Subject.SUBMISSION: "Judges what was handed in.",
+        Subject.RECORDING: "Judges the recording of a run.",
+    }[check.subject]
+    parts = [f"## {check.name}", check.documentation, judged]
+    if check.parameters.model_fields:
+        parts.append(_fields_table(check.parameters))
+    else:
+        parts.append("It has no parameters.")
+    return "\n\n".join(parts)
+
+
+def _model_section(one: type[BaseModel]) -> str:
+    return f"## {one.__name__}\n\n{inspect.getdoc(one)}\n\n{_fields_table(one)}"
+
+
+def _fields_table(one: type[BaseModel]) -> str:
+    schema = one.model_json_schema(by_alias=True)
+    definitions = schema.get("$defs", {})
+    required = schema.get("required", [])
+    rows = []
+    for key, found in schema.get("properties", {}).items():
+        default = "required" if key in required else _default(found)
+        meaning = str(found.get("description", "")).replace("\n", " ")
+        rows.append((f"`{key}`", _value(found, definitions), default, meaning))
+    return _table(("key", "value", "default", "meaning"), rows)
+
+
+def _value(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
+    """What may be written, in words."""
+    if "x-dimension" in schema:
+        dimension = Dimension(schema["x-dimension"])
+        return f"{dimension.value}, such as `{_EXAMPLES[dimension]}`"
+    if "$ref" in schema:
+        name = str(schema["$ref"]).rpartition("/")[2]
+        target = definitions[name]
+        is_section = any(one.__name__ == name for one in (*_ASSIGNMENT_MODELS, *_MUTANT_MODELS))
+        return f"[{name}](#{name.lower()})" if is_section else _value(target, definitions)
+    for key in ("anyOf", "oneOf"):
+        if key in schema:
+            forms = [form for form in schema[key] if form.get("type") != "null"]
+            return " or ".join(dict.fromkeys(_value(form, definitions) for form in forms))
+    if "enum" in schema or "const" in schema:
+        allowed = schema.get("enum", [schema.get("const")])
+        return " or ".join(f"`{value}`" for value in allowed)
+    kind = schema.get("type")
+    if kind == "array":
+        return f"list of {_value(schema.get('items', {}), definitions)}"
+    inner = schema.get("additionalProperties")
+    if kind == "object" and isinstance(inner, dict):
+        return f"keys, each with {_value(inner, definitions)}"
+    return _TYPES.get(str(kind), "anything") + _bounds(schema)
+
+
+def _bounds(schema: Mapping[str, Any]) -> str:
+    words = {
+        "minimum": "at least",
+        "exclusiveMinimum": "more than",
+        "maximum": "at most",
+        "exclusiveMaximum": "less than",
+    }
+    found = [f"{word} {schema[key]:g}" for key, word in words.items() if key in schema]
+    return f", {' and '.join(found)}" if found else ""
+
+
+def _default(schema: Mapping[str, Any]) -> str:
+    default = schema.get("default")
+    if default in (None, "", [], {}):
+        return ""
+    dimensions = [form.get("x-dimension") for form in (schema, *schema.get("anyOf", ()))]
+    if Dimension.TIME.value in dimensions:
+        return f"`{format_duration(default)}`"
+    if Dimension.RATIO.value in dimensions:
+        return f"`{default * 100:g} %`"
+    if isinstance(default, bool):
+        return f"`{str(default).lower()}`"
+    return f"`{default}`"
+
+
+def _quantity_rows() -> Iterator[tuple[str, ...]]:
+    for dimension, units in UNITS.items():
+        listed = ", ".join(f"`{unit}`" for unit in units)
+        yield dimension.value, listed, f"`{_EXAMPLES[dimension]}`"
+
+
+def _table(header: tuple[str, ...], rows: Any) -> str:
+    lines = [header, ("---",) * len(header), *rows]
+    cells = [[str(cell).replace("|", "\\|") for cell in line] for line in lines]
+    return "\n".join(f"| {' | '.join(line)} |" for line in cells)
+
+
+def documents() -> dict[str, str]:
+    """Every generated file of ``docs/``, by name."""
+    return {"assignment-yaml.md": assignment_markdown(), "checks.md": checks_markdown()}
+
+
+def stale(folder: Path) -> list[str]:
+    """Names of generated files in a folder that are missing or not up to date."""
+    return [
+        name
+        for name, text in documents().items()
+        if not (folder / name).is_file() or (folder / name).read_text(encoding="utf-8") != text
+    ]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Write the files, or with ``--check`` only compare them.
+
+    Returns:
+        0, or 1 where ``--check`` found a stale file.
+    """
+    parser = argparse.ArgumentParser(prog="python -m grader.docs", description=__doc__)
+    parser.add_argument("--check", action="store_true", help="only compare; 1 if one is stale")
+    parser.add_argument("--folder", type=Path, default=resources.root() / "docs")
+    options = parser.parse_args(arguments)
+    old = stale(options.folder)
+    if options.check:
+        for name in old:
+            print(f"{options.folder / name} is stale: run python -m grader.docs", file=sys.stderr)
+        return 1 if old else 0
+    options.folder.mkdir(exist_ok=True)
+    for name in old:
+        (options.folder / name).write_text(documents()[name], encoding="utf-8")
+        print(options.folder / name)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

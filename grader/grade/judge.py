@@ -1,0 +1,178 @@
+"""Judging: every check of an assignment, on one submission and its recordings.
+
+A check is worth the credit of its worst scenario: it passes only where every scenario passes,
+and partial credit counts only as far as every scenario gives it. An author who wants points
+for each scenario writes a check for each.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from grader.assignment.model import CheckSpec
+from grader.checks.check import Subject
+from grader.checks.finding import Finding, Status
+from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding
+from grader.grade.order import dependency_order
+from grader.grade.points import points_for
+from grader.grade.unrun import why_not_run
+from grader.recording.model import Ending, Recording
+from grader.submission.record import SubmissionRecord
+
+if TYPE_CHECKING:
+    # Reading YAML is not needed to judge; a worker of a batch starts without it.
+    from grader.assignment.load import BoundCheck, LoadedAssignment
+
+_NOT_YOURS = "Nothing to fix on your side: tell whoever runs the grader."
+
+
+def grade(
+    loaded: LoadedAssignment,
+    submission: SubmissionRecord,
+    recordings: Mapping[str, Recording],
+) -> Grade:
+    """Judge a submission.
+
+    A check whose requirement did not pass is skipped. A check that itself fails (an exception)
+    is an error of ours and keeps its traceback.
+
+    Args:
+        loaded: The assignment with its checks.
+        submission: What was handed in.
+        recordings: By scenario id; empty where nothing could be launched.
+
+    Returns:
+        The grade, with one result per check in the author's order.
+
+    Raises:
+        ValueError: A requirement does not exist, or the requirements form a circle.
+    """
+    bound = {item.spec.id: item for item in loaded.checks}
+    results: dict[str, CheckResult] = {}
+    for name in dependency_order({name: item.spec.requires for name, item in bound.items()}):
+        roots = _roots(bound[name].spec, results)
+        findings = (
+            (_skipped([results[root] for root in roots]),)
+            if roots
+            else tuple(_findings(bound[name], loaded, submission, recordings))
+        )
+        results[name] = _result(bound[name], loaded, findings, roots)
+    ordered = tuple(results[name] for name in bound)
+    return Grade(loaded.assignment, loaded.sha256, submission, ordered)
+
+
+def _result(
+    bound: BoundCheck,
+    loaded: LoadedAssignment,
+    findings: tuple[ScenarioFinding, ...],
+    waits_for: tuple[str, ...],
+) -> CheckResult:
+    spec = bound.spec
+    status = min((item.finding.status for item in findings), key=SEVERITY.index)
+    credit = 0.0
+    if status is Status.PASSED:
+        credit = 1.0
+    elif status is Status.FAILED:
+        credit = min(item.finding.credit for item in findings)
+    return CheckResult(
+        id=spec.id,
+        title=bound.title,
+        status=status,
+        points=points_for(spec.points, credit),
+        max_points=spec.points,
+        visibility=spec.visibility,
+        scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound)),
+        findings=findings,
+        waits_for=waits_for,
+        hint=spec.hint,
+    )
+
+
+def _roots(spec: CheckSpec, results: Mapping[str, CheckResult]) -> tuple[str, ...]:
+    """The failed or errored checks for which a check has to wait, each once."""
+    lacking = [results[name] for name in spec.requires if results[name].status != Status.PASSED]
+    return tuple(dict.fromkeys(root for item in lacking for root in item.waits_for or (item.id,)))
+
+
+def _skipped(roots: Sequence[CheckResult]) -> ScenarioFinding:
+    titles = " and ".join(f"“{root.title}”" for root in roots)
+    if any(root.status is Status.ERROR for root in roots):
+        observed, hint = f"{titles} could not be judged, so neither could this", _NOT_YOURS
+    else:
+        observed = f"{titles} did not pass, so this could not be judged"
+        hint = f"Fix {titles} first: this is not a second mistake."
+    return ScenarioFinding(None, Finding(Status.SKIPPED, f"{titles} to pass first", observed, hint))
+
+
+def _findings(
+    bound: BoundCheck,
+    loaded: LoadedAssignment,
+    submission: SubmissionRecord,
+    recordings: Mapping[str, Recording],
+) -> Iterator[ScenarioFinding]:
+    if bound.check.subject is Subject.SUBMISSION:
+        yield _judge(bound, submission, None)
+        return
+    scenarios = [scenario.id for scenario in loaded.scenarios_of(bound)]
+    if not scenarios:
+        # Without this a check of nothing would pass, and give its points to everybody.
+        yield ScenarioFinding(None, _fault("there is no scenario that this check could judge"))
+    for scenario in scenarios:
+        recording = recordings.get(scenario)
+        if recording is None:
+            finding = why_not_run(submission, loaded.assignment.packages) or _fault(
+                f"there is no recording of the scenario {scenario!r}"
+            )
+            yield ScenarioFinding(scenario, finding)
+        elif fault := _recording_fault(recording, scenario, submission):
+            yield ScenarioFinding(scenario, _fault(fault))
+        else:
+            yield _judge(bound, recording, scenario)
+
+
+def _recording_fault(
+    recording: Recording, scenario: str, submission: SubmissionRecord
+) -> str | None:
+    """Why a recording cannot be judged, or None."""
+    if recording.faults:
+        return "; ".join(recording.faults)
+    if recording.ending is Ending.FAULT:
+        return "the run was ended by a fault that left no message"
+    if recording.scenario != scenario:
+        return f"the recording is of another scenario, {recording.scenario!r}"
+    if recording.submission.sha256 != submission.sha256:
+        return f"the recording is of another submission, {recording.submission.id!r}"
+    return None
+
+
+def _judge(
+    bound: BoundCheck, subject: SubmissionRecord | Recording, scenario: str | None
+) -> ScenarioFinding:
+    try:
+        finding = bound.check.judge(subject, bound.parameters)
+        misuse = _misuse(finding)
+    except Exception as error:
+        # Whatever a check raises is a bug in it, and must not cost the student anything.
+        told = "".join(traceback.format_exception(error))
+        said = f"{type(error).__name__}: {error}".rstrip(": ")
+        return ScenarioFinding(scenario, _fault(f"the check itself failed: {said}"), told)
+    if misuse:
+        return ScenarioFinding(scenario, _fault(f"the check {bound.check.name!r} {misuse}"))
+    return ScenarioFinding(scenario, finding)
+
+
+def _misuse(finding: Any) -> str:
+    """What is wrong with what a check returned; an instructor's own check is not typed."""
+    if not isinstance(finding, Finding):
+        return f"returned {type(finding).__name__} instead of a Finding"
+    if finding.status is Status.SKIPPED:
+        return "returned 'skipped', which only its requirements may decide"
+    if finding.status is Status.FAILED and not 0.0 <= finding.credit < 1.0:
+        return f"failed with a credit of {finding.credit}; it must be in [0, 1)"
+    return ""
+
+
+def _fault(observed: str) -> Finding:
+    return Finding.error("a recording and a check that can be judged", observed, hint=_NOT_YOURS)

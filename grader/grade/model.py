@@ -1,0 +1,145 @@
+"""The model of a grade: what every check said of one submission, with its points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from grader.assignment.model import Assignment, Visibility
+from grader.checks.finding import Finding, Status
+from grader.grade.points import total
+from grader.submission.record import SubmissionRecord
+
+SEVERITY = (Status.ERROR, Status.FAILED, Status.SKIPPED, Status.PASSED)
+"""Worst first: the status of a check is the worst of its findings."""
+
+
+@dataclass(frozen=True)
+class ScenarioFinding:
+    """A finding and what it was found in.
+
+    Attributes:
+        scenario: Id of the scenario; None for the submission itself, and for a check that
+            was skipped.
+        finding: What the check said.
+        traceback: Where the check itself failed, for the instructor; else empty.
+    """
+
+    scenario: str | None
+    finding: Finding
+    traceback: str = ""
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """What one check said in all its scenarios.
+
+    Attributes:
+        id: Its id in the assignment.
+        title: One line for the student.
+        status: The worst of its findings.
+        points: Earned, in [0, max_points].
+        max_points: For passing.
+        visibility: When the student gets to see it.
+        scenarios: Ids of the scenarios that it judges; empty for the submission itself.
+        findings: One per scenario in the assignment's order, at least one in all.
+        waits_for: Ids of the failed or errored checks at the bottom of a skip.
+        hint: The author's own hint.
+    """
+
+    id: str
+    title: str
+    status: Status
+    points: float
+    max_points: float
+    visibility: Visibility
+    scenarios: tuple[str, ...]
+    findings: tuple[ScenarioFinding, ...]
+    waits_for: tuple[str, ...] = ()
+    hint: str = ""
+
+    @property
+    def decisive(self) -> ScenarioFinding:
+        """The finding that decided: of the worst status, the first with the least credit."""
+        return min(
+            self.findings,
+            key=lambda item: (SEVERITY.index(item.finding.status), item.finding.credit),
+        )
+
+
+@dataclass(frozen=True)
+class Grade:
+    """The grade of one submission.
+
+    Attributes:
+        assignment: What was asked for.
+        assignment_sha256: Hash of its files, as hex.
+        submission: What was handed in.
+        results: One per check, in the author's order.
+    """
+
+    assignment: Assignment
+    assignment_sha256: str
+    submission: SubmissionRecord
+    results: tuple[CheckResult, ...]
+
+    @property
+    def graded(self) -> bool:
+        """Whether every check could be judged. If not, the score means nothing yet."""
+        return not self.of(Status.ERROR)
+
+    @property
+    def score(self) -> float:
+        """Points earned by what could be judged."""
+        return total(result.points for result in self.results)
+
+    @property
+    def max_score(self) -> float:
+        """Points that the assignment gives."""
+        return total(result.max_points for result in self.results)
+
+    @property
+    def full_points(self) -> bool:
+        """Whether it is graded and no point was lost."""
+        return self.graded and self.score == self.max_score
+
+    def of(self, status: Status) -> tuple[CheckResult, ...]:
+        """Results of one status, in the author's order."""
+        return tuple(result for result in self.results if result.status is status)
+
+    def result(self, check: str) -> CheckResult:
+        """The result of the check of that id.
+
+        Raises:
+            KeyError: The assignment has no such check.
+        """
+        for result in self.results:
+            if result.id == check:
+                return result
+        raise KeyError(check)
+
+    def waiting_for(self, check: str) -> tuple[CheckResult, ...]:
+        """Results that were skipped because of a check, directly or not."""
+        return tuple(result for result in self.results if check in result.waits_for)
+
+    def first_to_fix(self) -> CheckResult | None:
+        """The failed check that most others wait for; of equals, the author's first.
+
+        None where no check failed.
+        """
+        return max(
+            self.of(Status.FAILED),
+            key=lambda result: len(self.waiting_for(result.id)),
+            default=None,
+        )
+
+    def disturbed_scenarios(self) -> tuple[str, ...]:
+        """Scenarios that the host disturbed too much to judge: worth repeating alone."""
+        disturbed = {
+            item.scenario
+            for result in self.results
+            for item in result.findings
+            if item.finding.status is Status.ERROR and item.finding.disturbed
+        }
+        return tuple(
+            scenario.id for scenario in self.assignment.scenarios if scenario.id in disturbed
+        )

@@ -1,0 +1,158 @@
+"""Building blocks of the drawings in a report: elements, scales, ticks.
+
+Drawings carry no colour of their own: the style sheet gives it by class, light and dark. Each
+is made twice, wide and narrow, because text that is scaled down to a phone cannot be read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from markupsafe import Markup, escape
+
+from grader.report.clean import one_line
+
+WIDE, NARROW = 760, 330
+LETTER = 6.3
+"""Mean width of a character of the labels, in pixels; generous, so that nothing collides."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A drawing.
+
+    Attributes:
+        caption: What is to be seen, for everybody.
+        wide: SVG for :data:`WIDE` pixels.
+        narrow: The same for :data:`NARROW` pixels.
+    """
+
+    caption: str
+    wide: Markup
+    narrow: Markup
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A linear map from values to pixels.
+
+    Attributes:
+        low: Value at ``begin``.
+        high: Value at ``end``, more than ``low``.
+        begin: Pixel.
+        end: Pixel.
+    """
+
+    low: float
+    high: float
+    begin: float
+    end: float
+
+    def __call__(self, value: float) -> float:
+        """The pixel of a value, which may lie outside."""
+        share = (value - self.low) / (self.high - self.low)
+        return self.begin + share * (self.end - self.begin)
+
+    def clipped(self, value: float) -> float:
+        """The pixel of a value, moved to the nearest end if it lies outside."""
+        return self(min(max(value, self.low), self.high))
+
+
+def element(tag: str, *content: str, **attributes: str | float) -> Markup:
+    """An element; text and attributes are escaped, nested elements are not again.
+
+    Args:
+        tag: Name of the element.
+        content: Text or elements.
+        attributes: By name; ``class_`` gives ``class``, ``stroke_width`` ``stroke-width``.
+    """
+    written = Markup("").join(
+        Markup(' {}="{}"').format(name.rstrip("_").replace("_", "-"), _attribute(value))
+        for name, value in attributes.items()
+    )
+    inner = Markup("").join(escape(item) for item in content)
+    return Markup("<{0}{1}>{2}</{0}>").format(Markup(tag), written, inner)
+
+
+def drawing(
+    name: str, title: str, description: str, size: tuple[float, float], content: Iterable[str]
+) -> Markup:
+    """A whole SVG, with the title and description that a screen reader says.
+
+    Args:
+        name: Unique in the document; letters, digits and hyphens.
+        title: What it is.
+        description: What is to be seen in it, in words.
+        size: Width and height in pixels.
+        content: Its elements.
+    """
+    width, height = size
+    return element(
+        "svg",
+        element("title", one_line(title), id=f"{name}-title"),
+        element("desc", one_line(description), id=f"{name}-desc"),
+        *content,
+        viewBox=f"0 0 {width:g} {height:g}",
+        width=width,
+        height=height,
+        role="img",
+        aria_labelledby=f"{name}-title {name}-desc",
+    )
+
+
+def line(x1: float, y1: float, x2: float, y2: float, class_: str) -> Markup:
+    """A straight line."""
+    return element("line", x1=x1, y1=y1, x2=x2, y2=y2, class_=class_)
+
+
+def label(text: str, x: float, y: float, class_: str = "label", anchor: str = "start") -> Markup:
+    """A line of text; ``anchor`` is ``start``, ``middle`` or ``end``."""
+    return element("text", one_line(text), x=x, y=y, class_=class_, text_anchor=anchor)
+
+
+def cross(x: float, y: float, class_: str, size: float = 3.5) -> Markup:
+    """A diagonal cross around a point."""
+    path = (
+        f"M{x - size:.1f} {y - size:.1f}L{x + size:.1f} {y + size:.1f}"
+        f"M{x - size:.1f} {y + size:.1f}L{x + size:.1f} {y - size:.1f}"
+    )
+    return element("path", d=path, class_=class_)
+
+
+def fitted(text: str, width: float) -> str:
+    """Shorten text in its middle so that it fits into a width in pixels."""
+    text = one_line(text)
+    room = max(5, int(width / LETTER))
+    if len(text) <= room:
+        return text
+    head = (room - 1) // 2
+    return f"{text[:head]}…{text[len(text) - (room - 1 - head) :]}"
+
+
+def ticks(low: float, high: float, count: int) -> tuple[tuple[float, str], ...]:
+    """Round values within [low, high], about ``count`` of them, with their labels."""
+    rough = (high - low) / max(1, count)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough * 0.999)
+    digits = max(0, -math.floor(math.log10(step) + 1e-9))
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
+    values = [number * step for number in range(first, last + 1)]
+    return tuple((value, _number(value, digits)) for value in values)
+
+
+def columns(pixels: Sequence[float]) -> list[float]:
+    """One of all pixels that fall into the same column, so that a flood stays drawable."""
+    return sorted({round(pixel * 2) / 2 for pixel in pixels})
+
+
+def _number(value: float, digits: int) -> str:
+    if abs(value) >= 1e6 or digits > 4:
+        return f"{value:.3g}"
+    return f"{value + 0.0:.{digits}f}"
+
+
+def _attribute(value: str | float) -> str:
+    return value if isinstance(value, str) else f"{value:.1f}".removesuffix(".0")

@@ -1,0 +1,159 @@
+"""The grade in a terminal: a table, every lost point explained, the score last.
+
+Nothing is said by colour alone, and nothing of a student's is parsed as markup: every text is
+cleaned and wrapped in a :class:`rich.text.Text`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from rich.cells import cell_len
+from rich.console import Console, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from grader.checks.finding import Status
+from grader.grade.model import CheckResult, Grade, ScenarioFinding
+from grader.report import words
+from grader.report.clean import clean, one_line
+
+_STYLE = {
+    Status.PASSED: "green",
+    Status.FAILED: "bold red",
+    Status.SKIPPED: "dim",
+    Status.ERROR: "bold magenta",
+}
+_WIDE = 110
+"""Columns from which on the table also tells what was observed."""
+_TITLE = 56
+"""Columns that a title may take there before it is wrapped."""
+_READABLE = 100
+"""Columns beyond which lines of prose get hard to read."""
+_INDENT = 12
+_LOG_LINES = 8
+
+
+def print_grade(console: Console, grade: Grade) -> None:
+    """Print a grade.
+
+    Args:
+        console: Where to; its width, colours and encoding are respected.
+        grade: What to print.
+    """
+    console.print(_heading(console, grade))
+    console.print()
+    console.print(_table(console, grade))
+    for result in (*grade.of(Status.FAILED), *grade.of(Status.ERROR)):
+        console.print()
+        _explain(console, result)
+    console.print()
+    _conclude(console, grade)
+
+
+def _heading(console: Console, grade: Grade) -> Text:
+    return Text.assemble(
+        (_line(console, grade.assignment.title), "bold"),
+        ("   ", ""),
+        (_line(console, grade.submission.id), "dim"),
+    )
+
+
+def _table(console: Console, grade: Grade) -> Table:
+    wide = console.width >= _WIDE
+    table = Table.grid(padding=(0, 2, 0, 0), expand=False)
+    table.add_column(no_wrap=True)
+    longest = max(cell_len(one_line(result.title)) for result in grade.results)
+    table.add_column(overflow="fold", min_width=min(longest, _TITLE if wide else 10))
+    table.add_column(no_wrap=True, justify="right")
+    if wide:
+        table.add_column(no_wrap=True, overflow="ellipsis")
+    for result in grade.results:
+        row: list[RenderableType] = [
+            _status(console, result.status),
+            Text(_line(console, result.title)),
+            Text(_points(result), "" if result.status is Status.PASSED else "bold"),
+        ]
+        if wide:
+            row.append(Text(_line(console, _short(grade, result)), "dim", overflow="ellipsis"))
+        table.add_row(*row)
+    return table
+
+
+def _status(console: Console, status: Status) -> Text:
+    said = words.STATUS[status]
+    symbol = said.ascii if console.options.ascii_only else said.symbol
+    return Text(f"{symbol} {said.word}", _STYLE[status])
+
+
+def _points(result: CheckResult) -> str:
+    earned = "?" if result.status is Status.ERROR else words.number(result.points)
+    return f"{earned} / {words.number(result.max_points)}"
+
+
+def _short(grade: Grade, result: CheckResult) -> str:
+    """What fits into the table's last column."""
+    if result.waits_for:
+        return "waits for " + ", ".join(grade.result(root).title for root in result.waits_for)
+    return result.decisive.finding.observed
+
+
+def _explain(console: Console, result: CheckResult) -> None:
+    """Say why points were lost, or why there is no verdict."""
+    console.print(
+        Text.assemble(_status(console, result.status), "  ", (_line(console, result.title), "bold"))
+    )
+    for item in result.findings:
+        if item.finding.status is result.status:
+            for name, text in _rows(result, item):
+                console.print(_hanging(console, name, text))
+
+
+def _hanging(console: Console, name: str, text: str) -> Text:
+    """A name, and beside it a text in as many lines as it needs."""
+    width = max(10, min(console.width, _READABLE) - _INDENT)
+    lines = Text(_block(console, text)).wrap(console, width, overflow="fold")
+    for line in lines:
+        line.rstrip()
+    margin = Text(f"\n{' ' * _INDENT}")
+    return Text.assemble((f"  {name:<8}  ", "dim"), margin.join(lines))
+
+
+def _rows(result: CheckResult, item: ScenarioFinding) -> Iterator[tuple[str, str]]:
+    finding = item.finding
+    if len(result.findings) > 1 and item.scenario:
+        yield "scenario", item.scenario
+    yield "expected", finding.expected
+    yield "observed", finding.observed
+    for text in words.advice(result, finding):
+        yield "try next", text
+    for place in finding.evidence.places:
+        yield "where", one_line(str(place))
+    if finding.evidence.log:
+        yield "printed", "\n".join(finding.evidence.log[:_LOG_LINES])
+
+
+def _conclude(console: Console, grade: Grade) -> None:
+    first = grade.first_to_fix()
+    if first is not None:
+        text = f"{_line(console, first.title)}. {words.waiting(grade, first)}".rstrip()
+        console.print(Text.assemble(("Fix this first: ", "bold"), text))
+    if grade.graded:
+        score = f"{words.number(grade.score)} of {words.number(grade.max_score)} points"
+        style = "bold green" if grade.full_points else "bold"
+        console.print(Text(f"Score: {score}", style))
+    else:
+        console.print(Text(f"Not graded. {words.headline(grade)}", "bold magenta"))
+
+
+def _line(console: Console, text: str) -> str:
+    return _encodable(console, one_line(text))
+
+
+def _block(console: Console, text: str) -> str:
+    return _encodable(console, clean(text).expandtabs(4))
+
+
+def _encodable(console: Console, text: str) -> str:
+    """What the terminal's encoding has no character for is written as an escape."""
+    return text.encode(console.encoding, "backslashreplace").decode(console.encoding)

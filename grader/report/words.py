@@ -1,0 +1,91 @@
+"""How a grade is put into words, the same in every report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from grader.assignment.model import Visibility
+from grader.checks.finding import Finding, Status
+from grader.checks.wording import counted
+from grader.grade.model import CheckResult, Grade
+
+
+@dataclass(frozen=True)
+class StatusWords:
+    """A status for people; the symbol tells it without colour, and in ASCII too.
+
+    Attributes:
+        word: One word.
+        symbol: One character.
+        ascii: One character for terminals without Unicode.
+    """
+
+    word: str
+    symbol: str
+    ascii: str
+
+
+STATUS = {
+    Status.PASSED: StatusWords("passed", "✓", "+"),
+    Status.FAILED: StatusWords("failed", "✗", "x"),
+    Status.SKIPPED: StatusWords("skipped", "–", "-"),
+    Status.ERROR: StatusWords("error", "!", "!"),
+}
+
+HIDDEN_UNTIL = {
+    Visibility.VISIBLE: "",
+    Visibility.AFTER_DUE_DATE: "for students after the due date",
+    Visibility.AFTER_PUBLISHED: "for students after grades are published",
+    Visibility.HIDDEN: "never shown to students",
+}
+
+ENVIRONMENT = {
+    "ros_distro": "ROS distribution",
+    "ros_source": "ROS from",
+    "rmw": "RMW",
+    "python": "Python",
+    "sandbox": "Sandbox",
+    "domain_id": "ROS domain",
+}
+
+
+def number(value: float) -> str:
+    """Points without needless digits: ``3``, ``2.5``."""
+    return f"{value:.10g}"
+
+
+def tally(grade: Grade, status: Status) -> str:
+    """``9 passed``, ``1 error``; nothing where there are none."""
+    count = len(grade.of(status))
+    if not count:
+        return ""
+    return counted(count, "error") if status is Status.ERROR else f"{count} {STATUS[status].word}"
+
+
+def headline(grade: Grade) -> str:
+    """One sentence on the whole."""
+    if not grade.graded:
+        return "Something of the grader or of the machine failed; no point is lost by it."
+    if grade.full_points:
+        return "Full points."
+    failed, skipped = len(grade.of(Status.FAILED)), len(grade.of(Status.SKIPPED))
+    text = f"{counted(failed, 'check')} failed"
+    if skipped:
+        verb = "waits" if skipped == 1 else "wait"
+        text += f", {counted(skipped, 'other')} {verb} for {'it' if failed == 1 else 'them'}"
+    return f"{text}."
+
+
+def waiting(grade: Grade, result: CheckResult) -> str:
+    """How many checks wait for a failed one, or nothing."""
+    count = len(grade.waiting_for(result.id))
+    if not count:
+        return ""
+    verb = "waits" if count == 1 else "wait"
+    return f"{counted(count, 'other check')} {verb} for it."
+
+
+def advice(result: CheckResult, finding: Finding) -> tuple[str, ...]:
+    """What to try next: the check's hint, then the author's own where a check failed."""
+    own = result.hint if finding.status is Status.FAILED else ""
+    return tuple(dict.fromkeys(text for text in (finding.hint, own) if text))

@@ -1,0 +1,46 @@
+"""Where the files that are not Python code lie: assignments, references, templates.
+
+In a checkout they stand beside the import package; a wheel carries them in
+``grader/_data/``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader.errors import GraderFault
+
+PACKAGE = Path(__file__).resolve().parent
+
+
+def root(package: Path = PACKAGE) -> Path:
+    """The folder that holds ``assignments/``, ``reference/`` and ``templates/``.
+
+    Args:
+        package: Folder of the import package.
+
+    Raises:
+        GraderFault: It is in neither place: the installation is not complete.
+    """
+    for candidate in (package / "_data", package.parent):
+        if (candidate / "assignments").is_dir():
+            return candidate
+    raise GraderFault(
+        f"no assignments beside {package}: the installation of rosgrade is not complete; "
+        "install it again"
+    )
+
+
+def assignments() -> Path:
+    """The folder with one folder for each assignment."""
+    return root() / "assignments"
+
+
+def reference() -> Path:
+    """The folder with the reference solutions, one folder for each assignment."""
+    return root() / "reference"
+
+
+def templates() -> Path:
+    """The folder with the Jinja2 templates."""
+    return root() / "templates"

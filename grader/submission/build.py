@@ -1,0 +1,305 @@
+"""Build a submission with ``colcon build`` in a scratch place, or take it from the cache.
+
+setup.py and CMakeLists.txt are the student's programs: they run in processes of their own that
+are bounded in time and output and leave nothing behind. What they may read and reach is the
+business of a sandbox around them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import stat
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.errors import GraderFault
+from grader.ros import RosInstallation
+from grader.submission import buildlog
+from grader.submission.bounded import Outcome, OutputLimits, run_bounded
+from grader.submission.build_cache import INSTALL, BuildCache, CachedBuild
+from grader.submission.culprit import Sources, find_culprit
+from grader.submission.installed import site_packages
+from grader.submission.locate import Located
+from grader.submission.members import MIB
+from grader.submission.record import BuildRecord
+from grader.submission.rosdistro import PACKAGES
+
+VERSION = 1
+"""Raise it when the same submission would now be built differently."""
+
+_CMAKE_INCLUDE = Path(__file__).with_name("wheels.cmake")
+_PROGRESS = re.compile(r"(Starting >>>|Finished <<<) (\S+)")
+_COMPILE_S = 60.0
+_LEAST_FREE_BYTES = 64 * MIB
+
+
+@dataclass(frozen=True)
+class BuildLimits:
+    """How much a build may take.
+
+    Attributes:
+        python_s: Wall time where all packages are ament_python.
+        other_s: Wall time where one is not.
+        install_bytes: Size of the install space.
+        install_files: Number of files in it.
+        output: What is kept of the log.
+    """
+
+    python_s: float = 120.0
+    other_s: float = 300.0
+    install_bytes: int = 512 * MIB
+    install_files: int = 20_000
+    output: OutputLimits = field(default_factory=OutputLimits)
+
+
+def build(
+    located: Located,
+    sources: Sources,
+    ros: RosInstallation,
+    *,
+    only_python: bool,
+    cache: BuildCache,
+    limits: BuildLimits | None = None,
+    on_progress: Callable[[str], None] = lambda _: None,
+    environ: Mapping[str, str] = os.environ,
+) -> CachedBuild:
+    """Build all packages of a submission, unless just this was built before.
+
+    Args:
+        located: The submission; its private copy is where the build runs, so read from it what
+            you need before.
+        sources: Its packages and what is needed to find whom to blame.
+        ros: Builds with this installation only.
+        only_python: All packages are ament_python.
+        cache: Where builds are kept; failed ones too, but not those that were ended by the
+            time limit.
+        limits: What is too much.
+        on_progress: Told in a few words what happens.
+        environ: The caller's environment.
+
+    Raises:
+        GraderFault: It could not be built here, for no fault of the student: colcon or a
+            package of Jazzy is missing, the disk is full.
+    """
+    limits = limits or BuildLimits()
+    wall_s = limits.python_s if only_python else limits.other_s
+    workshop = _Workshop(located, sources, ros, limits, wall_s, on_progress, environ)
+    key = build_key(located.sha256, ros)
+    on_progress("looking for an earlier build")
+    with cache.locked(key, wait_s=wall_s + _COMPILE_S):
+        found = cache.find(key)
+        if found is not None:
+            return found
+        with cache.unfinished() as unfinished:
+            record = workshop.build(unfinished / INSTALL)
+            if record.timed_out:
+                return CachedBuild(record, None)
+            return cache.store(key, unfinished, record)
+
+
+def build_key(sha256: str, ros: RosInstallation) -> str:
+    """Name a build by everything that it depends on.
+
+    Args:
+        sha256: The submission's hash.
+        ros: Installing or updating a package changes the times of its files.
+    """
+    watched = [prefix / "share/ament_index/resource_index/packages" for prefix in ros.prefixes]
+    watched += [ros.python, *site_packages_of(ros)]
+    parts = [
+        VERSION,
+        sha256,
+        ros.source,
+        ros.distro,
+        str(ros.python),
+        [str(prefix) for prefix in ros.prefixes],
+        [path.stat().st_mtime_ns for path in watched if path.exists()],
+        sorted(ros.packages),
+    ]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def site_packages_of(ros: RosInstallation) -> list[Path]:
+    """Folders that hold colcon and setuptools, as far as they come with this ROS."""
+    return [path for prefix in ros.prefixes for path in site_packages(prefix)]
+
+
+@dataclass(frozen=True)
+class _Workshop:
+    """One build that is really run."""
+
+    located: Located
+    sources: Sources
+    ros: RosInstallation
+    limits: BuildLimits
+    wall_s: float
+    on_progress: Callable[[str], None]
+    environ: Mapping[str, str]
+
+    def build(self, install: Path) -> BuildRecord:
+        # Beside the copy, so that relative paths in the log are the same on every run.
+        scratch = self.located.root.with_name("scratch")
+        scratch.mkdir()
+        environment = self._environment(scratch)
+        finished: set[str] = set()
+
+        def on_line(line: str) -> None:
+            match = _PROGRESS.match(line)
+            if match and match[1].startswith("Finished"):
+                finished.add(match[2])
+            elif match:
+                self.on_progress(f"building {match[2]}")
+
+        outcome = run_bounded(
+            self._command(environment, scratch, install),
+            cwd=scratch,
+            environment=environment,
+            wall_s=self.wall_s,
+            output=self.limits.output,
+            on_line=on_line,
+        )
+        self._check_machine(outcome, scratch, install)
+        problem = tidy(install, self.limits) or _ended_by_us(outcome, self.wall_s)
+        record = self._record(outcome, finished, problem, scratch, install)
+        self._compile(environment, install, scratch)
+        return record
+
+    def _environment(self, scratch: Path) -> dict[str, str]:
+        environment = self.ros.environment(self.environ)
+        for name in ("HOME", "TMPDIR", "COLCON_HOME"):
+            folder = scratch / name.lower()
+            folder.mkdir()
+            environment[name] = str(folder)
+        # Messages of CMake and the compiler are searched for whom to blame.
+        environment["LC_ALL"] = "C.UTF-8"
+        environment.pop("XDG_RUNTIME_DIR", None)
+        return environment
+
+    def _command(self, environment: Mapping[str, str], scratch: Path, install: Path) -> list[str]:
+        folders = [str(self.located.root / folder) for folder in self.sources.folders.values()]
+        command = [*_colcon(self.ros, environment["PATH"]), "--log-base", os.devnull, "build"]
+        command += ["--merge-install", "--continue-on-error", "--executor", "sequential"]
+        command += ["--build-base", str(scratch / "build"), "--install-base", str(install)]
+        command += ["--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"]
+        command += ["--base-paths", *folders]
+        if self.wall_s != self.limits.python_s:
+            # Linters and test frameworks are not there to be found on a small installation.
+            command += ["--cmake-args", "-DBUILD_TESTING=OFF"]
+            if self.ros.source == "wheels":
+                command += [f"-DCMAKE_PROJECT_INCLUDE={_CMAKE_INCLUDE}"]
+        return command
+
+    def _check_machine(self, outcome: Outcome, scratch: Path, install: Path) -> None:
+        """Raise what is not the student's fault."""
+        if outcome.status == 0 or outcome.ended_by_us:
+            return
+        if outcome.status is not None and outcome.status < 0:
+            raise GraderFault(
+                f"colcon was killed by signal {-outcome.status}; perhaps memory ran out"
+            )
+        if "No space left on device" in outcome.output:
+            free = min(shutil.disk_usage(path).free for path in (scratch, install.parent))
+            if free < _LEAST_FREE_BYTES:
+                raise GraderFault("the disk is full: the submission could not be built")
+        lacking = buildlog.missing_cmake_packages(outcome.output) & PACKAGES
+        lacking -= self.ros.packages | set(self.sources.folders)
+        if lacking:
+            raise GraderFault(
+                "this ROS installation lacks what the submission needs to build: "
+                f"{', '.join(sorted(lacking))}; use a full ROS 2 {self.ros.distro}"
+            )
+
+    def _record(
+        self,
+        outcome: Outcome,
+        finished: set[str],
+        problem: str | None,
+        scratch: Path,
+        install: Path,
+    ) -> BuildRecord:
+        paths = {
+            str(self.located.root): "",
+            str(scratch / "build"): "build",
+            str(install): "install",
+            str(scratch): "scratch",
+        }
+        log = buildlog.clean(outcome.output, paths)
+        failed = sorted(set(self.sources.folders) - finished)
+        succeeded = outcome.status == 0 and not failed and problem is None
+        culprit = None if succeeded else find_culprit(log, failed, self.sources)
+        if problem is not None:
+            log += f"\n[rosgrade: {problem}]\n"
+        return BuildRecord(
+            succeeded=succeeded,
+            duration_s=round(outcome.duration_s, 3),
+            timed_out=outcome.ended_by_us == "time",
+            failed_packages=tuple(failed),
+            culprit=culprit,
+            log=buildlog.ending(log),
+        )
+
+    def _compile(self, environment: Mapping[str, str], install: Path, scratch: Path) -> None:
+        """Compile what the build installed, so that nodes start without doing it."""
+        folders = [str(path) for path in site_packages(install)]
+        if folders:
+            command = [str(self.ros.python), "-I", "-S", "-m", "compileall", "-qq", *folders]
+            run_bounded(command, cwd=scratch, environment=environment, wall_s=_COMPILE_S)
+
+
+def _colcon(ros: RosInstallation, path: str) -> list[str]:
+    beside = ros.python.parent / "colcon"
+    if beside.exists():
+        return [str(ros.python), str(beside)]
+    found = shutil.which("colcon", path=path)
+    if found is None:
+        raise GraderFault(
+            "colcon is not installed: apt install python3-colcon-common-extensions, "
+            "or install the wheels with pip install 'rosgrade[ros]'"
+        )
+    return [found]
+
+
+def _ended_by_us(outcome: Outcome, wall_s: float) -> str | None:
+    if outcome.ended_by_us == "time":
+        return f"the build was ended after {wall_s:.0f} s"
+    if outcome.ended_by_us == "output":
+        return "the build was ended because it wrote too much output"
+    return None
+
+
+def tidy(install: Path, limits: BuildLimits) -> str | None:
+    """Take out of an install space what nobody of ours should open or follow.
+
+    Pipes, sockets and devices go, and symbolic links that lead out of it.
+
+    Returns:
+        Why it cannot be used at all, in which case it is removed, or None.
+    """
+    if install.is_symlink():
+        install.unlink()
+        return "the build put a symbolic link in place of the install space"
+    total = count = 0
+    base = os.path.realpath(install)
+    for parent, folders, names in os.walk(install):
+        for name in [*folders, *names]:
+            path = Path(parent, name)
+            status = path.lstat()
+            if stat.S_ISLNK(status.st_mode):
+                if not f"{os.path.realpath(path)}/".startswith(f"{base}/"):
+                    path.unlink()
+            elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+                path.unlink()
+            total += status.st_size
+            count += 1
+    if total > limits.install_bytes or count > limits.install_files:
+        shutil.rmtree(install)
+        return (
+            f"the build installed more than {limits.install_files} files "
+            f"or {limits.install_bytes // MIB} MiB"
+        )
+    return None

@@ -1,0 +1,239 @@
+"""Builds kept by the content of what was built.
+
+``<cache>/builds/<key>/`` holds ``build.json`` and, where something was installed, ``install/``.
+An entry is made under another name and renamed, so it is there as a whole or not at all. The
+hash in it finds damage, such as a student's program that wrote into its own installation.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import os
+import shutil
+import stat
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from grader.errors import GraderFault
+from grader.submission.record import BuildRecord
+
+INSTALL = "install"
+
+_RECORD = "build.json"
+_UNFINISHED = ".unfinished-"
+_LOCK_POLL_S = 0.05
+_STALE_S = 24 * 3600.0
+
+
+@dataclass(frozen=True)
+class CacheLimits:
+    """When old builds are thrown away.
+
+    Attributes:
+        total_bytes: The least recently used go when all builds together are larger.
+        age_s: A build goes when it was not used for so long.
+        safe_s: A build that was used within this time is never thrown away: it may be running.
+    """
+
+    total_bytes: int = 2 * 2**30
+    age_s: float = 30 * 24 * 3600.0
+    safe_s: float = 3600.0
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """The content of ``build.json``."""
+
+    build: BuildRecord
+    installed: bool
+    tree: str
+    size: int
+
+
+_ENTRY = TypeAdapter(_Entry)
+
+
+@dataclass(frozen=True)
+class CachedBuild:
+    """A build that is in the cache.
+
+    Attributes:
+        build: What colcon did.
+        install: Its install space, or None where nothing was installed.
+    """
+
+    build: BuildRecord
+    install: Path | None
+
+
+class BuildCache:
+    """The builds in one cache folder; several processes may use it at once."""
+
+    def __init__(self, folder: Path, limits: CacheLimits | None = None) -> None:
+        """Name the folder; it is made when something is stored.
+
+        Args:
+            folder: The caller's cache folder, ``builds`` below it is used.
+            limits: When old builds are thrown away.
+        """
+        self._folder = folder / "builds"
+        self._limits = limits or CacheLimits()
+
+    @contextlib.contextmanager
+    def locked(self, key: str, wait_s: float) -> Iterator[bool]:
+        """Hold a build's lock, so that two who need it do not both build it.
+
+        Args:
+            key: The build.
+            wait_s: Longest wait; without the lock the same work is done twice, nothing worse.
+
+        Yields:
+            Whether the lock is held.
+
+        Raises:
+            GraderFault: The cache folder cannot be used.
+        """
+        deadline = time.monotonic() + wait_s
+        with _usable(self._folder):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            file = os.open(self._folder / f"{key}.lock", os.O_RDWR | os.O_CREAT, 0o600)
+        try:
+            held = _lock(file)
+            while not held and time.monotonic() < deadline:
+                time.sleep(_LOCK_POLL_S)
+                held = _lock(file)
+            yield held
+        finally:
+            os.close(file)
+
+    def find(self, key: str) -> CachedBuild | None:
+        """Return a build that is there and whole, or None."""
+        folder = self._folder / key
+        entry = _read(folder)
+        install = folder / INSTALL
+        if entry is None or (entry.installed and tree_hash(install) != entry.tree):
+            return None
+        with contextlib.suppress(OSError):
+            os.utime(folder)
+        return CachedBuild(replace(entry.build, cached=True), install if entry.installed else None)
+
+    @contextlib.contextmanager
+    def unfinished(self) -> Iterator[Path]:
+        """A folder in which an entry is made; gone at the end, unless it was stored.
+
+        Raises:
+            GraderFault: The cache folder cannot be used.
+        """
+        with _usable(self._folder):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            folder = Path(tempfile.mkdtemp(prefix=_UNFINISHED, dir=self._folder))
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def store(self, key: str, unfinished: Path, build: BuildRecord) -> CachedBuild:
+        """Make an unfinished folder, with what is in its ``install``, the build of that key.
+
+        When somebody else was quicker, theirs stays and is returned.
+
+        Raises:
+            GraderFault: The cache folder cannot be written.
+        """
+        install = unfinished / INSTALL
+        installed = install.is_dir()
+        size = sum(path.lstat().st_size for path in _files(install))
+        entry = _Entry(build, installed, tree_hash(install) if installed else "", size)
+        with _usable(self._folder):
+            (unfinished / _RECORD).write_bytes(_ENTRY.dump_json(entry))
+            other = self.find(key)
+            if other is not None:
+                return other
+            with contextlib.suppress(FileNotFoundError):
+                # A damaged one; renamed, so that the place is free for the shortest time.
+                (self._folder / key).rename(unfinished / "damaged")
+            unfinished.rename(self._folder / key)
+        shutil.rmtree(self._folder / key / "damaged", ignore_errors=True)
+        self.prune(keep=key)
+        return CachedBuild(build, self._folder / key / INSTALL if installed else None)
+
+    def prune(self, keep: str = "") -> None:
+        """Throw away builds that are old, or the least recently used of too many."""
+        now = time.time()
+        builds = []
+        for folder in self._folder.iterdir():
+            try:
+                used = folder.lstat().st_mtime
+            except OSError:
+                continue
+            if folder.name.startswith(_UNFINISHED):
+                if now - used > _STALE_S:
+                    shutil.rmtree(folder, ignore_errors=True)
+            elif folder.is_dir() and folder.name != keep and now - used > self._limits.safe_s:
+                builds.append((used, folder, _size(folder)))
+        total = sum(size for _, _, size in builds)
+        for used, folder, size in sorted(builds, key=lambda item: item[0]):
+            if now - used > self._limits.age_s or total > self._limits.total_bytes:
+                shutil.rmtree(folder, ignore_errors=True)
+                (self._folder / f"{folder.name}.lock").unlink(missing_ok=True)
+                total -= size
+
+
+def tree_hash(folder: Path) -> str:
+    """Hash all files and links below a folder, but for what Python caches while it runs."""
+    total = hashlib.sha256()
+    for path in _files(folder):
+        name = os.fsencode(path.relative_to(folder))
+        status = path.lstat()
+        if stat.S_ISLNK(status.st_mode):
+            content = os.fsencode(path.readlink())
+        elif stat.S_ISREG(status.st_mode):
+            content = path.read_bytes()
+        else:
+            content = b"special"
+        executable = b"x" if status.st_mode & stat.S_IXUSR else b"-"
+        total.update(executable + name + b"\0" + hashlib.sha256(content).digest())
+    return total.hexdigest()
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    for parent, folders, names in os.walk(folder):
+        links = [name for name in folders if Path(parent, name).is_symlink()]
+        folders[:] = sorted(name for name in folders if name != "__pycache__")
+        for name in sorted([*names, *links]):
+            yield Path(parent, name)
+
+
+def _read(folder: Path) -> _Entry | None:
+    try:
+        return _ENTRY.validate_json((folder / _RECORD).read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def _size(folder: Path) -> int:
+    entry = _read(folder)
+    return entry.size if entry else 0
+
+
+def _lock(file: int) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def _usable(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise GraderFault(f"the cache folder {folder} cannot be used: {error}") from error

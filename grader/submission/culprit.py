@@ -1,0 +1,194 @@
+"""Whose file and line a build log blames first."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from grader.submission.paths import join, shown
+from grader.submission.record import SourceError
+
+_STARTED = re.compile(r"Starting >>> (\S+)")
+_TRACEBACK = "Traceback (most recent call last):"
+_FRAME = re.compile(r'\s*File "([^"]+)", line (\d+)')
+_SYNTAX_ERROR = re.compile(r"(SyntaxError|IndentationError|TabError): .+")
+_CMAKE = re.compile(r"CMake Error at (.+?):(\d+) \((\w+)\):")
+_CMAKE_PLAIN = re.compile(r"CMake Error: (.+)")
+_CMAKE_CALLER = re.compile(r"\s+(\S+):(\d+) \(\w+\)")
+_COMPILER = re.compile(r"([^\s:]+):(\d+)(?::\d+)?: (?:fatal )?error: (.+)")
+_MANIFEST = re.compile(r"(?:\S*InvalidPackage: )?Error\(s\) in package '([^']+)':")
+_SETUPTOOLS = re.compile(r"error: (.+)")
+_NO_SETUP_PY = re.compile(r".*can't open file '[^']*setup\.py'")
+_NEVER_CALLED = "setup()' was never called"
+_QUOTED = re.compile(r"'([^']+)'")
+_RUN_SETUP = ", in run_setup"
+_INTERFACE = re.compile(r"Error processing '([^']+)' of package '[^']+': (.+)")
+_INSTALLED = re.compile(r"(?:install|build/[^/]+/build)/lib/(?:python3[^/]*/site-packages/)?(.+)")
+_MAX_MESSAGE = 500
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What the search needs to know of the submission.
+
+    Attributes:
+        files: Paths of all its files.
+        folders: Package -> its folder.
+        setup_py: Package -> lines of its setup.py.
+        malformed: Package -> entry points that setuptools will not accept.
+    """
+
+    files: Collection[str]
+    folders: Mapping[str, str]
+    setup_py: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    malformed: Mapping[str, tuple[SourceError, ...]] = field(default_factory=dict)
+
+
+def find_culprit(log: str, failed: Collection[str], sources: Sources) -> SourceError | None:
+    """Find the first place in the student's own files that a cleaned log blames.
+
+    Args:
+        log: colcon's output with the student's paths, packages built one after another.
+        failed: Packages that were not finished; what the log says of others is no reason.
+        sources: The submission.
+
+    Returns:
+        For a Python traceback the deepest frame in the student's files. None where the log
+        blames no file of the student.
+    """
+    lines = log.splitlines()
+    package = next(iter(sources.folders), "") if len(sources.folders) == 1 else ""
+    for number, line in enumerate(lines):
+        started = _STARTED.match(line)
+        if started:
+            package = started[1]
+        elif package in failed or not package:
+            blamed = _Place(lines, number, package, sources).blamed()
+            if blamed is not None:
+                message = shown(blamed.message)[:_MAX_MESSAGE]
+                return SourceError(shown(blamed.file), blamed.line, message)
+    return None
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A line of the log, with what stands around it."""
+
+    lines: list[str]
+    number: int
+    package: str
+    sources: Sources
+
+    @property
+    def line(self) -> str:
+        return self.lines[self.number]
+
+    @property
+    def setup_py(self) -> str:
+        return join(self.sources.folders.get(self.package, "."), "setup.py")
+
+    def blamed(self) -> SourceError | None:
+        """Whom this line blames, if it is a message that blames somebody."""
+        line = self.line
+        if line.rstrip().endswith(_TRACEBACK):
+            return self._traceback()
+        if match := _FRAME.match(line):
+            return self._syntax_error(match)
+        if match := _CMAKE.match(line):
+            return self._cmake(match)
+        if match := _CMAKE_PLAIN.match(line):
+            return self._at("CMakeLists.txt", None, match[1])
+        if match := _INTERFACE.match(line):
+            return self._at(match[1], None, match[2])
+        if match := _COMPILER.match(line):
+            return self._at(match[1], int(match[2]), match[3])
+        if match := _MANIFEST.match(line):
+            reason = "".join(self.lines[self.number + 1 : self.number + 2]).strip("- ")
+            return self._at(match[1], None, reason or line)
+        if _NO_SETUP_PY.match(line):
+            return SourceError(self.setup_py, None, "there is no setup.py")
+        if match := _SETUPTOOLS.match(line):
+            return self._setup(match[1])
+        return None
+
+    def _own(self, path: str) -> str | None:
+        """The student's file that a path of the log means."""
+        folder = self.sources.folders.get(self.package, ".")
+        candidates = [path, join(folder, path)]
+        installed = _INSTALLED.fullmatch(path)
+        if installed:
+            candidates.append(join(folder, installed[1]))
+        normal = (posixpath.normpath(candidate) for candidate in candidates)
+        return next((name for name in normal if name in self.sources.files), None)
+
+    def _at(self, path: str, line: int | None, message: str) -> SourceError | None:
+        file = self._own(path)
+        return SourceError(file, line, message) if file else None
+
+    def _block(self) -> list[str]:
+        """The following lines that are indented, and the first that is not."""
+        block = []
+        for line in self.lines[self.number + 1 : self.number + 400]:
+            block.append(line)
+            if line and not line[0].isspace():
+                break
+        return block
+
+    def _traceback(self) -> SourceError | None:
+        block = self._block()
+        message = block[-1] if block else ""
+        file, at, in_setup = None, None, False
+        for line in block:
+            frame = _FRAME.match(line)
+            if frame is None:
+                continue
+            path = self.setup_py if in_setup and frame[1] == "<string>" else frame[1]
+            in_setup = in_setup or _RUN_SETUP in line
+            own = self._own(path)
+            if own:
+                file, at = own, int(frame[2])
+        if file:
+            return SourceError(file, at, message)
+        if _NEVER_CALLED in message:
+            malformed = self.sources.malformed.get(self.package)
+            if malformed:
+                return malformed[0]
+            return self._setup("setup() is never called, or refuses its arguments")
+        return None
+
+    def _syntax_error(self, frame: re.Match[str]) -> SourceError | None:
+        following = self.lines[self.number + 1 : self.number + 5]
+        found = next((line for line in following if _SYNTAX_ERROR.match(line)), None)
+        return self._at(frame[1], int(frame[2]), found) if found else None
+
+    def _cmake(self, match: re.Match[str]) -> SourceError | None:
+        text: list[str] = []
+        for line in self._block():
+            if text and not line.strip():
+                break
+            text.append(line.strip())
+        message = " ".join(part for part in text if part) or f"{match[3]} failed"
+        blamed = self._at(match[1], int(match[2]), message)
+        callers = map(_CMAKE_CALLER.match, self._block_after("Call Stack"))
+        for caller in callers:
+            if blamed is None and caller is not None:
+                blamed = self._at(caller[1], int(caller[2]), message)
+        return blamed
+
+    def _block_after(self, heading: str) -> list[str]:
+        for number in range(self.number + 1, min(self.number + 40, len(self.lines))):
+            if self.lines[number].startswith(heading):
+                return _Place(self.lines, number, self.package, self.sources)._block()
+        return []
+
+    def _setup(self, message: str) -> SourceError | None:
+        if self.setup_py not in self.sources.files:
+            return None
+        source = self.sources.setup_py.get(self.package, [])
+        for quoted in _QUOTED.findall(message):
+            for number, line in enumerate(source, start=1):
+                if f"'{quoted}'" in line or f'"{quoted}"' in line:
+                    return SourceError(self.setup_py, number, message)
+        return SourceError(self.setup_py, None, message)

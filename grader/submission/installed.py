@@ -1,0 +1,148 @@
+"""What the build put into the install space, for ``ros2 run`` and for Python."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from grader.submission.entrypoints import EntryPoint, parse_installed
+from grader.submission.paths import is_within
+
+_MAX_METADATA_BYTES = 256 * 1024
+_MAX_HASHED_BYTES = 16 * 2**20
+_DISTRIBUTION = re.compile(r"(?P<name>.+?)-[^-]+(-py3[.\d]*)?\.(egg-info|dist-info)")
+
+
+@dataclass(frozen=True)
+class InstallSpace:
+    """The facts of one install space (merged layout).
+
+    Attributes:
+        executables: Package -> what is in ``lib/<package>``, sorted.
+        in_bin: What is in ``bin``, sorted.
+        entry_points: Distribution, normalised -> its console scripts.
+        python: Path of each Python file -> hash of its content; relative to site-packages, or
+            ``lib/<package>/...`` for scripts.
+        origins: Path of each of them -> the student's file that it is a copy of.
+    """
+
+    executables: Mapping[str, tuple[str, ...]]
+    in_bin: tuple[str, ...]
+    entry_points: Mapping[str, tuple[EntryPoint, ...]]
+    python: Mapping[str, str]
+    origins: Mapping[str, str]
+
+
+def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) -> InstallSpace:
+    """Look at an install space; what is not a regular file there does not count.
+
+    Args:
+        install: The install space.
+        packages: The submission's packages.
+        sources: Path of each of the student's Python files -> hash of its content.
+    """
+    executables = {}
+    python: dict[str, str] = {}
+    for package in packages:
+        folder = install / "lib" / package
+        found = [path for path in regular_files(folder) if os.access(path, os.X_OK)]
+        executables[package] = tuple(sorted({path.name for path in found}))
+        for path in regular_files(folder):
+            python[path.relative_to(install).as_posix()] = _hash(path)
+    entry_points = {}
+    for site in site_packages(install):
+        for path in regular_files(site):
+            name = path.relative_to(site).as_posix()
+            if name.endswith(".py"):
+                python[name] = _hash(path)
+        for metadata in sorted(site.glob("*-info")):
+            match = _DISTRIBUTION.fullmatch(metadata.name)
+            if match:
+                entry_points[normalised(match["name"])] = _entry_points(metadata)
+    in_bin = sorted(path.name for path in regular_files(install / "bin"))
+    return InstallSpace(
+        executables, tuple(in_bin), entry_points, python, match_files(python, sources)
+    )
+
+
+def site_packages(install: Path) -> list[Path]:
+    """Folders of an install space that Python imports from."""
+    return sorted(install.glob("lib/python3*/site-packages"))
+
+
+def normalised(distribution: str) -> str:
+    """Write a distribution's name so that ``bot-publisher`` equals ``bot_publisher``."""
+    return re.sub(r"[-_.]+", "_", distribution).lower()
+
+
+def regular_files(folder: Path) -> Iterator[Path]:
+    """All regular files below a folder, without following links, sorted."""
+    for parent, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if name != "__pycache__")
+        for name in sorted(names):
+            path = Path(parent, name)
+            if stat.S_ISREG(path.lstat().st_mode):
+                yield path
+
+
+def match_files(python: Mapping[str, str], sources: Mapping[str, str]) -> dict[str, str]:
+    """Find for each installed Python file the student's file that it was copied from.
+
+    Args:
+        python: Installed path -> hash.
+        sources: The student's path -> hash.
+
+    Returns:
+        Installed path -> student's path: of those with the same content the one whose path ends
+        most alike. Files that the build changed or made are left out.
+    """
+    by_hash: dict[str, list[str]] = {}
+    for path, digest in sources.items():
+        by_hash.setdefault(digest, []).append(path)
+    found = {}
+    for installed, digest in python.items():
+        candidates = by_hash.get(digest)
+        if candidates:
+            found[installed] = max(sorted(candidates), key=lambda path: _likeness(path, installed))
+    return found
+
+
+def in_folder(files: Mapping[str, str], folder: str) -> tuple[tuple[str, str], ...]:
+    """Those of the matched files that come from one package's folder, sorted."""
+    return tuple(sorted((new, old) for new, old in files.items() if is_within(old, folder)))
+
+
+def hash_of(data: bytes) -> str:
+    """The hash by which installed and handed-in files are compared."""
+    return sha256(data).hexdigest()
+
+
+def _likeness(path: str, installed: str) -> int:
+    count = 0
+    for left, right in zip(reversed(path.split("/")), reversed(installed.split("/")), strict=False):
+        if left != right:
+            break
+        count += 1
+    return count
+
+
+def _hash(path: Path) -> str:
+    if path.stat().st_size > _MAX_HASHED_BYTES:
+        return ""
+    return hash_of(path.read_bytes())
+
+
+def _entry_points(metadata: Path) -> tuple[EntryPoint, ...]:
+    path = metadata / "entry_points.txt"
+    try:
+        if not stat.S_ISREG(path.lstat().st_mode) or path.stat().st_size > _MAX_METADATA_BYTES:
+            return ()
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ()
+    return tuple(parse_installed(text, "setup.py"))

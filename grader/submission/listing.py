@@ -1,0 +1,214 @@
+"""Which files of a folder are the submission.
+
+What colcon, Python, git and editors left behind is not: a student often hands in the whole
+workspace, with copies of every package in ``build/`` and ``install/``.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.errors import SubmissionError
+from grader.submission.members import (
+    MIB,
+    TOOL_FOLDERS,
+    ArchiveLimits,
+    LeadsOut,
+    is_left_out,
+    resolve_link,
+)
+from grader.submission.paths import join, shown
+
+MANIFEST = "package.xml"
+IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
+
+_COLCON_FOLDERS = ("build", "install", "log")
+_COLCON_MARKS = ("COLCON_IGNORE", ".built_by", ".colcon_install_layout", "local_setup.sh")
+_VIRTUAL_ENVIRONMENT = "pyvenv.cfg"
+
+
+@dataclass(frozen=True)
+class SubmissionFile:
+    """A file of the submission.
+
+    Attributes:
+        path: Relative, forward slashes, undecodable bytes as surrogates.
+        size: In bytes; 0 for a link.
+        executable: Whether its owner may execute it.
+        link: Where a symbolic link leads, relative to the link's folder; None for a file.
+    """
+
+    path: str
+    size: int
+    executable: bool = False
+    link: str | None = None
+
+
+@dataclass
+class Listing:
+    """What was found in a folder.
+
+    Attributes:
+        files: Sorted by path.
+        skipped: Folders that were not looked into, sorted.
+    """
+
+    files: list[SubmissionFile] = field(default_factory=list)
+    skipped: list[str] = field(default_factory=list)
+
+
+def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
+    """List a folder, the same way on every machine.
+
+    Args:
+        root: The folder.
+        limits: What is too much.
+
+    Raises:
+        SubmissionError: Too many or too large files, a file that cannot be read, or a symbolic
+            link that leads out of the folder.
+    """
+    try:
+        return _list_files(root, limits or ArchiveLimits())
+    except OSError as error:
+        raise SubmissionError(
+            f"{shown(str(error.filename))}: cannot be read: {error.strerror}"
+        ) from error
+
+
+def _list_files(root: Path, limits: ArchiveLimits) -> Listing:
+    listing = Listing()
+    links: dict[str, str] = {}
+    total = 0
+    for path, entry in _walk(root, ".", False, listing.skipped, limits.depth):
+        if entry.is_symlink():
+            links[path] = _target(root, path)
+        elif entry.is_file(follow_symlinks=False):
+            status = entry.stat(follow_symlinks=False)
+            total += status.st_size
+            executable = bool(status.st_mode & stat.S_IXUSR)
+            listing.files.append(SubmissionFile(path, status.st_size, executable))
+        if len(listing.files) + len(links) > limits.members:
+            raise SubmissionError(f"the submission holds more than {limits.members} files")
+        if total > limits.total_bytes:
+            raise SubmissionError(_too_large(listing.files, limits))
+    listing.files += _links_inside(links, listing.files)
+    listing.files.sort(key=lambda file: os.fsencode(file.path))
+    listing.skipped.sort()
+    return listing
+
+
+def _walk(
+    root: Path, folder: str, in_package: bool, skipped: list[str], depth: int
+) -> Iterator[tuple[str, os.DirEntry[str]]]:
+    with os.scandir(root / folder) as found:
+        entries = sorted(found, key=lambda entry: entry.name)
+    if depth < 0:
+        raise SubmissionError(f"{shown(folder)}: too many folders in one another")
+    in_package = in_package or any(entry.name == MANIFEST for entry in entries)
+    for entry in entries:
+        path = join(folder, entry.name)
+        if not entry.is_dir(follow_symlinks=False):
+            linked_leftover = entry.is_symlink() and entry.name in _COLCON_FOLDERS
+            if not (is_left_out(entry.name) or entry.name.endswith(".pyc") or linked_leftover):
+                yield path, entry
+        elif _is_leftover(root / path, entry.name, in_package):
+            skipped.append(path)
+        else:
+            yield from _walk(root, path, in_package, skipped, depth - 1)
+
+
+def _is_leftover(folder: Path, name: str, in_package: bool) -> bool:
+    if name in TOOL_FOLDERS or name.endswith(".egg-info"):
+        return True
+    if (folder / _VIRTUAL_ENVIRONMENT).exists():
+        return True
+    if name not in _COLCON_FOLDERS:
+        return False
+    if any((folder / mark).exists() for mark in _COLCON_MARKS):
+        return True
+    # A package may well have a module called "log"; a workspace has no use for another "log".
+    return not in_package and not (folder / MANIFEST).exists()
+
+
+def _target(root: Path, path: str) -> str:
+    target = os.fspath((root / path).readlink())
+    if not target.startswith("/"):
+        return target
+    # An absolute link into the folder itself is as good as a relative one.
+    for base in (root.absolute(), root.resolve()):
+        inside = os.path.relpath(target, base)
+        if inside.split("/")[0] != "..":
+            return os.path.relpath(inside, path.rpartition("/")[0] or ".")
+    raise SubmissionError(_leads_out(path, target))
+
+
+def _links_inside(links: dict[str, str], files: list[SubmissionFile]) -> list[SubmissionFile]:
+    if not links:
+        return []
+    present = {file.path for file in files}
+    for path in list(present):
+        while "/" in path:
+            path = path.rpartition("/")[0]
+            present.add(path)
+    kept = []
+    for path, target in links.items():
+        try:
+            end = resolve_link(path, links)
+        except LeadsOut:
+            raise SubmissionError(_leads_out(path, target)) from None
+        if end in present:
+            kept.append(SubmissionFile(path, 0, link=target))
+    return kept
+
+
+def _leads_out(path: str, target: str) -> str:
+    return (
+        f"{shown(path)}: the link to {shown(target)!r} leads out of the submission; "
+        "put the file itself there"
+    )
+
+
+def _too_large(files: list[SubmissionFile], limits: ArchiveLimits) -> str:
+    largest = max(files, key=lambda file: file.size)
+    return (
+        f"the submission holds more than {limits.total_bytes // MIB} MiB "
+        f"(largest file so far: {shown(largest.path)}, {largest.size / MIB:.1f} MiB)"
+    )
+
+
+def find_packages(paths: Iterable[str]) -> list[str]:
+    """Find the package folders, as colcon would.
+
+    Args:
+        paths: All files of the submission.
+
+    Returns:
+        Folders with a ``package.xml``, sorted, without those inside another package, in hidden
+        folders, or below a ``COLCON_IGNORE``, ``AMENT_IGNORE`` or ``CATKIN_IGNORE``.
+    """
+    folders, ignored = set(), set()
+    for path in paths:
+        folder, _, name = path.rpartition("/")
+        if name == MANIFEST:
+            folders.add(folder or ".")
+        elif name in IGNORE_MARKERS:
+            ignored.add(folder or ".")
+    found: list[str] = []
+    for folder in sorted(folders, key=lambda folder: (folder != ".", folder.count("/"))):
+        above = _with_parents(folder)
+        hidden = any(part.startswith(".") and part != "." for part in folder.split("/"))
+        if not hidden and ignored.isdisjoint(above) and set(found).isdisjoint(above):
+            found.append(folder)
+    return sorted(found, key=os.fsencode)
+
+
+def _with_parents(folder: str) -> list[str]:
+    chain = [folder]
+    while "/" in chain[-1]:
+        chain.append(chain[-1].rpartition("/")[0])
+    return [*chain, "."]

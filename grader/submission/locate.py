@@ -1,0 +1,158 @@
+"""Open a submission: a folder or an archive becomes a snapshot that nobody changes any more.
+
+Everything that is found out about a submission (hash, manifests, imports, build) is found out
+of one private copy. So the student may go on editing, and nothing of ours can touch the
+original.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.errors import GraderFault, SubmissionError, UsageError
+from grader.submission import archive
+from grader.submission.listing import Listing, SubmissionFile, find_packages, list_files
+from grader.submission.members import ArchiveLimits
+from grader.submission.paths import shown
+
+_CHUNK = 1024 * 1024
+_URL = re.compile(r"(https?|ssh|git|file|ftp):/|[\w.-]+@[\w.-]+:")
+
+
+@dataclass(frozen=True)
+class Located:
+    """An opened submission.
+
+    Attributes:
+        id: The folder's or archive's name, without the archive's suffix.
+        sha256: Hash over the files' paths, contents and executable bits, as hex.
+        root: The private copy; holds exactly ``files``.
+        files: Sorted by path.
+        packages: Folders with a ``package.xml``, sorted; ``.`` for the submission itself.
+        skipped: Folders that were left out, such as ``build`` and ``install``.
+    """
+
+    id: str
+    sha256: str
+    root: Path
+    files: tuple[SubmissionFile, ...]
+    packages: tuple[str, ...]
+    skipped: tuple[str, ...] = ()
+
+
+@contextmanager
+def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Located]:
+    """Open a submission for as long as the context lasts.
+
+    Args:
+        path: A folder (package, ``src``, workspace, clone of a repository, with any number of
+            folders around it) or an archive of one.
+        limits: What is too much.
+
+    Yields:
+        The located submission, with its private copy.
+
+    Raises:
+        UsageError: Nothing is there, or it is a URL.
+        SubmissionError: It cannot be read as a submission.
+        GraderFault: This machine cannot hold the copy.
+    """
+    limits = limits or ArchiveLimits()
+    source = check_path(path)
+    with tempfile.TemporaryDirectory(prefix="rosgrade-") as scratch:
+        if not source.is_dir():
+            unpacked = Path(scratch, "unpacked")
+            unpacked.mkdir()
+            archive.unpack(source, unpacked, limits)
+            listed = unpacked
+        else:
+            listed = source
+        listing = list_files(listed, limits)
+        root = Path(scratch, "submission")
+        sha256 = _copy(listed, listing, root)
+        yield Located(
+            id=submission_id(source),
+            sha256=sha256,
+            root=root,
+            files=tuple(listing.files),
+            packages=tuple(find_packages(file.path for file in listing.files)),
+            skipped=tuple(listing.skipped),
+        )
+
+
+def check_path(path: Path | str) -> Path:
+    """Return the path of a submission that exists.
+
+    Raises:
+        UsageError: Nothing is there, it is a URL, or neither a folder nor a file.
+    """
+    text = os.fspath(path)
+    if _URL.match(text):
+        raise UsageError(f"{shown(text)}: is a URL; clone it with git and name the folder")
+    source = Path(path)
+    if not (source.is_dir() or source.is_file()):
+        problem = "is neither a folder nor a file" if source.exists() else "does not exist"
+        raise UsageError(f"{shown(text)}: {problem}")
+    return source
+
+
+def submission_id(source: Path) -> str:
+    """Name a submission after its folder or archive."""
+    name = source.name if source.name not in ("", "..") else source.resolve().name
+    name = name or "submission"
+    if not source.is_dir():
+        suffix = next((s for s in archive.SUFFIXES if name.lower().endswith(s)), "")
+        name = name[: len(name) - len(suffix)] or name
+    return shown(name)
+
+
+def _copy(source: Path, listing: Listing, root: Path) -> str:
+    """Copy the listed files and hash what was copied, so that both agree for certain."""
+    total = hashlib.sha256()
+    root.mkdir()
+    for file in listing.files:
+        target = root / file.path
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if file.link is not None:
+                target.symlink_to(file.link)
+                digest, kind = hashlib.sha256(os.fsencode(file.link)).digest(), b"l"
+            else:
+                digest = _copy_file(source / file.path, target, file)
+                kind = b"x" if file.executable else b"f"
+        except OSError as error:
+            raise _fault(file.path, error) from error
+        # A NUL ends the path: no path contains one.
+        total.update(kind + os.fsencode(file.path) + b"\0" + digest)
+    return total.hexdigest()
+
+
+def _copy_file(source: Path, target: Path, file: SubmissionFile) -> bytes:
+    digest = hashlib.sha256()
+    left = file.size
+    # Not following a link that was put there since the listing; not waiting for a pipe either.
+    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
+    mode = 0o755 if file.executable else 0o644
+    with (
+        os.fdopen(os.open(source, flags), "rb") as reading,
+        os.fdopen(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as writing,
+    ):
+        while block := reading.read(min(_CHUNK, left)):
+            digest.update(block)
+            writing.write(block)
+            left -= len(block)
+    return digest.digest()
+
+
+def _fault(path: str, error: OSError) -> SubmissionError | GraderFault:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE):
+        return GraderFault(f"no private copy of the submission could be made: {error}")
+    return SubmissionError(f"{shown(path)}: cannot be read: {error.strerror}")

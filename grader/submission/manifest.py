@@ -1,0 +1,205 @@
+"""Read a package.xml: names and lines by a guarded parser, rules by catkin_pkg, as colcon does."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from grader.errors import GraderFault
+from grader.submission.record import Dependency, SourceError
+
+MAX_BYTES = 256 * 1024
+DEPENDENCY_KINDS = frozenset(
+    {
+        "depend",
+        "build_depend",
+        "build_export_depend",
+        "buildtool_depend",
+        "buildtool_export_depend",
+        "exec_depend",
+        "run_depend",
+        "test_depend",
+        "doc_depend",
+    }
+)
+"""Tags of package.xml that name another package or a rosdep key (REP-149)."""
+
+_MAX_DEPTH = 30
+_MAX_DEPENDENCIES = 500
+_DEFAULT_BUILD_TYPE = "catkin"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
+_MISMATCHED_TAG = expat.errors.codes[expat.errors.XML_ERROR_TAG_MISMATCH]
+_UNKNOWN_TAGS = re.compile(r"following tags: ([\w, -]+)")
+_QUOTED = re.compile(r"\"([^\"]+)\"|'([^']+)'")
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a package.xml says.
+
+    Attributes:
+        name: The package's name; None where it names none that could be one.
+        build_type: As colcon takes it: without an export it is ``catkin``. None where the XML is
+            broken before it says.
+        error: Why colcon does not accept it, or None.
+        dependencies: In its order; ``known`` is not yet told.
+    """
+
+    name: str | None
+    build_type: str | None
+    error: SourceError | None = None
+    dependencies: tuple[Dependency, ...] = ()
+
+
+@dataclass
+class _Element:
+    tag: str
+    line: int
+    attributes: dict[str, str]
+    text: str = ""
+
+
+@dataclass
+class _Document:
+    """Elements directly below <package>, those of <export> with them as ``export/tag``."""
+
+    elements: list[_Element] = field(default_factory=list)
+    error: tuple[int | None, str] | None = None
+
+    def texts(self, tag: str) -> list[str]:
+        return [element.text.strip() for element in self.elements if element.tag == tag]
+
+
+class _Refused(Exception):
+    pass
+
+
+def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Manifest:
+    """Read a package.xml.
+
+    Args:
+        data: Its content.
+        file: Its path in the submission, for errors.
+        environment: What ``condition`` attributes may ask for (``ROS_VERSION``, ...).
+    """
+    document = _parse(data)
+    names = [name for name in document.texts("name") if _NAME.fullmatch(name)]
+    build_types = document.texts("export/build_type")
+    default = None if document.error else _DEFAULT_BUILD_TYPE
+    dependencies = [
+        Dependency(element.text.strip(), element.tag, element.line)
+        for element in document.elements
+        if element.tag in DEPENDENCY_KINDS
+        and element.text.strip()
+        and _applies(element, environment)
+    ]
+    error = document.error or _violation(data, document)
+    if error is None and len(dependencies) > _MAX_DEPENDENCIES:
+        error = (None, f"names more than {_MAX_DEPENDENCIES} dependencies")
+    return Manifest(
+        name=names[0] if names else None,
+        build_type=build_types[0] if build_types else default,
+        error=SourceError(file, *error) if error else None,
+        dependencies=tuple(dependencies[:_MAX_DEPENDENCIES]),
+    )
+
+
+def _parse(data: bytes) -> _Document:
+    document = _Document()
+    path: list[str] = []
+    opened: list[int] = []
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        path.append(tag)
+        opened.append(parser.CurrentLineNumber)
+        if len(path) > _MAX_DEPTH:
+            raise _Refused("elements are nested too deeply")
+        if len(path) == 2 or (len(path) == 3 and path[1] == "export"):
+            name = "/".join(path[1:])
+            document.elements.append(_Element(name, parser.CurrentLineNumber, attributes))
+
+    def end(_tag: str) -> None:
+        path.pop()
+        opened.pop()
+
+    def text(characters: str) -> None:
+        if document.elements and document.elements[-1].tag == "/".join(path[1:]):
+            document.elements[-1].text += characters
+
+    def refuse_doctype(*_: object) -> None:
+        # Entities are declared there; package.xml has no use for any of it.
+        raise _Refused("a document type declaration (<!DOCTYPE ...>) is refused")
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = text
+    parser.StartDoctypeDeclHandler = refuse_doctype
+    if len(data) > MAX_BYTES:
+        document.error = (None, f"larger than {MAX_BYTES // 1024} KiB; not read")
+        return document
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        if error.code == _MISMATCHED_TAG and path:
+            # The place to mend is where the element begins, not where expat noticed.
+            document.error = (opened[-1], f"invalid XML: <{path[-1]}> is not closed")
+        else:
+            reason = expat.ErrorString(error.code)
+            document.error = (error.lineno, f"invalid XML: {reason} (column {error.offset + 1})")
+    except _Refused as error:
+        document.error = (parser.CurrentLineNumber, str(error))
+    except (ValueError, LookupError) as error:
+        document.error = (None, f"invalid XML: {error}")
+    return document
+
+
+def _violation(data: bytes, document: _Document) -> tuple[int | None, str] | None:
+    """What catkin_pkg, and with it colcon, does not accept."""
+    try:
+        from catkin_pkg.package import InvalidPackage, parse_package_string
+    except ImportError as error:
+        raise GraderFault("catkin_pkg is not installed: pip install catkin-pkg") from error
+    try:
+        package = parse_package_string(data, warnings=[])
+        package.get_build_type()
+        package.evaluate_conditions({})
+    except (InvalidPackage, AssertionError, ValueError, RecursionError) as error:
+        lines = [line.strip("- ") for line in str(error).splitlines()]
+        wrong = [line for line in lines if line and not line.startswith("Error(s)")]
+        message = "; ".join(wrong) or type(error).__name__
+        return _line_of(message, document), message
+    return None
+
+
+def _line_of(message: str, document: _Document) -> int | None:
+    """Find the element that a message of catkin_pkg is about."""
+    unknown = _UNKNOWN_TAGS.search(message)
+    if unknown:
+        tags = unknown[1].split(", ")
+        return next((item.line for item in document.elements if item.tag in tags), None)
+    quoted = [first or second for first, second in _QUOTED.findall(message)]
+    for value in quoted:
+        for element in document.elements:
+            if value == element.text.strip() or value in element.attributes.values():
+                return element.line
+    for value in quoted:
+        for element in document.elements:
+            if value == element.tag:
+                return element.line
+    return None
+
+
+def _applies(element: _Element, environment: Mapping[str, str]) -> bool:
+    condition = element.attributes.get("condition")
+    if condition is None:
+        return True
+    try:
+        from catkin_pkg.condition import evaluate_condition
+
+        return bool(evaluate_condition(condition, dict(environment)))
+    except (ImportError, ValueError):
+        return True

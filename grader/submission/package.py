@@ -1,0 +1,242 @@
+"""One package of a submission: what its files say, then what the build made of it."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from grader.ros import RosInstallation
+from grader.submission import source
+from grader.submission.dependencies import is_known
+from grader.submission.entrypoints import EntryPoint, Setup, read_setup
+from grader.submission.imports import find_imports, is_code, ros_imports
+from grader.submission.installed import InstallSpace, hash_of, in_folder, normalised
+from grader.submission.listing import MANIFEST
+from grader.submission.locate import Located
+from grader.submission.manifest import Manifest, read_manifest
+from grader.submission.paths import is_within, join, shown
+from grader.submission.record import Dependency, Import, PackageRecord, SourceError
+from grader.submission.rosdistro import PYTHON_MODULES
+from grader.submission.targets import Modules, missing_target
+
+_CONDITIONS = {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
+
+
+@dataclass(frozen=True)
+class Package:
+    """A package as handed in.
+
+    Attributes:
+        name: From package.xml, else from setup.py, else the folder's.
+        folder: In the submission.
+        manifest: What package.xml says.
+        setup: What setup.py and setup.cfg say.
+        setup_py: The lines of setup.py, none where there is no such file.
+        hashes: Hash of each Python file and script, by path in the submission.
+        trees: Syntax tree of each, or what is wrong with it.
+    """
+
+    name: str
+    folder: str
+    manifest: Manifest
+    setup: Setup
+    setup_py: Sequence[str]
+    hashes: Mapping[str, str]
+    trees: Mapping[str, ast.Module | SourceError]
+
+    @property
+    def build_type(self) -> str:
+        """As colcon takes it; guessed where package.xml is broken before it says."""
+        if self.manifest.build_type is not None:
+            return self.manifest.build_type
+        return "ament_python" if self.setup_py else "ament_cmake"
+
+    @property
+    def module_root(self) -> str:
+        """Folder in the submission that holds the package's Python modules."""
+        below = self.setup.package_dir
+        return self.folder if below == "." else join(self.folder, below)
+
+    def code(self) -> dict[str, ast.Module | SourceError]:
+        """Trees of what runs: no tests, launch files, setup.py."""
+        return {p: t for p, t in self.trees.items() if is_code(_below(p, self.folder))}
+
+    def modules(self, installed: Collection[str] | None = None) -> Modules:
+        """The package's Python modules."""
+        root = self.module_root
+        trees = {
+            _below(path, root): tree if isinstance(tree, ast.Module) else None
+            for path, tree in self.code().items()
+            if is_within(path, root) and path.endswith(".py")
+        }
+        return Modules(trees, installed)
+
+
+def read_package(located: Located, folder: str, ros: RosInstallation) -> Package:
+    """Read a package from the private copy of its submission.
+
+    Args:
+        located: The submission.
+        folder: The package's folder in it.
+        ros: For conditions in package.xml.
+    """
+    manifest = read_manifest(
+        _bytes(located, join(folder, MANIFEST)) or b"",
+        shown(join(folder, MANIFEST)),
+        {**_CONDITIONS, "ROS_DISTRO": ros.distro},
+    )
+    setup_py = _bytes(located, join(folder, "setup.py"))
+    setup = read_setup(setup_py, _bytes(located, join(folder, "setup.cfg")), shown(folder))
+    hashes: dict[str, str] = {}
+    trees: dict[str, ast.Module | SourceError] = {}
+    for file in located.files:
+        if not is_within(file.path, folder):
+            continue
+        suffixed = file.path.endswith(".py")
+        if not suffixed and "." in file.path.rpartition("/")[2]:
+            continue
+        data = _bytes(located, file.path)
+        if data is not None and (suffixed or source.is_python_script(data)):
+            hashes[file.path] = hash_of(data)
+            trees[file.path] = source.parse(data, shown(file.path))
+    folder_name = located.id if folder == "." else folder.rpartition("/")[2]
+    return Package(
+        name=manifest.name or setup.name or shown(folder_name),
+        folder=folder,
+        manifest=manifest,
+        setup=setup,
+        setup_py=(setup_py or b"").decode("utf-8", "replace").splitlines(),
+        hashes=hashes,
+        trees=trees,
+    )
+
+
+def record_packages(
+    packages: Sequence[Package], ros: RosInstallation, installed: InstallSpace | None
+) -> tuple[PackageRecord, ...]:
+    """Record all packages of a submission.
+
+    Args:
+        packages: What was handed in.
+        ros: The installation that they were built with.
+        installed: What the build made, or None where nothing was built.
+    """
+    providers = _providers(packages, ros)
+    records = [_record(package, packages, providers, ros, installed) for package in packages]
+    return tuple(sorted(records, key=lambda record: record.name))
+
+
+def _record(
+    package: Package,
+    packages: Sequence[Package],
+    providers: Mapping[str, tuple[str, ...]],
+    ros: RosInstallation,
+    installed: InstallSpace | None,
+) -> PackageRecord:
+    submitted = {other.name for other in packages}
+    declared = {dependency.name for dependency in package.manifest.dependencies}
+    imports = _imports(package)
+    record = PackageRecord(
+        name=package.name,
+        path=shown(package.folder),
+        build_type=package.build_type,
+        manifest_error=package.manifest.error,
+        dependencies=tuple(
+            _told(dependency, ros, submitted) for dependency in package.manifest.dependencies
+        ),
+        imports=tuple(imports),
+        ros_imports=tuple(
+            ros_imports(
+                imports,
+                own=package.modules().folders | {package.name},
+                packages={
+                    module: next((name for name in names if name in declared), names[0])
+                    for module, names in providers.items()
+                },
+            )
+        ),
+        syntax_errors=tuple(
+            tree for _, tree in sorted(package.trees.items()) if isinstance(tree, SourceError)
+        ),
+    )
+    return _with_executables(record, package, set(providers), installed, alone=len(packages) == 1)
+
+
+def _with_executables(
+    record: PackageRecord,
+    package: Package,
+    elsewhere: set[str],
+    installed: InstallSpace | None,
+    *,
+    alone: bool,
+) -> PackageRecord:
+    entries = list(package.setup.entry_points)
+    modules = package.modules()
+    files: dict[str, str] = {}
+    executables: tuple[str, ...] = ()
+    misplaced: list[str] = []
+    if installed is not None:
+        files = {shown(i): shown(p) for i, p in in_folder(installed.origins, package.folder)}
+        executables = installed.executables.get(package.name, ())
+        distribution = normalised(package.setup.name or package.name)
+        built = installed.entry_points.get(distribution)
+        if built is not None:
+            entries = [_at_declaration(entry, package) for entry in built]
+            modules = package.modules(installed.python)
+        names = {entry.name for entry in entries}
+        misplaced = [name for name in installed.in_bin if alone or name in names]
+    elsewhere = elsewhere | sys.stdlib_module_names
+    missing = [(e.name, missing_target(e, modules, elsewhere=elsewhere)) for e in entries]
+    return replace(
+        record,
+        entry_points=tuple((entry.name, entry.target) for entry in entries),
+        executables=executables,
+        misplaced_executables=tuple(misplaced),
+        missing_targets=tuple((name, error) for name, error in missing if error is not None),
+        files=tuple(sorted(files.items())),
+    )
+
+
+def _at_declaration(entry: EntryPoint, package: Package) -> EntryPoint:
+    """Give an installed entry point the place where the student wrote it."""
+    for declared in package.setup.entry_points:
+        if declared.name == entry.name:
+            return replace(entry, file=declared.file, line=declared.line)
+    return replace(entry, file=shown(join(package.folder, "setup.py")))
+
+
+def _imports(package: Package) -> list[Import]:
+    found: list[Import] = []
+    for path, tree in sorted(package.code().items()):
+        if isinstance(tree, ast.Module):
+            found += find_imports(tree, shown(path))
+    return found
+
+
+def _providers(packages: Sequence[Package], ros: RosInstallation) -> dict[str, tuple[str, ...]]:
+    """Importable module -> packages of which each provides it."""
+    providers: dict[str, tuple[str, ...]] = {name: (name,) for name in ros.python_modules}
+    providers.update(PYTHON_MODULES)
+    for package in packages:
+        providers[package.name] = (package.name,)
+        providers.update({module: (package.name,) for module in package.modules().folders})
+    return providers
+
+
+def _told(dependency: Dependency, ros: RosInstallation, submitted: set[str]) -> Dependency:
+    known = is_known(dependency.name, installed=ros.packages, submitted=submitted)
+    return replace(dependency, name=shown(dependency.name), known=known)
+
+
+def _below(path: str, folder: str) -> str:
+    return path if folder == "." else path[len(folder) + 1 :]
+
+
+def _bytes(located: Located, path: str) -> bytes | None:
+    """Read a file of the private copy; its links lead to nothing outside of it."""
+    try:
+        return (located.root / path).read_bytes()
+    except OSError:
+        return None

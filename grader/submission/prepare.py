@@ -1,0 +1,173 @@
+"""From what a student handed in to its record and, where it builds, an install space."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.errors import SubmissionError
+from grader.ros import RosInstallation
+from grader.submission.archive import SUFFIXES
+from grader.submission.build import BuildLimits, build
+from grader.submission.build_cache import BuildCache, CacheLimits
+from grader.submission.culprit import Sources
+from grader.submission.installed import inspect
+from grader.submission.listing import MANIFEST
+from grader.submission.locate import Located, check_path, opened, submission_id
+from grader.submission.members import ArchiveLimits
+from grader.submission.package import Package, read_package, record_packages
+from grader.submission.paths import shown
+from grader.submission.record import SubmissionRecord
+
+_MAX_PACKAGES = 200
+_LEFTOVERS = ("build", "install", "log")
+_ARCHIVES = (*SUFFIXES, ".rar", ".7z")
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A submission that is ready to run, or the record of why it is not.
+
+    Attributes:
+        record: What is known of it.
+        install: Its install space (merged layout), read-only for everybody; also there when
+            only some packages were built. None where nothing was.
+    """
+
+    record: SubmissionRecord
+    install: Path | None
+
+
+@dataclass(frozen=True)
+class PrepareLimits:
+    """How much a submission may hold, how long it may build, what the cache keeps."""
+
+    archive: ArchiveLimits = field(default_factory=ArchiveLimits)
+    build: BuildLimits = field(default_factory=BuildLimits)
+    cache: CacheLimits = field(default_factory=CacheLimits)
+
+
+def prepare(
+    path: Path | str,
+    ros: RosInstallation,
+    *,
+    cache: Path,
+    limits: PrepareLimits | None = None,
+    on_progress: Callable[[str], None] = lambda _: None,
+    environ: Mapping[str, str] = os.environ,
+) -> Prepared:
+    """Find the packages of a submission, read them, build them.
+
+    Nothing that a student can do wrong raises: it is told in the record's ``problem``, in a
+    package's ``manifest_error``, or in ``build``.
+
+    Args:
+        path: A folder or an archive.
+        ros: Builds with this installation.
+        cache: Folder for builds, such as ``$XDG_CACHE_HOME/rosgrade``.
+        limits: What is too much.
+        on_progress: Told in a few words what happens.
+        environ: The caller's environment; only its locale and time zone are passed on.
+
+    Raises:
+        UsageError: Nothing is at ``path``, or it is a URL.
+        GraderFault: It cannot be graded here, for no fault of the student.
+    """
+    limits = limits or PrepareLimits()
+    source = check_path(path)
+    on_progress("reading the submission")
+    try:
+        with opened(source, limits.archive) as located:
+            builds = BuildCache(cache, limits.cache)
+            return _prepare(located, ros, builds, limits, on_progress, environ)
+    except SubmissionError as error:
+        # Nothing of it is known, so only its name can tell it from others.
+        sha256 = hashlib.sha256(os.fsencode(source.name)).hexdigest()
+        return Prepared(SubmissionRecord(submission_id(source), sha256, problem=str(error)), None)
+
+
+def _prepare(
+    located: Located,
+    ros: RosInstallation,
+    cache: BuildCache,
+    limits: PrepareLimits,
+    on_progress: Callable[[str], None],
+    environ: Mapping[str, str],
+) -> Prepared:
+    packages = [read_package(located, folder, ros) for folder in located.packages[:_MAX_PACKAGES]]
+    problem = find_problem(located, packages)
+    if problem is not None:
+        records = record_packages(packages, ros, None)
+        return Prepared(SubmissionRecord(located.id, located.sha256, problem, records), None)
+    sources = Sources(
+        files={file.path for file in located.files},
+        folders={package.name: package.folder for package in packages},
+        setup_py={package.name: package.setup_py for package in packages},
+        malformed={package.name: package.setup.malformed for package in packages},
+    )
+    built = build(
+        located,
+        sources,
+        ros,
+        only_python=all(package.build_type == "ament_python" for package in packages),
+        cache=cache,
+        limits=limits.build,
+        on_progress=on_progress,
+        environ=environ,
+    )
+    installed = None
+    if built.install is not None:
+        hashes = {path: digest for p in packages for path, digest in p.hashes.items()}
+        installed = inspect(built.install, sources.folders, hashes)
+    records = record_packages(packages, ros, installed)
+    record = SubmissionRecord(located.id, located.sha256, None, records, built.build)
+    return Prepared(record, built.install)
+
+
+def find_problem(located: Located, packages: Sequence[Package]) -> str | None:
+    """Say why a submission cannot be built at all, in words for its author; None if it can."""
+    if not located.files:
+        return "the submission is empty"
+    if not packages:
+        return _no_package(located)
+    if len(located.packages) > _MAX_PACKAGES:
+        return f"the submission holds more than {_MAX_PACKAGES} packages"
+    places: dict[str, str] = {}
+    for package in packages:
+        other = places.setdefault(package.name, package.folder)
+        if other != package.folder:
+            return (
+                f"two packages are called {package.name}: {shown(other)} and "
+                f"{shown(package.folder)}; hand in one of them"
+            )
+    return None
+
+
+def _no_package(located: Located) -> str:
+    names = [file.path.rpartition("/")[2] for file in located.files]
+    if MANIFEST in names:
+        return (
+            "every package.xml is in a hidden folder or below a COLCON_IGNORE, AMENT_IGNORE or "
+            "CATKIN_IGNORE"
+        )
+    problem = "there is no package.xml anywhere, so there is no ROS package"
+    alike = [file.path for file in located.files if _is_nearly_manifest(file.path)]
+    archives = [file.path for file in located.files if file.path.lower().endswith(_ARCHIVES)]
+    leftovers = [path for path in located.skipped if path.rpartition("/")[2] in _LEFTOVERS]
+    if alike:
+        return f"{problem}; {shown(alike[0])} must be called package.xml"
+    if archives:
+        return f"{problem}; hand in what is in {shown(archives[0])}, not the archive in another"
+    if leftovers:
+        return f"{problem} (nobody looks into {shown(leftovers[0])}/: hand in src/)"
+    if all(name.endswith(".py") for name in names):
+        return f"{problem}; hand in the whole package, not only its Python files"
+    return problem
+
+
+def _is_nearly_manifest(path: str) -> bool:
+    name = path.rpartition("/")[2].lower()
+    return name in ("package.xml", "package.xml.txt", "packages.xml", "package.xlm", "package")

@@ -1,0 +1,186 @@
+"""Contact: how far a circular robot gets along an arc before it touches something.
+
+Contact stops the translation; turning on the spot goes on, since it moves no circle. The
+first contact within a step is found, however thin a wall is and however long the step:
+an interval of the arc counts as free only if its chord keeps its distance from every wall by
+more than the arc's sagitta. Intervals grow while they are free and shrink to a nanometre
+where they are not, which is where the robot stops.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sim.motion import Pose, integrate
+from sim.script import MovingObstacle
+from sim.shapes import Capsule, chord_clearance_m, point_clearance_m
+from sim.world import World
+
+RESOLUTION_M = 1e-9
+"""The place of a contact is found to this precision, and no motion shorter than this is made
+against a wall, so that a robot which pushes against one stays where it is to the last bit."""
+
+TOUCH_M = 1e-6
+"""A robot that is nearer than this touches."""
+
+_ROUNDING_M = 1e-12
+_SIGHT_M = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Result of a step near walls.
+
+    Attributes:
+        share: How much of the translation was possible, in [0, 1].
+        label: What is touched at the end, such as ``boxes[2]``, or None.
+    """
+
+    share: float
+    label: str | None
+
+
+FREE = Contact(1.0, None)
+_Near = tuple[tuple[Capsule, str], ...]
+
+
+class ContactFinder:
+    """Finds contacts of one robot in one world.
+
+    It remembers what is near and how far the robot may travel before anything can touch it, so
+    that a step in free space costs nothing. What it remembers never changes a result.
+    """
+
+    def __init__(self, world: World, radius_m: float) -> None:
+        """Prepare the world for a robot.
+
+        Args:
+            world: What can be touched.
+            radius_m: Radius of the robot's footprint.
+        """
+        self._radius_m = radius_m
+        self._all: _Near = tuple(
+            (capsule, shape.label) for shape in world.shapes for capsule in shape.capsules
+        )
+        self._moving = world.moving
+        self._near: _Near = ()
+        self._anchor = (math.inf, math.inf)
+        self._sight_m = 0.0
+        self._free_m = -1.0
+
+    def find(
+        self, pose: Pose, linear_m_s: float, angular_rad_s: float, dt_s: float, end_ns: int
+    ) -> Contact:
+        """Look for the first contact of one step.
+
+        Args:
+            pose: Where the step begins.
+            linear_m_s: Velocity during it.
+            angular_rad_s: Angular velocity during it.
+            dt_s: Its length.
+            end_ns: Simulated time at its end; moving obstacles are already there.
+        """
+        travel_m = abs(linear_m_s) * dt_s
+        moving = self._moving_near(pose, travel_m, end_ns) if self._moving else ()
+        if not moving and travel_m + TOUCH_M < self._free_m:
+            self._free_m -= travel_m
+            return FREE
+        near = self._walls_near(pose, travel_m) + moving
+        share, hit = 1.0, None
+        if travel_m > 0.0:
+            share, hit = self._advance(pose, linear_m_s, angular_rad_s, dt_s, near)
+        end = integrate(pose, linear_m_s, angular_rad_s, dt_s * share) if share > 0.0 else pose
+        touched = self._touched(end, near)
+        return Contact(share, hit or touched)
+
+    def _walls_near(self, pose: Pose, travel_m: float) -> _Near:
+        """Walls that this step could reach, with some to spare for the next steps."""
+        ax, ay = self._anchor
+        if math.hypot(pose.x_m - ax, pose.y_m - ay) + travel_m + TOUCH_M >= self._sight_m:
+            self._anchor = (pose.x_m, pose.y_m)
+            self._sight_m = max(_SIGHT_M, 4.0 * travel_m)
+            reach_m = self._radius_m + self._sight_m
+            self._near = tuple(
+                item
+                for item in self._all
+                if point_clearance_m(pose.x_m, pose.y_m, item[0]) < reach_m
+            )
+        return self._near
+
+    def _moving_near(self, pose: Pose, travel_m: float, time_ns: int) -> _Near:
+        found: list[tuple[Capsule, str]] = []
+        for obstacle in self._moving:
+            at = obstacle.pose_at(time_ns)
+            if at is None:
+                continue
+            reach_m = obstacle.reach_m + self._radius_m + travel_m + TOUCH_M
+            if math.hypot(at.x_m - pose.x_m, at.y_m - pose.y_m) <= reach_m:
+                shape = obstacle.shape_at(at)
+                found.extend((capsule, obstacle.label) for capsule in shape.capsules)
+                if shape.contains(pose.x_m, pose.y_m):
+                    found.append(((pose.x_m, pose.y_m, pose.x_m, pose.y_m, 0.0), obstacle.label))
+        return tuple(found)
+
+    def _touched(self, pose: Pose, near: _Near) -> str | None:
+        """What is touched at a pose; remembers how far the rest is away."""
+        ax, ay = self._anchor
+        free_m = self._sight_m - math.hypot(pose.x_m - ax, pose.y_m - ay)
+        touched = None
+        for capsule, label in near:
+            clearance_m = point_clearance_m(pose.x_m, pose.y_m, capsule) - self._radius_m
+            if clearance_m < free_m:
+                free_m = clearance_m
+                if clearance_m <= TOUCH_M:
+                    touched = label
+        self._free_m = free_m
+        return touched
+
+    def _advance(
+        self, pose: Pose, linear_m_s: float, angular_rad_s: float, dt_s: float, near: _Near
+    ) -> tuple[float, str | None]:
+        travel_m = abs(linear_m_s) * dt_s
+        allowed: list[tuple[Capsule, str, float]] = []
+        for capsule, label in near:
+            clearance_m = point_clearance_m(pose.x_m, pose.y_m, capsule) - self._radius_m
+            if clearance_m <= travel_m + TOUCH_M:
+                # A robot that something moved onto may leave, but not go deeper.
+                deepest_m = min(-RESOLUTION_M, clearance_m - _ROUNDING_M)
+                allowed.append((capsule, label, self._radius_m + deepest_m))
+        if not allowed:
+            return 1.0, None
+        least = min(1.0, RESOLUTION_M / travel_m)
+        begin, length = 0.0, 1.0
+        here = pose
+        while begin < 1.0:
+            end = min(1.0, begin + length)
+            there = integrate(pose, linear_m_s, angular_rad_s, dt_s * end)
+            part = end - begin
+            sagitta_m = 0.125 * travel_m * abs(angular_rad_s) * dt_s * part * part
+            hit = next(
+                (
+                    label
+                    for capsule, label, distance_m in allowed
+                    if chord_clearance_m(here.x_m, here.y_m, there.x_m, there.y_m, capsule)
+                    < distance_m + sagitta_m
+                ),
+                None,
+            )
+            if hit is None:
+                begin, here = end, there
+                length *= 2.0
+            elif length <= least:
+                return begin, hit
+            else:
+                length = max(least, 0.125 * min(length, part))
+        return 1.0, None
+
+
+def obstacles_at(moving: tuple[MovingObstacle, ...], time_ns: int) -> list[Capsule]:
+    """The outlines of all obstacles that are there at a simulated time."""
+    found: list[Capsule] = []
+    for obstacle in moving:
+        pose = obstacle.pose_at(time_ns)
+        if pose is not None:
+            found.extend(obstacle.shape_at(pose).capsules)
+    return found

@@ -1,0 +1,168 @@
+"""Coordinates in YAML: lists such as ``[1.5, 20 cm, 90 deg]``.
+
+In a list of coordinates a bare number is metres (REP-103); an entry with a unit is
+converted. An angle always needs its unit, for nobody can tell whether 1.5 meant radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from grader.assignment.quantity import Dimension, parse_quantity
+from sim.motion import Pose
+
+MAX_COORDINATE_M = 10_000.0
+"""Beyond it double precision no longer resolves a contact to a nanometre."""
+
+
+def metres(value: Any) -> float:
+    """Read a length: a bare number is metres.
+
+    Raises:
+        ValueError: It is not a length, not finite or absurdly large.
+    """
+    number: float
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value)
+        if not math.isfinite(number):
+            raise ValueError(f"{value!r} is not finite")
+    else:
+        try:  # YAML 1.1 reads 1e3 as a string
+            number = float(value) if isinstance(value, str) else math.nan
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            number = parse_quantity(value, Dimension.LENGTH)
+    if abs(number) > MAX_COORDINATE_M:
+        raise ValueError(
+            f"{value!r} is too far away: at most {MAX_COORDINATE_M / 1000:g} km are simulated"
+        )
+    return number
+
+
+@dataclass(frozen=True)
+class Metres:
+    """Pydantic annotation: a length in metres, a bare number is allowed.
+
+    Attributes:
+        positive: Whether it must be more than zero.
+    """
+
+    positive: bool = False
+
+    def __get_pydantic_core_schema__(
+        self, source: type[Any], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Validate by :func:`metres`."""
+
+        def read(value: Any) -> float:
+            try:
+                number = metres(value)
+            except ValueError as error:
+                raise _wrong(str(error)) from None
+            if self.positive and number <= 0.0:
+                raise _wrong(f"{value!r} is too small: it must be more than 0")
+            return number
+
+        return core_schema.no_info_plain_validator_function(read)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Describe the length to an editor."""
+        return {"type": ["number", "string"], "description": "Metres, or a length with its unit."}
+
+
+@dataclass(frozen=True)
+class Entries:
+    """Pydantic annotation: a list with named entries.
+
+    Attributes:
+        names: What each entry is; one called ``yaw`` is an angle, all others are lengths.
+        make: Makes the value from the entries.
+        optional: So many entries at the end may be left out; they are then zero.
+        positive: Whether every length must be more than zero.
+    """
+
+    names: tuple[str, ...]
+    make: Callable[..., Any]
+    optional: int = 0
+    positive: bool = False
+
+    def __get_pydantic_core_schema__(
+        self, source: type[Any], handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Validate entry by entry."""
+        return core_schema.no_info_plain_validator_function(self._read)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Describe the list to an editor."""
+        return {
+            "type": "array",
+            "items": {"type": ["number", "string"]},
+            "minItems": len(self.names) - self.optional,
+            "maxItems": len(self.names),
+            "description": f"{self._form}: metres, or entries with their unit.",
+        }
+
+    @property
+    def _form(self) -> str:
+        return f"[{', '.join(self.names)}]"
+
+    def _read(self, value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise _wrong(f"expected {self._form}, not {value!r}")
+        least = len(self.names) - self.optional
+        if not least <= len(value) <= len(self.names):
+            needed = f"{least} to {len(self.names)}" if self.optional else f"{least}"
+            raise _wrong(f"expected {self._form}: {needed} entries, not {len(value)}")
+        numbers = [self._entry(name, item) for name, item in zip(self.names, value, strict=False)]
+        return self.make(*numbers, *[0.0] * (len(self.names) - len(numbers)))
+
+    def _entry(self, name: str, item: Any) -> float:
+        try:
+            if name == "yaw":
+                return _angle(item)
+            number = metres(item)
+        except ValueError as error:
+            raise _wrong(f"{name}: {error}") from None
+        if self.positive and number <= 0.0:
+            raise _wrong(f"{name}: {item!r} is too small: it must be more than 0")
+        return number
+
+
+def _angle(item: Any) -> float:
+    if isinstance(item, int | float) and not isinstance(item, bool) and item:
+        raise ValueError(f"{item!r} has no unit: write '{item} deg' or '{item} rad'")
+    return parse_quantity(item, Dimension.ANGLE)
+
+
+def _wrong(text: str) -> PydanticCustomError:
+    return PydanticCustomError("quantity", "{text}", {"text": text})
+
+
+def _tuple(*numbers: float) -> tuple[float, ...]:
+    return numbers
+
+
+def _pose(x_m: float, y_m: float, yaw_rad: float) -> Pose:
+    return Pose(x_m, y_m, math.remainder(yaw_rad, math.tau))
+
+
+PositiveMetres = Annotated[float, Metres(positive=True)]
+Point = Annotated[tuple[float, float], Entries(("x", "y"), _tuple)]
+Size = Annotated[tuple[float, float], Entries(("length", "width"), _tuple, positive=True)]
+Ends = Annotated[tuple[float, float, float, float], Entries(("x1", "y1", "x2", "y2"), _tuple)]
+Rectangle = Annotated[
+    tuple[float, float, float, float], Entries(("x_min", "y_min", "x_max", "y_max"), _tuple)
+]
+PoseInPlane = Annotated[Pose, Entries(("x", "y", "yaw"), _pose)]
+PoseOrPoint = Annotated[Pose, Entries(("x", "y", "yaw"), _pose, optional=1)]

@@ -1,0 +1,246 @@
+"""The YAML options of the simulator: ``robot``, ``lidar``, ``odometry`` and ``topics``.
+
+Only models; this module imports neither numpy nor rclpy. Defaults are those of TurtleBot3 in
+Gazebo, or the text says why not:
+
+- Topics and their QoS: ``turtlebot3_gazebo/params/turtlebot3_burger_bridge.yaml`` of
+  ROBOTIS-GIT/turtlebot3_simulations, bridged by ros_gz_bridge with its default QoS
+  (reliable, volatile, depth 10: ``factory.hpp`` of gazebosim/ros_gz). Its ``/cmd_vel`` is a
+  TwistStamped in Jazzy; the default here is Twist, as in the ROS tutorials.
+- LiDAR: ``turtlebot3_burger/model.sdf`` there, with two differences. It casts 360 beams from
+  0 to 6.28 rad, 1.0023 degrees apart; here they are exactly 1 degree apart, as those of the
+  LDS-01. Its noise of 10 mm is off here unless asked for.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from grader.assignment.name import topic_name
+from grader.assignment.quantity import (
+    Dimension,
+    Duration,
+    DurationOrZero,
+    Frequency,
+    QuantityOf,
+    Ratio,
+)
+from grader.assignment.source import Model, read_source
+from sim.coordinates import Metres, PoseInPlane, PositiveMetres
+from sim.motion import ORIGIN, Pose
+
+TopicName = Annotated[str, AfterValidator(topic_name)]
+Rate = Annotated[Frequency, Field(le=100.0)]
+LengthOrZero = Annotated[float, QuantityOf(Dimension.LENGTH, minimum=0.0)]
+
+_SPEED = QuantityOf(Dimension.SPEED, minimum=0.0, exclusive=True)
+_ANGULAR_SPEED = QuantityOf(Dimension.ANGULAR_SPEED, minimum=0.0, exclusive=True)
+_ACCELERATION = QuantityOf(Dimension.ACCELERATION, minimum=0.0, exclusive=True)
+_ANGULAR_ACCELERATION = QuantityOf(Dimension.ANGULAR_ACCELERATION, minimum=0.0, exclusive=True)
+
+
+class Layout(str, Enum):
+    """Where the beams of a scan begin; they go counter-clockwise in both."""
+
+    FROM_ZERO = "0..2pi"
+    """Beam 0 is straight ahead (LDS-01, TurtleBot3 in Gazebo)."""
+    FROM_MINUS_PI = "-pi..pi"
+    """Beam 0 is straight behind, the middle one straight ahead."""
+
+
+class NoReturn(str, Enum):
+    """What a beam reports that measured no distance."""
+
+    INF = "inf"
+    """+inf beyond the range, -inf below it (REP-117, Gazebo)."""
+    ZERO = "zero"
+    """0.0 for both, as the real LDS-01."""
+
+
+class OdometryOrigin(str, Enum):
+    """Where the frame ``odom`` is."""
+
+    WORLD = "world"
+    """At the world's origin (Gazebo Classic)."""
+    START = "start"
+    """Where the robot started (the DiffDrive system of Gazebo Sim)."""
+
+
+class RobotOptions(Model):
+    """The robot and where it starts."""
+
+    model: Literal["burger", "waffle"] = Field("burger", description="Kind of TurtleBot3.")
+    pose: PoseInPlane | None = Field(
+        None, description="Start as [x, y, yaw]; if left out, the world's `start`."
+    )
+    radius: PositiveMetres | None = Field(None, description="Footprint; if left out, the model's.")
+    max_speed: Annotated[float, _SPEED] | None = Field(None, description="Instead of the model's.")
+    max_angular_speed: Annotated[float, _ANGULAR_SPEED] | None = Field(
+        None, description="Instead of the model's."
+    )
+    max_acceleration: Annotated[float, _ACCELERATION] | None = Field(
+        None, description="Instead of the model's; for braking too."
+    )
+    max_angular_acceleration: Annotated[float, _ANGULAR_ACCELERATION] | None = Field(
+        None, description="Instead of the model's; for braking too."
+    )
+    command_timeout: Duration | None = Field(
+        None,
+        description="The robot stops when no command came for so long. If left out, the last "
+        "command holds for ever, as in Gazebo.",
+    )
+
+
+class LidarOptions(Model):
+    """The LiDAR."""
+
+    enabled: bool = Field(True, description="Whether there is one.")
+    beams: int = Field(360, ge=1, le=3600, description="Beams of a full turn, evenly spaced.")
+    rate: Rate = Field(5.0, description="Scans in a second, at most 100 Hz.")
+    range_min: PositiveMetres = Field(0.12, description="Least distance that is measured.")
+    range_max: PositiveMetres = Field(3.5, description="Greatest distance that is measured.")
+    layout: Layout = Field(Layout.FROM_ZERO, description="Where the beams begin.")
+    no_return: NoReturn = Field(NoReturn.INF, description="What a beam without distance reports.")
+    noise: LengthOrZero = Field(0.0, description="Standard deviation of a measured distance.")
+    pose: PoseInPlane = Field(ORIGIN, description="Where it sits on the robot.")
+    frame: str = Field("base_scan", min_length=1, description="`header.frame_id`.")
+    starts: DurationOrZero = Field(0.0, description="No scan before this time.")
+    stops: DurationOrZero | None = Field(None, description="No scan from this time on.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> LidarOptions:
+        if self.range_min >= self.range_max:
+            raise ValueError("range_min must be less than range_max")
+        return self
+
+
+class DriftOptions(Model):
+    """Errors of the wheel odometry, drawn from the seed; all are off unless given."""
+
+    radius: Ratio = Field(
+        0.0, description="Standard deviation of each wheel's radius, constant in a run."
+    )
+    separation: Ratio = Field(
+        0.0, description="Standard deviation of the wheel separation, constant in a run."
+    )
+    slip: Annotated[float, Metres()] = Field(
+        0.0,
+        ge=0.0,
+        description="Standard deviation of a wheel's way after one metre; it grows with the "
+        "square root of the way.",
+    )
+
+    @property
+    def is_off(self) -> bool:
+        """Whether odometry is exact."""
+        return not (self.radius or self.separation or self.slip)
+
+
+class CovarianceOptions(Model):
+    """Variances that odometry reports, as Gazebo Classic's diff drive does (m² and rad²)."""
+
+    x: float = Field(1e-5, ge=0.0)
+    y: float = Field(1e-5, ge=0.0)
+    yaw: float = Field(1e-3, ge=0.0)
+
+
+class OdometryOptions(Model):
+    """The wheel odometry."""
+
+    enabled: bool = Field(True, description="Whether there is one.")
+    rate: Rate = Field(30.0, description="Messages in a second, at most 100 Hz.")
+    frame: str = Field("odom", min_length=1, description="`header.frame_id`.")
+    child_frame: str = Field("base_footprint", min_length=1, description="`child_frame_id`.")
+    origin: OdometryOrigin = Field(
+        OdometryOrigin.WORLD,
+        description="Where `odom` is: with `world` the coordinates of the world file are those "
+        "of odometry.",
+    )
+    drift: DriftOptions = Field(default_factory=DriftOptions, description="Errors.")
+    covariance: CovarianceOptions = Field(
+        default_factory=CovarianceOptions, description="Variances that are reported."
+    )
+    starts: DurationOrZero = Field(0.0, description="No odometry before this time.")
+    stops: DurationOrZero | None = Field(None, description="No odometry from this time on.")
+
+
+class TopicOptions(Model):
+    """A topic with its QoS."""
+
+    topic: TopicName = Field(description="Fully qualified name.")
+    reliability: Literal["reliable", "best_effort"] = Field("reliable")
+    durability: Literal["volatile", "transient_local"] = Field("volatile")
+    depth: int = Field(10, ge=1, le=10_000)
+
+
+class CommandTopic(TopicOptions):
+    """The topic of velocity commands."""
+
+    topic: TopicName = Field("/cmd_vel", description="Fully qualified name.")
+    type: Literal["geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"] = Field(
+        "geometry_msgs/msg/Twist", description="A publisher of the other type does not match."
+    )
+
+
+class OdometryTopic(TopicOptions):
+    """The topic of odometry."""
+
+    topic: TopicName = Field("/odom", description="Fully qualified name.")
+
+
+class ScanTopic(TopicOptions):
+    """The topic of scans."""
+
+    topic: TopicName = Field("/scan", description="Fully qualified name.")
+
+
+class ClockTopic(TopicOptions):
+    """The topic of simulated time, for nodes with ``use_sim_time``."""
+
+    enabled: bool = Field(False, description="Whether it is published.")
+    topic: TopicName = Field("/clock", description="Fully qualified name.")
+
+
+class TransformTopic(TopicOptions):
+    """The topic of transforms; published where the package tf2_msgs is installed."""
+
+    enabled: bool = Field(True, description="Whether they are published.")
+    topic: TopicName = Field("/tf", description="Fully qualified name.")
+    static_topic: TopicName = Field("/tf_static", description="For the pose of the LiDAR.")
+
+
+class Topics(Model):
+    """All topics."""
+
+    command: CommandTopic = Field(default_factory=CommandTopic)
+    odometry: OdometryTopic = Field(default_factory=OdometryTopic)
+    scan: ScanTopic = Field(default_factory=ScanTopic)
+    clock: ClockTopic = Field(default_factory=ClockTopic)
+    tf: TransformTopic = Field(default_factory=TransformTopic)
+
+
+class SimulatorOptions(Model):
+    """Everything about the simulator but the world."""
+
+    robot: RobotOptions = Field(default_factory=RobotOptions)
+    lidar: LidarOptions = Field(default_factory=LidarOptions)
+    odometry: OdometryOptions = Field(default_factory=OdometryOptions)
+    topics: Topics = Field(default_factory=Topics)
+
+    def start(self, world_start: Pose) -> Pose:
+        """Where the robot starts in a world with this ``start``."""
+        return self.robot.pose if self.robot.pose is not None else world_start
+
+
+def read_options(file: Path) -> SimulatorOptions:
+    """Read simulator options from a file of their own.
+
+    Raises:
+        UsageError: The file cannot be read.
+        AssignmentError: It says something that it must not; with file and line.
+    """
+    return read_source(file).read(SimulatorOptions)

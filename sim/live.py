@@ -1,0 +1,298 @@
+"""The simulator alone, for a student to drive against, with a live view in the terminal."""
+
+from __future__ import annotations
+
+import math
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+import rclpy
+from pydantic import TypeAdapter, ValidationError
+from rclpy.context import Context
+from rclpy.signals import SignalHandlerOptions
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from grader.errors import UsageError
+from grader.nearest import did_you_mean
+from sim.coordinates import PoseInPlane
+from sim.description import SimulatorOptions, read_options
+from sim.lidar import Scan
+from sim.motion import NS, Pose
+from sim.node import RosSimulator, make_node
+from sim.pacing import Lateness
+from sim.robot import MODELS
+from sim.simulation import Simulation, Step, make_simulation
+from sim.view import Layer, draw, hit_points, range_towards
+from sim.world import Values, World, read_world
+
+_STYLES = {
+    Layer.EMPTY: "",
+    Layer.WALL: "bold",
+    Layer.MOVING: "bold magenta",
+    Layer.HIT: "red",
+    Layer.FOOTPRINT: "green",
+    Layer.ROBOT: "bold green",
+}
+_REFRESH_NS = 100_000_000
+_LINE_NS = NS
+_SUMMARY_LINES = 9
+
+
+def run(
+    world_file: Path,
+    *,
+    options_file: Path | None = None,
+    robot: str | None = None,
+    pose: str | None = None,
+    seed: int = 0,
+    domain_id: int | None = None,
+    values: Values | None = None,
+    duration_s: float | None = None,
+    output: TextIO | None = None,
+) -> None:
+    """Simulate in real time until Ctrl-C.
+
+    Args:
+        world_file: The world.
+        options_file: Robot, sensors and topics; if left out, the defaults.
+        robot: ``burger`` or ``waffle``, instead of what the options say.
+        pose: Start such as ``"1, 0.5, 90 deg"``, instead of what options and world say.
+        seed: Of noise and drift.
+        domain_id: ROS domain; if left out, ROS_DOMAIN_ID.
+        values: For the ``$names`` of the world.
+        duration_s: End after so much simulated time, or None.
+        output: Where to write; if it is no terminal, one line in a second.
+
+    Raises:
+        UsageError: A file cannot be read, or there is no such robot or pose.
+        AssignmentError: A file says something that it must not.
+    """
+    world = read_world(world_file, values)
+    options = _options(options_file, robot, pose)
+    simulation = make_simulation(world, options, seed)
+    context = Context()
+    # Ctrl-C is ours: rclpy's handler would shut the context down within a step.
+    rclpy.init(
+        args=[],
+        context=context,
+        domain_id=domain_id,
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
+    try:
+        node: Any = make_node("rosgrade_sim", context)
+        screen = Screen(world, simulation, options)
+        simulator = RosSimulator(node, simulation, options, screen)
+        screen.simulator = simulator
+        with _until_interrupted() as stop:
+            _loop(simulator, screen, stop, duration_s, output or sys.stdout)
+        node.destroy_node()
+    finally:
+        context.try_shutdown()
+
+
+def _loop(
+    simulator: RosSimulator,
+    screen: Screen,
+    stop: threading.Event,
+    duration_s: float | None,
+    output: TextIO,
+) -> None:
+    end_ns = None if duration_s is None else round(duration_s * NS)
+    with screen.shown(output) as show:
+        deadline_ns = simulator.start()
+        while not stop.is_set() and (end_ns is None or screen.time_ns < end_ns):
+            wait_s = (deadline_ns - time.monotonic_ns()) / NS
+            if wait_s > 0.0 and stop.wait(wait_s):
+                break
+            deadline_ns = simulator.catch_up()
+            if deadline_ns > time.monotonic_ns():  # never draw while steps wait
+                show()
+
+
+class Screen:
+    """What is shown; takes the truth from the simulator as its sink."""
+
+    def __init__(self, world: World, simulation: Simulation, options: SimulatorOptions) -> None:
+        """Begin with nothing to show."""
+        self.simulator: RosSimulator | None = None
+        self._world, self._simulation, self._options = world, simulation, options
+        self._step: Step | None = None
+        self._scan: tuple[Scan, Pose] | None = None
+        self._late_steps = 0
+        self._worst_late_ns = 0
+        self._rejected = 0
+        self._shown_ns = 0
+
+    @property
+    def time_ns(self) -> int:
+        """Simulated time of what is shown."""
+        return self._step.time_ns if self._step else 0
+
+    def on_step(self, step: Step, stamp_ns: int) -> None:
+        """Keep the newest step and the newest scan."""
+        self._step = step
+        self._rejected += sum(event.kind.value == "command_rejected" for event in step.events)
+        if step.scan is not None:
+            self._scan = (step.scan, step.pose)
+
+    def on_late(self, lateness: Lateness) -> None:
+        """Count late steps."""
+        self._late_steps += lateness.steps
+        self._worst_late_ns = max(self._worst_late_ns, lateness.late_ns)
+
+    @contextmanager
+    def shown(self, output: TextIO) -> Iterator[_Show]:
+        """Show it while the block runs: a live view on a terminal, else a line in a second."""
+        if not output.isatty():
+            yield _Show(self, _LINE_NS, lambda: print(self.line(), file=output, flush=True))
+            return
+        console = Console(file=output)
+        # We refresh it ourselves between two steps; a thread of rich's would disturb them.
+        with Live(console=console, screen=True, auto_refresh=False, redirect_stdout=False) as live:
+            yield _Show(self, _REFRESH_NS, lambda: live.update(self.picture(console), refresh=True))
+
+    def line(self) -> str:
+        """Everything that matters in one line."""
+        step = self._step
+        if step is None:
+            return "starting"
+        text = (
+            f"{step.time_ns / NS:8.2f} s  x {step.pose.x_m:+.3f} m  y {step.pose.y_m:+.3f} m  "
+            f"yaw {math.degrees(step.pose.yaw_rad):+.1f} deg  "
+            f"v {step.twist.linear_m_s:+.3f} m/s  w {step.twist.angular_rad_s:+.3f} rad/s  "
+            f"ahead {self._range(0.0)}"
+        )
+        if step.contact:
+            text += f"  CONTACT with {step.contact}"
+        if self._late_steps:
+            text += f"  {self._late_steps} steps late"
+        return text
+
+    def picture(self, console: Console) -> Group:
+        """The live view."""
+        columns, lines = console.size
+        rows = max(4, lines - _SUMMARY_LINES - 1)
+        robot = self._simulation.robot.model
+        pose = self._simulation.pose
+        scan, at = self._scan or (None, pose)
+        hits = hit_points(self._simulation.lidar, scan, at) if scan else []
+        cells = draw(self._world, pose, robot.radius_m, self.time_ns, columns, rows, hits)
+        text = Text(no_wrap=True)
+        for line in cells:
+            for cell in line:
+                text.append(cell.character, _STYLES[cell.layer])
+            text.append("\n")
+        return Group(text, self._summary())
+
+    def _summary(self) -> Table:
+        table = Table.grid(padding=(0, 2))
+        step, model = self._step, self._simulation.robot.model
+        if step is None:
+            return table
+        degrees = math.degrees(step.pose.yaw_rad)
+        table.add_row(
+            f"{self._world.file.name}, {model.name}", f"{step.time_ns / NS:.1f} s", "Ctrl-C ends"
+        )
+        table.add_row(
+            "pose", f"x {step.pose.x_m:+.3f} m", f"y {step.pose.y_m:+.3f} m", f"{degrees:+.1f} deg"
+        )
+        for name, twist in (("velocity", step.twist), ("command", step.command)):
+            table.add_row(name, f"{twist.linear_m_s:+.3f} m/s", f"{twist.angular_rad_s:+.3f} rad/s")
+        table.add_row(
+            "scan",
+            f"ahead {self._range(0.0)}",
+            f"left {self._range(math.pi / 2)}",
+            f"behind {self._range(math.pi)}",
+            f"right {self._range(-math.pi / 2)}",
+        )
+        touching = f"[bold red]with {step.contact}[/]" if step.contact else "none"
+        table.add_row("contact", touching)
+        table.add_row("topics", *self._topics())
+        if self._late_steps:
+            worst = f"{self._worst_late_ns / 1e6:.0f} ms"
+            table.add_row("late", f"{self._late_steps} steps", f"at most {worst}")
+        return table
+
+    def _topics(self) -> list[str]:
+        simulator, topics = self.simulator, self._options.topics
+        if simulator is None:
+            return []
+        publishers = simulator.command.get_publisher_count()
+        odometry = simulator.odometry.publisher.get_subscription_count()
+        scan = simulator.scan.publisher.get_subscription_count()
+        rejected = f", {self._rejected} not finite" if self._rejected else ""
+        return [
+            f"{topics.command.topic}: {publishers} publishers",
+            f"{simulator.commands} commands{rejected}",
+            f"{topics.odometry.topic}: {odometry} subscriptions",
+            f"{topics.scan.topic}: {scan} subscriptions",
+        ]
+
+    def _range(self, direction_rad: float) -> str:
+        if self._scan is None:
+            return "no scan"
+        return f"{range_towards(self._simulation.lidar, self._scan[0], direction_rad):.2f} m"
+
+
+class _Show:
+    """Calls a function whenever so much simulated time has passed."""
+
+    def __init__(self, screen: Screen, every_ns: int, show: Callable[[], object]) -> None:
+        self._screen, self._every_ns, self._show = screen, every_ns, show
+        self._next_ns = every_ns
+
+    def __call__(self) -> None:
+        time_ns = self._screen.time_ns
+        if time_ns >= self._next_ns:
+            self._next_ns = (time_ns // self._every_ns + 1) * self._every_ns
+            self._show()
+
+
+@contextmanager
+def _until_interrupted() -> Iterator[threading.Event]:
+    """An event that SIGINT and SIGTERM set, while the block runs."""
+    stop = threading.Event()
+    before = {
+        number: signal.signal(number, lambda *_: stop.set())
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _options(file: Path | None, robot: str | None, pose: str | None) -> SimulatorOptions:
+    options = read_options(file) if file else SimulatorOptions()
+    changes: dict[str, object] = {}
+    if robot is not None:
+        if robot not in MODELS:
+            known = ", ".join(MODELS)
+            raise UsageError(f"there is no robot {robot!r} ({known}).{did_you_mean(robot, MODELS)}")
+        changes["model"] = robot
+    if pose is not None:
+        changes["pose"] = parse_pose(pose)
+    return options.model_copy(update={"robot": options.robot.model_copy(update=changes)})
+
+
+def parse_pose(text: str) -> Pose:
+    """Read a pose from a command line, such as ``"1, 0.5, 90 deg"``.
+
+    Raises:
+        UsageError: It is not one.
+    """
+    entries = [part.strip() for part in text.strip().strip("[]").split(",")]
+    try:
+        return TypeAdapter(PoseInPlane).validate_python(entries)
+    except ValidationError as error:
+        raise UsageError(f"--pose: {error.errors()[0]['msg']}") from None

@@ -1,0 +1,185 @@
+"""What the simulator says on its topics: one class for each topic, with messages reused.
+
+Only what changes from one message to the next is written again.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from array import array
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Quaternion, TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+
+from sim.description import OdometryOptions, TopicOptions, TransformTopic
+from sim.lidar import Lidar, Scan
+from sim.motion import NS, Pose
+from sim.odometry import OdometrySample
+
+UNKNOWN_VARIANCE = 1e12
+"""Variance of what wheels cannot tell (z, roll, pitch), as Gazebo Classic's diff drive reports."""
+
+
+def qos_profile(options: TopicOptions) -> QoSProfile:
+    """The QoS that the YAML describes."""
+    # Any: rclpy is typed in parts only.
+    make: Any = QoSProfile
+    profile: QoSProfile = make(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=options.depth,
+        reliability=ReliabilityPolicy[options.reliability.upper()],
+        durability=DurabilityPolicy[options.durability.upper()],
+    )
+    return profile
+
+
+class OdometryPublisher:
+    """Publishes nav_msgs/msg/Odometry."""
+
+    def __init__(self, node: Node, topic: TopicOptions, options: OdometryOptions) -> None:
+        """Create the publisher."""
+        self._message = Odometry()
+        self._message.header.frame_id = options.frame
+        self._message.child_frame_id = options.child_frame
+        variances = options.covariance
+        diagonal = (variances.x, variances.y, *[UNKNOWN_VARIANCE] * 3, variances.yaw)
+        for index, variance in enumerate(diagonal):
+            self._message.pose.covariance[7 * index] = variance
+            self._message.twist.covariance[7 * index] = variance
+        self.publisher = _publisher(node, Odometry, topic.topic, qos_profile(topic))
+
+    def publish(self, sample: OdometrySample, stamp_ns: int) -> None:
+        """Publish a sample.
+
+        Args:
+            sample: What odometry says.
+            stamp_ns: ROS time of it.
+        """
+        message = self._message
+        _set_time(message.header.stamp, stamp_ns)
+        message.pose.pose.position.x = sample.pose.x_m
+        message.pose.pose.position.y = sample.pose.y_m
+        _set_yaw(message.pose.pose.orientation, sample.pose.yaw_rad)
+        message.twist.twist.linear.x = sample.twist.linear_m_s
+        message.twist.twist.angular.z = sample.twist.angular_rad_s
+        self.publisher.publish(message)
+
+
+class ScanPublisher:
+    """Publishes sensor_msgs/msg/LaserScan."""
+
+    def __init__(self, node: Node, topic: TopicOptions, lidar: Lidar) -> None:
+        """Create the publisher."""
+        self._message = LaserScan()
+        self._message.header.frame_id = lidar.options.frame
+        self._message.angle_min = lidar.angle_min_rad
+        self._message.angle_max = lidar.angle_max_rad
+        self._message.angle_increment = lidar.angle_increment_rad
+        self._message.time_increment = 0.0
+        self._message.scan_time = lidar.scan_time_s
+        self._message.range_min = lidar.options.range_min
+        self._message.range_max = lidar.options.range_max
+        self.publisher = _publisher(node, LaserScan, topic.topic, qos_profile(topic))
+
+    def publish(self, scan: Scan, stamp_ns: int) -> None:
+        """Publish a scan.
+
+        Args:
+            scan: What was measured.
+            stamp_ns: ROS time of it.
+        """
+        _set_time(self._message.header.stamp, stamp_ns)
+        # An array('f') is taken over as it is; a list would be checked number by number.
+        self._message.ranges = array("f", scan.ranges_m.tobytes())
+        self.publisher.publish(self._message)
+
+
+class ClockPublisher:
+    """Publishes rosgraph_msgs/msg/Clock."""
+
+    def __init__(self, node: Node, topic: TopicOptions) -> None:
+        """Create the publisher."""
+        self._message = Clock()
+        self.publisher = _publisher(node, Clock, topic.topic, qos_profile(topic))
+
+    def publish(self, stamp_ns: int) -> None:
+        """Publish a ROS time."""
+        _set_time(self._message.clock, stamp_ns)
+        self.publisher.publish(self._message)
+
+
+class TransformPublisher:
+    """Publishes odom -> base_footprint, and once base_footprint -> base_scan."""
+
+    def __init__(
+        self, node: Node, topic: TransformTopic, odometry: OdometryOptions, lidar: Lidar, tf: Any
+    ) -> None:
+        """Create the publishers.
+
+        Args:
+            node: Of whom.
+            topic: Names and QoS; the static transform is always transient-local.
+            odometry: Names of the frames.
+            lidar: Where it sits.
+            tf: The type tf2_msgs/msg/TFMessage (see :func:`transform_type`).
+        """
+        self._moving = TransformStamped()
+        self._moving.header.frame_id = odometry.frame
+        self._moving.child_frame_id = odometry.child_frame
+        self._fixed = TransformStamped()
+        self._fixed.header.frame_id = odometry.child_frame
+        self._fixed.child_frame_id = lidar.options.frame
+        self._lidar_pose = lidar.options.pose
+        self._type = tf
+        self._message = tf(transforms=[self._moving])
+        self.publisher = _publisher(node, tf, topic.topic, qos_profile(topic))
+        latched = topic.model_copy(update={"durability": "transient_local", "depth": 1})
+        self.static_publisher = _publisher(node, tf, topic.static_topic, qos_profile(latched))
+
+    def publish_static(self, stamp_ns: int) -> None:
+        """Publish where the LiDAR sits; late joiners get it too."""
+        _set_transform(self._fixed, self._lidar_pose, stamp_ns)
+        self.static_publisher.publish(self._type(transforms=[self._fixed]))
+
+    def publish(self, sample: OdometrySample, stamp_ns: int) -> None:
+        """Publish where odometry believes the robot to be."""
+        _set_transform(self._moving, sample.pose, stamp_ns)
+        self.publisher.publish(self._message)
+
+
+def transform_type() -> Any | None:
+    """The type tf2_msgs/msg/TFMessage, or None where tf2_msgs is not installed."""
+    try:
+        return importlib.import_module("tf2_msgs.msg").TFMessage
+    except ImportError:
+        return None
+
+
+def _publisher(node: Node, message_type: Any, topic: str, qos: QoSProfile) -> Any:
+    # Without event callbacks the publisher needs no executor.
+    callbacks = PublisherEventCallbacks(use_default_callbacks=False)
+    return node.create_publisher(message_type, topic, qos, event_callbacks=callbacks)
+
+
+def _set_transform(transform: TransformStamped, pose: Pose, stamp_ns: int) -> None:
+    _set_time(transform.header.stamp, stamp_ns)
+    transform.transform.translation.x = pose.x_m
+    transform.transform.translation.y = pose.y_m
+    _set_yaw(transform.transform.rotation, pose.yaw_rad)
+
+
+def _set_time(time: Time, stamp_ns: int) -> None:
+    time.sec, time.nanosec = divmod(stamp_ns, NS)
+
+
+def _set_yaw(quaternion: Quaternion, yaw_rad: float) -> None:
+    quaternion.z = math.sin(0.5 * yaw_rad)
+    quaternion.w = math.cos(0.5 * yaw_rad)

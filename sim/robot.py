@@ -1,0 +1,130 @@
+"""The robot: a differential drive with limits of speed and acceleration.
+
+Pure functions of a state; no clock, no random numbers, no walls (see :mod:`sim.contact`).
+
+Sources of the figures:
+
+- Speeds, wheel separation: ROBOTIS e-Manual, TurtleBot3, "Features", Hardware Specifications
+  (https://emanual.robotis.com/docs/en/platform/turtlebot3/features/).
+- Wheel separation and radius again, linear acceleration 1.0 m/s²: the DiffDrive system in
+  ``turtlebot3_gazebo/models/turtlebot3_{burger,waffle}/model.sdf`` of
+  ROBOTIS-GIT/turtlebot3_simulations. That file leaves braking and turning unlimited; here the
+  same limit holds for braking (our choice: a robot that stops within one step would teach
+  the wrong thing).
+- Angular acceleration 3.2 rad/s² and radius of the footprint: ``acc_lim_theta`` and
+  ``robot_radius`` in ``turtlebot3_navigation2/param/{burger,waffle}.yaml`` of
+  ROBOTIS-GIT/turtlebot3 (for the Waffle the radius of the global costmap).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sim.motion import REST, Pose, Twist, integrate
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the drive can do, the same forwards and backwards.
+
+    Attributes:
+        speed_m_s: Greatest speed.
+        angular_speed_rad_s: Greatest angular speed.
+        acceleration_m_s2: Greatest change of speed, speeding up or braking.
+        angular_acceleration_rad_s2: Greatest change of angular speed.
+    """
+
+    speed_m_s: float
+    angular_speed_rad_s: float
+    acceleration_m_s2: float
+    angular_acceleration_rad_s2: float
+
+
+@dataclass(frozen=True, slots=True)
+class RobotModel:
+    """A kind of robot.
+
+    Attributes:
+        name: As in TURTLEBOT3_MODEL.
+        limits: What its drive can do.
+        radius_m: Radius of its circular footprint around base_footprint.
+        wheel_separation_m: Distance between its wheels.
+    """
+
+    name: str
+    limits: Limits
+    radius_m: float
+    wheel_separation_m: float
+
+
+BURGER = RobotModel("burger", Limits(0.22, 2.84, 1.0, 3.2), 0.10, 0.160)
+WAFFLE = RobotModel("waffle", Limits(0.26, 1.82, 1.0, 3.2), 0.22, 0.287)
+MODELS = {model.name: model for model in (BURGER, WAFFLE)}
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A robot at a moment.
+
+    Attributes:
+        pose: In the world's frame.
+        twist: The velocity of the step that led here.
+    """
+
+    pose: Pose
+    twist: Twist = REST
+
+
+def velocity(twist: Twist, command: Twist, dt_s: float, limits: Limits) -> Twist:
+    """The velocity during the next step: as near to the command as the limits allow.
+
+    Args:
+        twist: The velocity now.
+        command: What is asked for; must be finite.
+        dt_s: Length of the step.
+        limits: What the drive can do; linear and angular are limited one by one, as
+            Gazebo's DiffDrive does.
+    """
+    return Twist(
+        _approach(
+            twist.linear_m_s,
+            command.linear_m_s,
+            limits.speed_m_s,
+            limits.acceleration_m_s2 * dt_s,
+        ),
+        _approach(
+            twist.angular_rad_s,
+            command.angular_rad_s,
+            limits.angular_speed_rad_s,
+            limits.angular_acceleration_rad_s2 * dt_s,
+        ),
+    )
+
+
+def step(state: State, command: Twist, dt_s: float, limits: Limits) -> State:
+    """Move for one step in free space.
+
+    The velocity changes at the beginning of the step and is constant in it, so that the path
+    is an exact arc.
+
+    Args:
+        state: Before the step.
+        command: What is asked for; must be finite.
+        dt_s: Length of the step.
+        limits: What the drive can do.
+
+    Returns:
+        The state after it. A robot at rest that is asked for nothing is returned as it is.
+    """
+    twist = velocity(state.twist, command, dt_s, limits)
+    if twist == REST and state.twist == REST:
+        return state
+    return State(integrate(state.pose, twist.linear_m_s, twist.angular_rad_s, dt_s), twist)
+
+
+def _approach(now: float, wanted: float, limit: float, change: float) -> float:
+    wanted = min(max(wanted, -limit), limit)
+    if abs(wanted - now) <= change:
+        return wanted + 0.0  # a commanded -0.0 becomes 0.0
+    return now + math.copysign(change, wanted - now)

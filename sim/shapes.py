@@ -1,0 +1,127 @@
+"""Shapes that stand in a world, reduced to what the rest computes with.
+
+Everything is made of *capsules*: all points within ``radius`` of a line segment. A wall is a
+capsule of radius zero, a circle is a capsule whose segment is a point. So one distance
+formula serves contact with any shape.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from sim.motion import Pose
+
+Capsule = tuple[float, float, float, float, float]
+"""x1, y1, x2, y2, radius in metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A shape in the frame it is given in.
+
+    Attributes:
+        label: Where it is in the YAML, such as ``boxes[2]``.
+        line: Its line in the file, or None for a shape that was not read from one.
+        capsules: Its outline.
+        corners: Corners of the area that it fills, in order; empty for a wall without an
+            inside and for a circle.
+    """
+
+    label: str
+    capsules: tuple[Capsule, ...]
+    line: int | None = None
+    corners: tuple[tuple[float, float], ...] = ()
+
+    def clearance_m(self, x_m: float, y_m: float) -> float:
+        """Distance from a point to the shape, negative inside it."""
+        nearest_m = min(point_clearance_m(x_m, y_m, capsule) for capsule in self.capsules)
+        return -abs(nearest_m) if self.contains(x_m, y_m) else nearest_m
+
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Whether a point is inside the area that the shape fills (even-odd rule)."""
+        inside = False
+        for (ax, ay), (bx, by) in zip(
+            self.corners, self.corners[1:] + self.corners[:1], strict=True
+        ):
+            if (ay > y_m) != (by > y_m) and x_m < ax + (y_m - ay) * (bx - ax) / (by - ay):
+                inside = not inside
+        return inside
+
+
+def wall(label: str, x1: float, y1: float, x2: float, y2: float, line: int | None = None) -> Shape:
+    """A straight wall without thickness."""
+    return Shape(label, ((x1, y1, x2, y2, 0.0),), line)
+
+
+def circle(label: str, x_m: float, y_m: float, radius_m: float, line: int | None = None) -> Shape:
+    """A round pillar."""
+    return Shape(label, ((x_m, y_m, x_m, y_m, radius_m),), line)
+
+
+def polygon(label: str, corners: tuple[tuple[float, float], ...], line: int | None = None) -> Shape:
+    """A filled polygon; the last corner is joined to the first."""
+    edges = zip(corners, corners[1:] + corners[:1], strict=True)
+    capsules = tuple((ax, ay, bx, by, 0.0) for (ax, ay), (bx, by) in edges)
+    return Shape(label, capsules, line, corners)
+
+
+def box(label: str, pose: Pose, size_m: tuple[float, float], line: int | None = None) -> Shape:
+    """A filled rectangle.
+
+    Args:
+        label: See :class:`Shape`.
+        pose: Its centre and the direction of its length.
+        size_m: Length (along x at yaw 0) and width.
+        line: See :class:`Shape`.
+    """
+    half_x, half_y = 0.5 * size_m[0], 0.5 * size_m[1]
+    cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
+    corners = tuple(
+        (pose.x_m + cos * x - sin * y, pose.y_m + sin * x + cos * y)
+        for x, y in ((half_x, half_y), (-half_x, half_y), (-half_x, -half_y), (half_x, -half_y))
+    )
+    return polygon(label, corners, line)
+
+
+def point_clearance_m(x_m: float, y_m: float, capsule: Capsule) -> float:
+    """Distance from a point to a capsule; negative inside it."""
+    x1, y1, x2, y2, radius = capsule
+    return _point_segment_m(x_m, y_m, x1, y1, x2, y2) - radius
+
+
+def chord_clearance_m(ax: float, ay: float, bx: float, by: float, capsule: Capsule) -> float:
+    """Least distance from any point of the segment a-b to a capsule; negative inside it."""
+    x1, y1, x2, y2, radius = capsule
+    if x1 == x2 and y1 == y2:
+        return _point_segment_m(x1, y1, ax, ay, bx, by) - radius
+    side_a = (x2 - x1) * (ay - y1) - (y2 - y1) * (ax - x1)
+    side_b = (x2 - x1) * (by - y1) - (y2 - y1) * (bx - x1)
+    if side_a * side_b < 0.0:
+        side_1 = (bx - ax) * (y1 - ay) - (by - ay) * (x1 - ax)
+        side_2 = (bx - ax) * (y2 - ay) - (by - ay) * (x2 - ax)
+        if side_1 * side_2 < 0.0:
+            return -radius
+    # Two segments that do not cross are nearest at an end of one of them.
+    return (
+        min(
+            _point_segment_m(ax, ay, x1, y1, x2, y2),
+            _point_segment_m(bx, by, x1, y1, x2, y2),
+            _point_segment_m(x1, y1, ax, ay, bx, by),
+            _point_segment_m(x2, y2, ax, ay, bx, by),
+        )
+        - radius
+    )
+
+
+def _point_segment_m(px: float, py: float, x1: float, y1: float, x2: float, y2: float) -> float:
+    ex, ey, qx, qy = x2 - x1, y2 - y1, px - x1, py - y1
+    square = ex * ex + ey * ey
+    if square > 0.0:
+        along = (qx * ex + qy * ey) / square
+        if along >= 1.0:
+            return math.hypot(px - x2, py - y2)
+        if along > 0.0:
+            # The cross product keeps its precision where subtracting the foot would not.
+            return abs(ex * qy - ey * qx) / math.sqrt(square)
+    return math.hypot(qx, qy)

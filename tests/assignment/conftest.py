@@ -1,0 +1,78 @@
+"""A small catalogue, and assignments written for one test."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.quantity import Duration
+from grader.assignment.model import InterfaceName, TopicName
+from grader.checks.check import Check, NoParameters, Parameters, Subject
+from grader.checks.finding import Finding
+from tests.assignment.lessons import GOOD
+
+
+class _Package(Parameters):
+    package: str
+
+
+class _Executable(Parameters):
+    package: str
+    executable: str
+
+
+class _Topic(Parameters):
+    topic: TopicName
+
+
+class _Type(Parameters):
+    topic: TopicName
+    type: InterfaceName
+
+
+class _Period(Parameters):
+    topic: TopicName
+    period: Duration
+
+
+def _never(subject: object, parameters: Parameters) -> Finding:
+    """Something is right."""
+    raise AssertionError("loading must not judge")
+
+
+def _check(name: str, subject: Subject, parameters: type[Parameters] = NoParameters) -> Check:
+    return Check(name, subject, parameters, _never)
+
+
+_SMALL = (
+    _check("package.builds", Subject.SUBMISSION, _Package),
+    _check("package.executable", Subject.SUBMISSION, _Executable),
+    _check("node.alive", Subject.RECORDING),
+    _check("topic.published", Subject.RECORDING, _Topic),
+    _check("topic.type", Subject.RECORDING, _Type),
+    _check("messages.count", Subject.RECORDING, _Topic),
+    _check("timing.period", Subject.RECORDING, _Period),
+)
+
+
+@pytest.fixture(scope="session")
+def catalogue() -> dict[str, Check]:
+    return {check.name: check for check in _SMALL}
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    """Write ``lesson/assignment.yaml`` (and files beside it); returns its folder."""
+
+    def _write(yaml: str = GOOD, **beside: str) -> Path:
+        folder = tmp_path / "lesson"
+        folder.mkdir(exist_ok=True)
+        (folder / "assignment.yaml").write_text(yaml, encoding="utf-8")
+        for name, content in beside.items():
+            (folder / f"{name}.py").write_text(textwrap.dedent(content), encoding="utf-8")
+        return folder
+
+    return _write

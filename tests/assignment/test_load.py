@@ -1,0 +1,392 @@
+"""Loading finds everything in an assignment that does not fit together, with its line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import FrozenInstanceError
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.load import (
+    find_assignment,
+    folder_sha256,
+    list_assignments,
+    load_assignment,
+)
+from grader.checks.check import Check
+from grader.errors import AssignmentError, UsageError
+from tests.assignment.lessons import GOOD, HEAD
+
+Write = Callable[..., Path]
+Catalogue = Mapping[str, Check]
+
+
+@pytest.fixture
+def mistakes(write: Write, catalogue: Catalogue) -> Callable[[str], list[str]]:
+    """Load an assignment; each mistake as ``line: text``."""
+
+    def _mistakes(yaml: str) -> list[str]:
+        folder = write(yaml)
+        try:
+            load_assignment(folder, catalogue)
+        except AssignmentError as error:
+            return [
+                line.removeprefix(f"{folder / 'assignment.yaml'}:")
+                for line in str(error).splitlines()
+            ]
+        return []
+
+    return _mistakes
+
+
+Mistakes = Callable[[str], list[str]]
+
+
+def test_a_loaded_assignment_has_its_checks_bound(write: Write, catalogue: Catalogue) -> None:
+    folder = write(
+        HEAD
+        + "  - {id: period, uses: timing.period, points: 2, "
+        + "with: {topic: /cmd_vel, period: 300 ms}}\n"
+    )
+    loaded = load_assignment(folder, catalogue)
+    (bound,) = loaded.checks
+    assert loaded.folder == folder
+    assert bound.check is catalogue["timing.period"]
+    assert bound.parameters.period == pytest.approx(0.3)
+    assert bound.title == "Something is right"
+    assert [scenario.id for scenario in loaded.scenarios_of(bound)] == ["run"]
+    with pytest.raises(FrozenInstanceError):
+        loaded.sha256 = ""  # type: ignore[misc]
+
+
+def test_a_check_of_the_submission_has_no_scenarios(write: Write, catalogue: Catalogue) -> None:
+    folder = write(HEAD + "  - {id: b, uses: package.builds, points: 1, with: {package: bot}}\n")
+    loaded = load_assignment(folder, catalogue)
+    assert loaded.scenarios_of(loaded.checks[0]) == ()
+
+
+def test_the_title_in_the_yaml_wins(write: Write, catalogue: Catalogue) -> None:
+    loaded = load_assignment(
+        write(HEAD + "  - {id: a, title: It lives, uses: node.alive, points: 1}\n"), catalogue
+    )
+    assert loaded.checks[0].title == "It lives"
+
+
+@pytest.mark.parametrize(
+    ("check", "said"),
+    [
+        (
+            "{id: a, points: 1}",
+            "checks[0]: says neither what it 'uses' (a check of the catalogue) nor 'python' "
+            "(an own check)",
+        ),
+        (
+            "{id: a, points: 1, uses: node.alive, python: 'checks.py:mine'}",
+            "checks[0]: give either 'uses' or 'python', not both",
+        ),
+        (
+            "{id: a, points: 1, uses: node.alife}",
+            "checks[0].uses: there is no check 'node.alife'. Did you mean 'node.alive'?",
+        ),
+        (
+            "{id: a, points: 1, uses: xyz}",
+            "checks[0].uses: there is no check 'xyz'. The checks are: messages.count, node.alive, "
+            "package.builds, package.executable, timing.period, topic.published, topic.type.",
+        ),
+        (
+            "{id: a, points: 1, uses: timing.period, with: {topic: /cmd_vel, period: 300}}",
+            "checks[0].with.period: 300 has no unit: write for example '300 s'",
+        ),
+        (
+            "{id: a, points: 1, uses: timing.period, with: {topic: /cmd_vel, perod: 3 s}}",
+            "checks[0].with.perod: unknown key 'perod'. Did you mean 'period'?",
+        ),
+        (
+            "{id: a, points: 1, uses: timing.period, with: {topic: /cmd_vel}}",
+            "checks[0].with: the key 'period' is missing",
+        ),
+        (
+            "{id: a, points: 1, uses: topic.published}",
+            "checks[0].with: the key 'topic' is missing",
+        ),
+        (
+            "{id: a, points: 1, uses: node.alive, with: {name: bot}}",
+            "checks[0].with.name: unknown key 'name'. None are allowed here.",
+        ),
+        (
+            "{id: a, points: 1, uses: node.alive, requires: [b]}",
+            "checks[0].requires[0]: there is no check 'b'. The checks are: a.",
+        ),
+        (
+            "{id: alive, points: 1, uses: node.alive, requires: [alife]}",
+            "checks[0].requires[0]: there is no check 'alife'. Did you mean 'alive'?",
+        ),
+        (
+            "{id: a, points: 1, uses: node.alive, requires: [a]}",
+            "checks[0].requires[0]: a check cannot require itself",
+        ),
+        (
+            "{id: a, points: 1, uses: node.alive, scenarios: [runs]}",
+            "checks[0].scenarios[0]: there is no scenario 'runs'. Did you mean 'run'?",
+        ),
+        (
+            "{id: a, points: 1, uses: package.builds, with: {package: bot}, scenarios: [run]}",
+            "checks[0].scenarios: 'package.builds' judges what was handed in, not a run: leave "
+            "'scenarios' out",
+        ),
+        (
+            "{id: a, points: 1, uses: package.builds, with: {package: bott}}",
+            "checks[0].with.package: 'bott' is not among 'packages'. Did you mean 'bot'?",
+        ),
+        (
+            "{id: a, points: 1, uses: package.executable, with: {package: bot, executable: pub}}",
+            "checks[0].with.executable: the package 'bot' has no executable 'pub' in 'packages'. "
+            "Did you mean 'bot_pub'?",
+        ),
+        (
+            "{id: a, points: 1, uses: messages.count, with: {topic: /cmdvel}}",
+            "checks[0].with.topic: the scenario 'run' does not record '/cmdvel'. Did you mean "
+            "'/cmd_vel'?",
+        ),
+        (
+            "{id: a, points: 1, uses: timing.period, with: {topic: /odom, period: 1 s}}",
+            "checks[0].with.topic: the scenario 'run' does not record '/odom'. It records: "
+            "/cmd_vel.",
+        ),
+        (
+            "{id: a, points: 1, uses: topic.type, with: {topic: /cmd_vel, type: a/msg/B}}",
+            "checks[0].with.type: the scenario 'run' records '/cmd_vel' as "
+            "'geometry_msgs/msg/Twist'",
+        ),
+    ],
+)
+def test_a_check_that_does_not_fit_is_told_with_its_line(
+    mistakes: Mistakes, check: str, said: str
+) -> None:
+    assert mistakes(f"{HEAD}  - {check}\n") == [f"13: {said}"]
+
+
+def test_a_topic_that_nobody_needs_recorded_may_be_judged_by_the_graph(
+    mistakes: Mistakes,
+) -> None:
+    assert not mistakes(
+        HEAD + "  - {id: a, points: 1, uses: topic.published, with: {topic: /odom}}\n"
+    )
+
+
+def test_worthless_checks_are_a_mistake_only_if_all_are(mistakes: Mistakes) -> None:
+    free = "  - {id: a, points: 0, uses: node.alive}\n"
+    assert mistakes(HEAD + free) == ["12: checks: the points of all checks add up to 0"]
+    assert not mistakes(HEAD + free + "  - {id: b, points: 0.5, uses: node.alive}\n")
+
+
+def test_names_that_stand_twice_name_the_first(mistakes: Mistakes) -> None:
+    text = """\
+rosgrade: 1
+id: lesson
+title: A lesson
+packages:
+  - {name: bot, executables: [x]}
+  - {name: bot}
+scenarios:
+  - {id: run, launch: [{package: bot, executable: x}], timeout: 1 s}
+  - id: run
+    launch: [{package: bot, executable: x}]
+    timeout: 1 s
+    record:
+      - {topic: /a, type: a/msg/B}
+      - {topic: /a, type: a/msg/B}
+checks:
+  - {id: a, points: 1, uses: node.alive}
+  - {id: b, points: 1, uses: node.alive}
+  - {id: a, points: 1, uses: node.alive}
+"""
+    assert mistakes(text) == [
+        "6: packages[1].name: 'bot' stands twice (first in line 5)",
+        "9: scenarios[1].id: 'run' stands twice (first in line 8)",
+        "14: scenarios[1].record[1].topic: '/a' is recorded twice",
+        "18: checks[2].id: 'a' stands twice (first in line 16)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "{executable: bot_pub}",
+            "{executable: bot_pup}",
+            "9: scenarios[0].launch[0].executable: the package 'bot' has no executable 'bot_pup' "
+            "in 'packages'. Did you mean 'bot_pub'?",
+        ),
+        (
+            "{executable: bot_pub}",
+            "{package: bott, executable: bot_pub}",
+            "9: scenarios[0].launch[0].package: 'bott' is not among 'packages'. Did you mean "
+            "'bot'?",
+        ),
+        (
+            "  - name: bot\n",
+            "  - name: other\n  - name: bot\n",
+            "10: scenarios[0].launch[0]: the key 'package' is missing: there is not exactly one "
+            "package (other, bot)",
+        ),
+    ],
+)
+def test_a_launch_names_what_is_handed_in(
+    mistakes: Mistakes, old: str, new: str, said: str
+) -> None:
+    assert mistakes(GOOD.replace(old, new)) == [said]
+
+
+@pytest.mark.parametrize(
+    ("until", "said"),
+    [
+        (
+            "{quiet: 5 s}",
+            "until.quiet: 5 s can never pass before the timeout of 5 s ends the scenario",
+        ),
+        (
+            "{elapsed: 1 min}",
+            "until.elapsed: 60 s can never pass before the timeout of 5 s ends the scenario",
+        ),
+    ],
+)
+def test_an_end_that_never_comes_is_a_mistake(mistakes: Mistakes, until: str, said: str) -> None:
+    text = GOOD.replace("timeout: 5 s", f"timeout: 5 s\n    until: {until}")
+    assert mistakes(text) == [f"12: scenarios[0].{said}"]
+
+
+def test_waiting_for_messages_that_are_not_recorded_is_a_mistake(mistakes: Mistakes) -> None:
+    text = GOOD.replace(
+        "record: [{topic: /cmd_vel, type: geometry_msgs/msg/Twist}]", "until: {messages: 3}"
+    )
+    assert mistakes(text) == [
+        "10: scenarios[0].until.messages: no topic is recorded: 'record' is missing"
+    ]
+
+
+def test_checks_of_a_run_need_a_scenario(mistakes: Mistakes) -> None:
+    start, end = GOOD.index("scenarios:"), GOOD.index("checks:")
+    assert mistakes(GOOD[:start] + GOOD[end:]) == [
+        "8: checks[0]: 'node.alive' judges a run, but the assignment has no scenarios"
+    ]
+
+
+def test_checks_that_wait_for_each_other_are_told_once_as_a_circle(mistakes: Mistakes) -> None:
+    text = HEAD + "".join(
+        f"  - {{id: {name}, points: 1, uses: node.alive, requires: [{required}]}}\n"
+        for name, required in [
+            ("a", ""),
+            ("b", "a, d"),
+            ("c", "b"),
+            ("d", "c"),
+            ("e", "d"),
+            ("x", "y"),
+            ("y", "x, e"),
+        ]
+    )
+    assert mistakes(text) == [
+        "14: checks[1].requires: never judged, because it requires itself: b -> d -> c -> b",
+        "18: checks[5].requires: never judged, because it requires itself: x -> y -> x",
+    ]
+
+
+def test_form_and_fit_are_told_together(mistakes: Mistakes) -> None:
+    text = HEAD.replace("timeout: 5 s", "timeout: 5") + (
+        "  - {id: a, uses: node.alife, points: 1, requires: [q]}\n"
+        "  - {id: b, uses: node.alive, point: 1, scenarios: [run]}\n"
+        "  - {id: c, uses: messages.count, points: 1, with: {topic: /nowhere}, scenarios: [run]}\n"
+        "  - {id: d, uses: node.alive, points: 1, requires: [b]}\n"
+    )
+    # The scenario is there, though it has a mistake: nothing that names it is wrong.
+    assert mistakes(text) == [
+        "11: scenarios[0].timeout: 5 has no unit: write for example '5 s'",
+        "13: checks[0].uses: there is no check 'node.alife'. Did you mean 'node.alive'?",
+        "13: checks[0].requires[0]: there is no check 'q'. The checks are: a, b, c, d.",
+        "14: checks[1].point: unknown key 'point'. Did you mean 'points'?",
+    ]
+
+
+def test_the_id_is_the_name_of_the_folder(mistakes: Mistakes) -> None:
+    assert mistakes(GOOD.replace("id: lesson", "id: other")) == [
+        "2: id: 'other' is not the name of its folder, 'lesson'"
+    ]
+
+
+def test_a_file_of_another_name_may_have_any_id(write: Write, catalogue: Catalogue) -> None:
+    folder = write()
+    draft = folder / "draft.yaml"
+    draft.write_text(GOOD.replace("id: lesson", "id: other"))
+    loaded = load_assignment(draft, catalogue)
+    assert loaded.assignment.id == "other"
+    before = loaded.sha256
+    (folder / "README.md").write_text("Unrelated to the draft.")
+    assert load_assignment(draft, catalogue).sha256 == before
+
+
+def test_an_assignment_is_found_by_id_folder_and_file(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = write() / "assignment.yaml"
+    everywhere = file.parent.parent
+    assert find_assignment("lesson", everywhere) == file
+    assert find_assignment(file, everywhere) == file
+    assert find_assignment(file.parent, everywhere) == file
+    monkeypatch.chdir(file.parent)
+    assert find_assignment(".", everywhere).resolve() == file
+
+
+def test_a_submission_in_a_folder_called_like_the_assignment_does_not_hide_it(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = write() / "assignment.yaml"
+    (tmp_path / "work" / "lesson").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "work")
+    assert find_assignment("lesson", file.parent.parent) == file
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("lessen", "no assignment 'lessen'. Did you mean 'lesson'?"),
+        ("xyz", "no assignment 'xyz'. There are: lesson."),
+        ("no/such/folder", "no/such/folder: no such file or folder"),
+        ("missing.yaml", "missing.yaml: no such file or folder"),
+    ],
+)
+def test_an_unknown_assignment_names_the_nearest(write: Write, name: str, said: str) -> None:
+    with pytest.raises(UsageError, match=re.escape(said)):
+        find_assignment(name, write().parent)
+
+
+def test_a_folder_without_an_assignment_is_told(write: Write, tmp_path: Path) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(UsageError, match=r"empty: there is no assignment\.yaml in it"):
+        find_assignment(empty, write().parent)
+
+
+def test_only_folders_with_an_assignment_are_listed(write: Write, tmp_path: Path) -> None:
+    write()
+    (tmp_path / "notes").mkdir()
+    assert list_assignments(tmp_path) == ("lesson",)
+
+
+def test_the_hash_tells_every_change_of_the_folder_but_caches(
+    write: Write, catalogue: Catalogue
+) -> None:
+    folder = write()
+    first = load_assignment(folder, catalogue).sha256
+    assert re.fullmatch(r"[0-9a-f]{64}", first)
+    (folder / "__pycache__").mkdir()
+    (folder / "__pycache__" / "checks.pyc").write_bytes(b"x")
+    (folder / ".swp").write_bytes(b"x")
+    assert load_assignment(folder, catalogue).sha256 == first
+    (folder / "worlds").mkdir()
+    (folder / "worlds" / "a.yaml").write_text("x")
+    second = folder_sha256(folder)
+    assert second != first
+    (folder / "worlds" / "a.yaml").rename(folder / "worlds" / "b.yaml")
+    assert folder_sha256(folder) not in (first, second)

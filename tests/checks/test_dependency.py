@@ -1,0 +1,133 @@
+"""package.dependencies: don't forget the dependencies."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.checks.finding import Status
+from grader.submission.record import Dependency, Import, SourceError
+from tests.checks.builder import SOURCE, failing, judge, package, submission
+
+NAME = "bot_publisher"
+RCLPY = Dependency("rclpy", "depend", 10, known=True)
+GEOMETRY = Dependency("geometry_msgs", "depend", 11, known=True)
+
+
+def judged(*dependencies, packages=(), **changes):
+    subject = submission(package(dependencies=dependencies, **changes), *packages)
+    return judge("package.dependencies", subject, package=NAME)
+
+
+def test_passes():
+    finding = judged(RCLPY, GEOMETRY)
+    assert finding.status is Status.PASSED
+    assert finding.observed == "`geometry_msgs` and `rclpy` declared"
+
+
+@pytest.mark.parametrize(
+    "kind", ["depend", "exec_depend", "build_depend", "build_export_depend", "run_depend"]
+)
+def test_every_tag_for_running_or_building_counts(kind):
+    finding = judged(RCLPY, Dependency("geometry_msgs", kind, 11))
+    assert finding.status is Status.PASSED
+
+
+def test_a_forgotten_dependency_names_the_import_and_the_tag_to_add():
+    finding = judged(RCLPY)
+    assert finding.status is Status.FAILED
+    assert finding.observed == f"{SOURCE}:3 imports `geometry_msgs`"
+    assert "Don't forget the dependencies" in finding.hint
+    assert "`<depend>geometry_msgs</depend>`" in finding.hint
+    assert finding.evidence.places == (SourceError(SOURCE, 3, "imports geometry_msgs"),)
+
+
+def test_every_forgotten_dependency_is_listed_once():
+    again = Import("geometry_msgs", SOURCE, 30)
+    finding = judged(ros_imports=(*package().ros_imports, again))
+    assert finding.observed == (
+        f"{SOURCE}:1 imports `rclpy`; {SOURCE}:3 imports `geometry_msgs`"
+    )
+    assert "`<depend>rclpy</depend>` and `<depend>geometry_msgs</depend>`" in finding.hint
+
+
+def test_test_depend_alone_does_not_count():
+    finding = judged(RCLPY, Dependency("geometry_msgs", "test_depend", 11, known=True))
+    assert finding.status is Status.FAILED
+    assert "test_depend counts for tests only" in finding.observed
+
+
+@pytest.mark.parametrize(
+    "unneeded",
+    [
+        Import("sensor_msgs", SOURCE, 5, optional=True),
+        Import("bot_publisher", SOURCE, 6),
+    ],
+)
+def test_what_needs_no_entry(unneeded):
+    finding = judged(RCLPY, GEOMETRY, ros_imports=(*package().ros_imports, unneeded))
+    assert finding.status is Status.PASSED
+
+
+def test_a_dependency_that_does_not_exist():
+    finding = judged(RCLPY, GEOMETRY, Dependency("geometry_msg", "depend", 12, known=False))
+    assert finding.status is Status.FAILED
+    assert "package.xml names `geometry_msg`, which does not exist" in finding.observed
+    assert "Did you mean `geometry_msgs` instead of `geometry_msg`?" in finding.hint
+    assert finding.evidence.places[0].file == "src/bot_publisher/package.xml"
+    assert finding.evidence.places[0].line == 12
+
+
+def test_both_kinds_of_fault_are_one_finding():
+    finding = judged(RCLPY, Dependency("geomtry_msgs", "depend", 12, known=False))
+    assert "imports `geometry_msgs`" in finding.observed
+    assert "`geomtry_msgs`, which does not exist" in finding.observed
+    assert len(finding.evidence.tables[0].rows) == 2
+
+
+def test_what_this_machine_cannot_tell_is_not_held_against_anybody():
+    rare = Dependency("python3-rare", "exec_depend", 12, known=None)
+    assert judged(RCLPY, GEOMETRY, rare).status is Status.PASSED
+
+
+def test_a_package_of_the_same_submission_exists():
+    own = Dependency("bot_interfaces", "depend", 12, known=False)
+    finding = judged(RCLPY, GEOMETRY, own, packages=(package("bot_interfaces"),))
+    assert finding.status is Status.PASSED
+
+
+def test_nothing_like_it_exists():
+    finding = judged(RCLPY, GEOMETRY, Dependency("zzzz", "depend", 12, known=False))
+    assert "Remove `zzzz` from package.xml." in finding.hint
+
+
+def test_a_file_that_python_cannot_read_hides_its_imports():
+    error = SourceError(SOURCE, 9, "invalid syntax")
+    finding = judged(RCLPY, syntax_errors=(error,), imports=(), ros_imports=())
+    assert finding.status is Status.FAILED
+    assert f"the imports cannot be read: {SOURCE}:9: invalid syntax" in finding.observed
+
+
+def test_imports_that_could_be_read_in_spite_of_a_syntax_error_are_judged():
+    error = SourceError(SOURCE, 9, "invalid syntax")
+    assert judged(RCLPY, GEOMETRY, syntax_errors=(error,)).status is Status.PASSED
+
+
+def test_a_broken_package_xml_and_a_missing_package():
+    error = SourceError("src/bot_publisher/package.xml", 8, "mismatched tag")
+    assert "mismatched tag" in judged(manifest_error=error).observed
+    other = submission(package("bot_publishr"))
+    assert "`bot_publishr`" in failing("package.dependencies", other, package=NAME)
+
+
+@given(
+    imported=st.sets(st.sampled_from(["rclpy", "geometry_msgs", "nav_msgs", "tf2_ros"])),
+    named=st.sets(st.sampled_from(["rclpy", "geometry_msgs", "nav_msgs", "tf2_ros", "std_msgs"])),
+)
+def test_passes_exactly_when_all_that_is_imported_is_named(imported, named):
+    finding = judged(
+        *(Dependency(name, "depend", 1, known=True) for name in sorted(named)),
+        ros_imports=tuple(Import(name, SOURCE, 1) for name in sorted(imported)),
+    )
+    assert (finding.status is Status.PASSED) == (imported <= named)
+    for name in imported - named:
+        assert f"<depend>{name}</depend>" in finding.hint

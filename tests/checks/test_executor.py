@@ -1,0 +1,158 @@
+"""executor.responsive: a callback may be busy, but must come back."""
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.recording.model import Ending
+from tests.checks.builder import (
+    NODE,
+    SOURCE,
+    call,
+    calls,
+    declarations,
+    declared,
+    died,
+    endpoint,
+    every,
+    failing,
+    judge,
+    messages,
+    node,
+    nodeless,
+    output,
+    reader,
+    recording,
+    taken,
+    traceback,
+)
+
+LOOPING = {"calls": calls(None), "declarations": declarations(timer_s=None, spin=False)}
+
+
+def responsive(run, **parameters):
+    return judge("executor.responsive", run, **parameters)
+
+
+class TestGood:
+    def test_answers_at_once(self):
+        finding = responsive(recording())
+        assert finding.status is Status.PASSED
+        assert finding.observed == "`/bot_publisher` answered 8 of 8 calls within 1 s"
+        assert finding.evidence.plots[0].y == pytest.approx([0.002] * 8)
+
+    def test_a_callback_that_sleeps_most_of_its_period(self):
+        assert responsive(recording(calls=calls(0.25))).status is Status.PASSED
+
+    def test_a_slow_constructor_before_the_first_message(self):
+        early = (call(0.1, None), call(0.3, 2.0), call(0.6, None))
+        run = recording(calls=(*early, *calls()))
+        assert responsive(run).status is Status.PASSED
+
+    def test_a_call_too_late_to_be_answered_before_the_end(self):
+        run = recording(calls=(*calls(), call(4.2, None)))
+        assert responsive(run).status is Status.PASSED
+
+    def test_one_late_answer_of_many(self):
+        run = recording(calls=(*calls(), call(2.2, 1.5)))
+        assert responsive(run).status is Status.PASSED
+        assert responsive(run, share="100 %").status is Status.FAILED
+
+    def test_a_node_without_parameter_services_is_judged_by_what_it_declares(self):
+        finding = responsive(recording(calls=()))
+        assert finding.status is Status.PASSED
+        assert "the process declared a timer and that its executor spins" in finding.observed
+
+    def test_a_node_that_publishes_nothing_is_judged_from_its_appearance(self):
+        run = recording(messages={}, endpoints=(reader(),))
+        assert responsive(run).status is Status.PASSED
+
+
+class TestBlocked:
+    def test_a_loop_that_never_spins(self):
+        found = failing("executor.responsive", recording(**LOOPING))
+        assert "answered 0 of 6 calls within 1 s" in found
+        assert "while 12 messages were published" in found
+        assert "rclpy.spin() was never called" in found
+        assert "`while True: publish(); time.sleep(0.3)`" in found
+
+    def test_the_line_of_the_loop(self):
+        log = output(traceback("KeyboardInterrupt", source="time.sleep(0.3)", line=17))
+        finding = responsive(recording(**LOOPING, log=log))
+        assert f"({SOURCE}:17)" in finding.observed
+        assert finding.evidence.places[0].line == 17
+
+    def test_a_loop_in_a_callback(self):
+        found = failing("executor.responsive", recording(calls=calls(None)))
+        assert "something keeps the executor from coming round" in found
+        assert "never called" not in found
+
+    def test_a_node_in_spin_when_it_was_interrupted_is_not_blamed_for_that_line(self):
+        log = output(traceback("KeyboardInterrupt", source="rclpy.spin(node)", line=30))
+        finding = responsive(recording(calls=calls(None), log=log))
+        assert finding.status is Status.FAILED
+        assert finding.evidence.places == ()
+
+    def test_answers_that_are_too_late(self):
+        found = failing("executor.responsive", recording(calls=calls(1.5)))
+        assert "answered 0 of 6 calls" in found
+
+    def test_a_death_is_the_deeper_cause(self):
+        run = recording(
+            calls=(call(0.8), call(1.3, None), call(1.8, None), call(2.3, None)),
+            processes=(died(1, 1.2),),
+            log=output(traceback("KeyError: 'x'")),
+        )
+        assert "KeyError: 'x'" in failing("executor.responsive", run)
+
+    def test_the_only_call_must_be_answered(self):
+        run = recording(calls=(call(1.0, None),))
+        assert responsive(run).status is Status.FAILED
+
+    def test_every_node_counts_unless_one_is_named(self):
+        twin = "/twin"
+        run = recording(
+            nodes=(node(), node(twin)),
+            endpoints=(endpoint(), reader()),
+            calls=(*calls(), *(call(t, None, of=twin) for t in (1.0, 1.5, 2.0, 2.5))),
+        )
+        assert "`/twin` answered 0 of 4" in failing("executor.responsive", run)
+        assert responsive(run, node="bot_publisher").status is Status.PASSED
+
+    def test_no_node(self):
+        run = nodeless(processes=(died(-11),), ending=Ending.EXITED)
+        assert "SIGSEGV" in failing("executor.responsive", run)
+        assert "found the node" in failing("executor.responsive", recording(), node="/other")
+
+
+class TestNotJudged:
+    def test_a_busy_machine(self):
+        slow = recording(calls=calls(1.4), disturbance=taken(0.5, 4.4, waited_s=0.5))
+        finding = responsive(slow)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_a_busy_machine_does_not_excuse_a_loop(self):
+        noise = taken(0.5, 4.4, waited_s=0.4)
+        assert responsive(recording(**LOOPING, disturbance=noise)).status is Status.FAILED
+
+    def test_no_call_and_nothing_declared(self):
+        finding = responsive(recording(calls=(), declarations=(declared("started"),)))
+        assert (finding.status, finding.disturbed) == (Status.ERROR, False)
+        assert f"`{NODE}/list_parameters`" in finding.observed
+
+    def test_no_call_because_it_died(self):
+        run = recording(
+            calls=(),
+            processes=(died(1, 0.9),),
+            messages=messages(every(0.3, 1)),
+            log=output(traceback("KeyError: 'x'")),
+        )
+        assert "KeyError: 'x'" in failing("executor.responsive", run)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [({"within": "0 s"}, "too small"), ({"share": "150 %"}, "less than or equal to 1")],
+)
+def test_parameters_out_of_range_are_refused(parameters, words):
+    with pytest.raises(ValueError, match=words):
+        responsive(recording(), **parameters)

@@ -1,0 +1,360 @@
+"""messages.count and messages.equal, and why a topic is silent."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.checks.finding import Status
+from grader.recording.model import Ending, Kind
+from tests.checks.builder import (
+    RELIABLE,
+    SOURCE,
+    TWIST,
+    declarations,
+    declared,
+    died,
+    endpoint,
+    every,
+    failing,
+    judge,
+    message,
+    messages,
+    nodeless,
+    output,
+    reader,
+    recording,
+    silent,
+    taken,
+    traceback,
+    twist,
+)
+
+VALUE = {"linear": {"x": 1.0}, "angular": {"z": 0.5}}
+
+
+def count(run, **limits):
+    return judge("messages.count", run, topic="/cmd_vel", **limits)
+
+
+def equal(run, value=None, **parameters):
+    return judge("messages.equal", run, topic="/cmd_vel", value=value or VALUE, **parameters)
+
+
+def unequal(value, **parameters):
+    """What is said of a run whose every message has this value."""
+    run = recording(messages=messages(every(0.3), value))
+    finding = equal(run, **parameters)
+    assert finding.status is Status.FAILED, finding
+    return finding.observed
+
+
+class TestCount:
+    @pytest.mark.parametrize(
+        ("number", "limits", "status"),
+        [
+            (1, {"exactly": 1}, Status.PASSED),
+            (2, {"exactly": 1}, Status.FAILED),
+            (3, {"at_least": 3}, Status.PASSED),
+            (2, {"at_least": 3}, Status.FAILED),
+            (3, {"at_most": 3}, Status.PASSED),
+            (4, {"at_most": 3}, Status.FAILED),
+            (0, {"at_most": 3}, Status.PASSED),
+            (3, {"at_least": 2, "at_most": 3}, Status.PASSED),
+            (0, {"exactly": 0}, Status.PASSED),
+        ],
+    )
+    def test_limits(self, number, limits, status):
+        run = recording(messages=messages(every(0.3, number)) if number else {})
+        assert count(run, **limits).status is status
+
+    @pytest.mark.parametrize(
+        ("limits", "words"),
+        [
+            ({}, "say how many"),
+            ({"exactly": 1, "at_most": 2}, "exactly stands alone"),
+            ({"at_least": 3, "at_most": 2}, r"at_least \(3\) is more than at_most \(2\)"),
+        ],
+    )
+    def test_limits_that_make_no_sense_are_refused(self, limits, words):
+        with pytest.raises(ValueError, match=words):
+            count(recording(), **limits)
+
+    def test_a_message_lost_on_its_way_was_published_all_the_same(self):
+        run = recording(messages={"/cmd_vel": (message(1.0, sequence=2),)})
+        finding = count(run, exactly=1)
+        assert finding.status is Status.FAILED
+        assert "2 messages (1 of them lost on the way)" in finding.observed
+        assert count(run, at_least=2).status is Status.PASSED
+
+    def test_too_many_where_one_was_expected(self):
+        finding = count(recording(), exactly=1)
+        assert finding.observed == "12 messages"
+        assert finding.expected == "exactly 1 message on `/cmd_vel`"
+        assert "Publish once" in finding.hint
+
+    def test_too_many_from_two_publishers(self):
+        run = recording(endpoints=(endpoint(), endpoint(appeared_s=0.5, node="/twin")))
+        found = failing("messages.count", run, topic="/cmd_vel", exactly=6)
+        assert "from 2 publishers (in `/bot_publisher` and `/twin`)" in found
+
+    def test_too_many_from_a_feedback_loop(self):
+        run = recording(endpoints=(endpoint(), endpoint(kind=Kind.SUBSCRIPTION)))
+        found = failing("messages.count", run, topic="/cmd_vel", at_most=6)
+        assert "may answer its own messages" in found
+
+    def test_too_few_because_it_died(self):
+        run = recording(
+            messages=messages(every(0.3, 3)),
+            processes=(died(1, 1.5),),
+            ending=Ending.EXITED,
+            log=output(traceback("IndexError: list index out of range")),
+        )
+        found = failing("messages.count", run, topic="/cmd_vel", at_least=10)
+        assert "3 messages on `/cmd_vel`" in found
+        assert f"IndexError: list index out of range ({SOURCE}:14)" in found
+
+    def test_too_few_because_the_machine_was_busy(self):
+        run = recording(
+            messages=messages(every(0.3, 6)), disturbance=taken(1.0, 4.0, waited_s=2.5)
+        )
+        finding = count(run, at_least=12)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_a_busy_machine_does_not_excuse_half_of_the_messages(self):
+        run = recording(
+            messages=messages(every(0.6, 6)), disturbance=taken(1.0, 4.0, waited_s=1.0)
+        )
+        assert count(run, at_least=12).status is Status.FAILED
+
+    def test_too_few_names_the_declared_timer(self):
+        run = recording(messages=messages([3.4]), declarations=declarations(timer_s=3.0))
+        found = failing("messages.count", run, topic="/cmd_vel", at_least=10)
+        assert "1 message on `/cmd_vel` in 4.1 s; the process declared a timer of 3 s" in found
+        assert "0.3 is 300 ms" in found
+
+
+class TestSilence:
+    def found(self, **changes):
+        return failing("messages.count", silent(**changes), topic="/cmd_vel", at_least=1)
+
+    def test_no_node(self):
+        run = nodeless(processes=(died(-11),), ending=Ending.EXITED)
+        assert "SIGSEGV" in failing("messages.count", run, topic="/cmd_vel", at_least=1)
+
+    def test_another_topic(self):
+        assert "`/cmdvel` instead" in self.found(
+            endpoints=(endpoint("/cmdvel"), reader()), declarations=()
+        )
+
+    def test_another_type_on_the_topic(self):
+        found = self.found(endpoints=(endpoint(type="geometry_msgs/msg/Vector3"), reader()))
+        assert "has the type `geometry_msgs/msg/Vector3`, not `geometry_msgs/msg/Twist`" in found
+
+    def test_qos_that_matches_no_reader(self):
+        offered = replace(RELIABLE, reliability="best_effort")
+        found = self.found(endpoints=(endpoint(qos=offered), reader()))
+        assert "QoS does not match" in found
+        assert "reliability best_effort offered, reliable requested" in found
+
+    def test_qos_is_not_blamed_when_one_reader_matches(self):
+        offered = replace(RELIABLE, reliability="best_effort")
+        found = self.found(endpoints=(endpoint(qos=offered), reader(), reader(qos=offered)))
+        assert "QoS" not in found
+
+    def test_death(self):
+        found = self.found(processes=(died(1),), log=output(traceback("KeyError: 'speed'")))
+        assert "no message on `/cmd_vel`: the process" in found
+        assert "KeyError: 'speed'" in found
+
+    def test_a_timer_of_300_seconds(self):
+        found = self.found(declarations=declarations(timer_s=300.0))
+        assert "the process declared a timer of 5 min" in found
+        assert "create_timer takes its period in seconds" in found
+
+    def test_a_long_timer_is_not_blamed_when_another_one_fires(self):
+        both = (*declarations(timer_s=300.0), *declarations(timer_s=0.3))
+        assert "5 min" not in self.found(declarations=both)
+
+    def test_spin_that_was_never_called(self):
+        found = self.found(declarations=declarations(spin=False))
+        assert "rclpy.spin() was never called, so no callback runs" in found
+
+    def test_a_loop_before_spin_names_its_line(self):
+        log = output(traceback("KeyboardInterrupt", source="time.sleep(0.3)", line=21))
+        found = self.found(declarations=declarations(spin=False), log=log)
+        assert f"{SOURCE}:21 when it was interrupted" in found
+
+    def test_without_a_tracer_spin_is_not_missed(self):
+        assert "spin" not in self.found(declarations=())
+
+    def test_printing_instead_of_publishing(self):
+        log = output("[INFO] [1700000001.2] [bot_publisher]: Publishing 1.0 0.5", time_s=1.2)
+        found = self.found(log=log)
+        assert "although the process prints" in found
+        assert "Publishing 1.0 0.5" in found
+        assert "printing and logging send nothing" in found
+
+    def test_a_traceback_that_names_publish_is_no_print(self):
+        log = output(traceback("KeyError: 'x'", source="self.publisher.publish(msg)"), time_s=1.2)
+        assert "prints" not in self.found(log=log)
+
+    def test_no_timer_at_all(self):
+        assert "declared no timer" in self.found(declarations=declarations(timer_s=None))
+
+    def test_silent_for_no_reason_that_can_be_seen(self):
+        found = self.found(log=output("something went wrong"))
+        assert "there but silent" in found
+        assert "except: pass" in found
+
+    def test_a_publisher_that_our_tracer_could_not_match_is_our_fault(self):
+        held = declared("held", topic="/cmd_vel", waited_s=2.0, matched=False)
+        run = silent(declarations=(*declarations(), held))
+        finding = count(run, exactly=1)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_a_run_that_the_machine_mostly_took_says_nothing(self):
+        finding = count(silent(disturbance=taken(0.5, 4.4, waited_s=2.5)), at_least=1)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "the machine took 2.5 s of 4.1 s" in finding.observed
+
+    @pytest.mark.parametrize(
+        ("check", "parameters"),
+        [
+            ("messages.equal", {"value": VALUE}),
+            ("timing.period", {"period": "300 ms"}),
+        ],
+    )
+    def test_the_same_words_in_every_check_that_needs_messages(self, check, parameters):
+        run = silent(declarations=declarations(timer_s=300.0))
+        found = failing(check, run, topic="/cmd_vel", **parameters)
+        assert "the process declared a timer of 5 min" in found
+
+
+class TestEqual:
+    def test_passes_for_nested_values_and_for_paths(self):
+        for value in (VALUE, {"linear.x": 1.0, "angular.z": 0.5}, {"linear": {"x": 1}, "angular.z": 0.5}):
+            finding = equal(recording(), value)
+            assert finding.status is Status.PASSED
+            assert finding.observed == "all of 12 messages"
+
+    def test_expected_is_told_with_the_rest(self):
+        assert equal(recording()).expected == (
+            "linear.x = 1.0, angular.z = 0.5, all else 0 in every message on `/cmd_vel`"
+        )
+
+    def test_the_first_wrong_message_is_named(self):
+        good, bad = twist(), twist(linear=(2.0, 0, 0))
+        stream = [good] * 4 + [bad] * 2 + [good] * 6
+        run = recording(
+            messages={
+                "/cmd_vel": tuple(
+                    message(t, v, sequence=n)
+                    for n, (t, v) in enumerate(zip(every(0.3), stream, strict=True), 1)
+                )
+            }
+        )
+        finding = equal(run)
+        assert "message 5 of 12 has linear.x = 2.0 instead of 1.0" in finding.observed
+        assert "(2 of 12 messages wrong)" in finding.observed
+        assert finding.evidence.moments[0].time_s == pytest.approx(0.7 + 4 * 0.3)
+        assert finding.evidence.tables[0].rows == (("linear.x", "1.0", "2.0"),)
+
+    @pytest.mark.parametrize(
+        ("value", "words"),
+        [
+            (twist((0.5, 0, 0), (0, 0, 1.0)), "linear.x and angular.z are swapped"),
+            (twist((1, 0, 0), (0.5, 0, 0)), "the 0.5 stands in angular.x instead of angular.z"),
+            (twist((0, 0, 1), (0, 0, 0.5)), "the 1.0 stands in linear.z instead of linear.x"),
+            (twist((-1, 0, 0)), "the sign of linear.x is wrong"),
+            (twist((1000, 0, 0)), "linear.x is 1000 times too large"),
+            (twist((0.01, 0, 0)), "linear.x is 100 times too small"),
+            (twist(angular=(0, 0, 28.6478897565)), "angular.z is in degrees"),
+            (twist(angular=(0, 0, 0.008726646)), "in radians already"),
+            (twist(angular=(0, 0, math.nan)), "angular.z is not a number"),
+            (twist((math.inf, 0, 0)), "linear.x is infinite"),
+            (twist((0, 0, 0), (0, 0, 0)), "published before its fields were set"),
+        ],
+    )
+    def test_slips(self, value, words):
+        assert words in unequal(value)
+
+    def test_a_value_that_adds_up(self):
+        stream = tuple(
+            message(t, twist((float(n), 0, 0)), sequence=n) for n, t in enumerate(every(0.3), 1)
+        )
+        finding = equal(recording(messages={"/cmd_vel": stream}))
+        assert "linear.x grows from message to message" in finding.observed
+
+    def test_the_rest_must_be_zero_unless_it_may_be_anything(self):
+        value = twist((1.0, 0.1, 0))
+        assert "linear.y = 0.1 instead of 0.0" in unequal(value)
+        run = recording(messages=messages(every(0.3), value))
+        assert equal(run, rest="any").status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("value", "words"),
+        [
+            ({"linear": {"w": 1.0}}, "linear has no field 'w'; it has x, y, z."),
+            ({"liner": {"x": 1.0}}, "Did you mean 'linear'?"),
+            ({"linear": 1.0}, "linear is a message: name its fields (x, y, z)"),
+            ({"linear": {"x": {"y": 1.0}}}, "linear.x has no field 'y': it is a plain value"),
+            ({"linear.x": "fast"}, "linear.x is a number, but a text is expected of it"),
+        ],
+    )
+    def test_a_wrong_field_in_the_assignment_costs_no_student_a_point(self, value, words):
+        finding = equal(recording(), value)
+        assert finding.status is Status.ERROR
+        assert f"the assignment expects what {TWIST} cannot be" in finding.observed
+        assert words in finding.observed
+
+    def test_too_few_right_messages(self):
+        run = recording(messages=messages(every(0.3, 3)))
+        found = failing("messages.equal", run, topic="/cmd_vel", value=VALUE, at_least=10)
+        assert "3 messages on `/cmd_vel`" in found
+
+    def test_arrays_are_compared_with_their_length(self):
+        def run(data):
+            value = {"data": data}
+            return recording(messages={"/d": (message(1.0, value, topic="/d"),)})
+
+        parameters = {"topic": "/d", "value": {"data": [1.0, 2.0]}}
+        assert judge("messages.equal", run([1.0, 2.0]), **parameters).status is Status.PASSED
+        for other in ([1.0], [1.0, 2.0, 3.0], [2.0, 1.0], []):
+            found = failing("messages.equal", run(other), **parameters)
+            assert "instead of [1.0, 2.0]" in found
+
+    def test_a_float32_field_holds_the_nearest_float32(self):
+        # 0.1 as IEEE 754 single precision, from the standard's own arithmetic.
+        single = 0.100000001490116119384765625
+        run = recording(messages={"/f": (message(1.0, {"data": single}, topic="/f"),)})
+        finding = judge("messages.equal", run, topic="/f", value={"data": 0.1})
+        assert finding.status is Status.PASSED
+
+    @given(
+        x=st.floats(-1e6, 1e6), z=st.floats(-1e6, 1e6), tolerance=st.floats(1e-9, 10),
+        off=st.floats(-20, 20),
+    )  # fmt: skip
+    def test_exactly_what_lies_within_the_tolerance_passes(self, x, z, tolerance, off):
+        run = recording(messages=messages([1.0, 1.3], twist((x + off, 0, 0), (0, 0, z))))
+        finding = equal(
+            run, {"linear": {"x": x}, "angular": {"z": z}}, tolerance=tolerance
+        )
+        distance = abs((x + off) - x)
+        if distance < 0.99 * tolerance:
+            assert finding.status is Status.PASSED
+        elif distance > 1.01 * tolerance and distance > 1e-6 * max(abs(x), 1.0):
+            assert finding.status is Status.FAILED
+            assert "linear.x = " in finding.observed
+
+    @given(st.integers(0, 11), st.floats(-10, 10).filter(lambda v: abs(v - 1.0) > 1e-6))
+    def test_one_wrong_message_anywhere_is_found(self, index, wrong):
+        stream = [
+            message(t, twist((wrong if n == index else 1.0, 0, 0)), sequence=n + 1)
+            for n, t in enumerate(every(0.3))
+        ]
+        finding = equal(recording(messages={"/cmd_vel": tuple(stream)}))
+        assert finding.status is Status.FAILED
+        assert f"message {index + 1} of 12" in finding.observed

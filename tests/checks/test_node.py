@@ -1,0 +1,316 @@
+"""node.exists, node.alive and node.ends: what a student reads when the node is not there."""
+
+from dataclasses import replace
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.recording.model import Ending
+from grader.submission.record import BuildRecord, SourceError
+from tests.checks.builder import (
+    BOT,
+    NODE,
+    SOURCE,
+    at,
+    call,
+    declarations,
+    declared,
+    died,
+    endpoint,
+    every,
+    failing,
+    judge,
+    messages,
+    node,
+    nodeless,
+    output,
+    process,
+    recording,
+    submission,
+    taken,
+    text,
+    traceback,
+)
+
+
+class TestExists:
+    @pytest.mark.parametrize("name", ["bot_publisher", "/bot_publisher"])
+    def test_plain_and_full_names_mean_the_same(self, name):
+        assert judge("node.exists", recording(), name=name).status is Status.PASSED
+
+    def test_a_name_that_ros_does_not_allow_is_the_authors_mistake(self):
+        with pytest.raises(ValueError, match="'bot publisher' is not a node name"):
+            judge("node.exists", recording(), name="bot publisher")
+
+    def test_nothing_launched_names_what_is_installed(self):
+        run = nodeless(ending=Ending.NOT_STARTED, processes=())
+        found = failing("node.exists", run, name=NODE)
+        assert "executable does not exist; installed are `bot_pub`" in found
+
+    def test_nothing_launched_because_the_build_failed(self):
+        culprit = SourceError("src/bot_publisher/setup.py", 7, "SyntaxError: invalid syntax")
+        build = BuildRecord(False, 1.0, failed_packages=("bot_publisher",), culprit=culprit)
+        run = nodeless(
+            ending=Ending.NOT_STARTED, processes=(), submission=submission(build=build)
+        )
+        finding = judge("node.exists", run, name=NODE)
+        assert "did not build" in finding.observed
+        assert finding.evidence.places == (culprit,)
+
+    def test_an_exception_is_named_with_the_students_own_line(self):
+        log = output(traceback("ValueError: math domain error"))
+        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=log)
+        finding = judge("node.exists", run, name=NODE)
+        assert "ended 1.20 s after launch with ValueError: math domain error" in finding.observed
+        assert f"{SOURCE}:14" in finding.observed
+        assert finding.evidence.places == (
+            SourceError(SOURCE, 14, "ValueError: math domain error"),
+        )
+        assert finding.evidence.log[-1] == "ValueError: math domain error"
+
+    def test_a_syntax_error_points_at_the_line_that_python_cannot_read(self):
+        log = output(
+            "Traceback (most recent call last):\n"
+            '  File "/w/install/lib/bot_publisher/bot_pub", line 25, in importlib_load\n'
+            "    return next(matches).load()\n"
+            '  File "/w/install/lib/python3.12/site-packages/bot_publisher/node.py", line 9\n'
+            "    def main(:\n"
+            "             ^\n"
+            "SyntaxError: invalid syntax"
+        )
+        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=log)
+        found = failing("node.exists", run, name=NODE)
+        assert f"SyntaxError: invalid syntax ({SOURCE}:9)" in found
+
+    @pytest.mark.parametrize(
+        ("raised", "hint"),
+        [
+            ("ModuleNotFoundError: No module named 'bot'", "setup.py installs it"),
+            ("rclpy.exceptions.NotInitializedException: rclpy.init() has not", "rclpy.init()"),
+            (
+                "rclpy.exceptions.ParameterNotDeclaredException: Invalid access to undeclared",
+                "declare_parameter",
+            ),
+            ("EOFError: EOF when reading a line", "no keyboard"),
+            (
+                "AttributeError: 'BotPublisher' object has no attribute '_default_callback_group'",
+                "super().__init__",
+            ),
+            (
+                "TypeError: Node.create_publisher() missing 1 required positional argument: "
+                "'qos_profile'",
+                "third argument",
+            ),
+            (
+                "AttributeError: type object 'str' has no attribute '_TYPE_SUPPORT' This might",
+                "not its name",
+            ),
+            ("AttributeError: module 'bot_publisher.node' has no attribute 'main'", "setup.py"),
+        ],
+    )
+    def test_frequent_exceptions_come_with_what_to_do(self, raised, hint):
+        run = nodeless(
+            processes=(died(1),), ending=Ending.EXITED, log=output(traceback(raised))
+        )
+        assert hint in judge("node.exists", run, name=NODE).hint
+
+    @pytest.mark.parametrize(
+        ("exit_code", "words"),
+        [
+            (-11, "SIGSEGV (segmentation fault)"),
+            (139, "SIGSEGV (segmentation fault), reported as exit code 139"),
+            (-9, "SIGKILL (killed, usually for too much memory)"),
+            (-6, "SIGABRT (abort)"),
+            (3, "exit code 3"),
+        ],
+    )
+    def test_a_crash_is_named_by_its_signal(self, exit_code, words):
+        run = nodeless(processes=(died(exit_code),), ending=Ending.EXITED)
+        assert words in failing("node.exists", run, name=NODE)
+
+    def test_main_that_returns_before_a_node_was_created(self):
+        run = nodeless(processes=(died(0),), ending=Ending.EXITED)
+        found = failing("node.exists", run, name=NODE)
+        assert "main() returned before a node was created" in found
+
+    def test_a_process_that_hangs_before_init_names_the_line_it_hangs_at(self):
+        interrupted = traceback("KeyboardInterrupt", source="time.sleep(60)", line=5)
+        run = nodeless(processes=(process(),), log=output(interrupted, time_s=5.0))
+        found = failing("node.exists", run, name=NODE)
+        assert f"never called rclpy.init() ({SOURCE}:5)" in found
+        assert "sleep" in found
+
+    def test_a_process_that_waits_for_input(self):
+        log = output(traceback("KeyboardInterrupt", source="name = input('Name? ')", line=6))
+        found = failing("node.exists", nodeless(log=log), name=NODE)
+        assert f"waits for input() ({SOURCE}:6)" in found
+
+    def test_a_process_that_called_init_but_made_no_node(self):
+        run = nodeless(declarations=(declared("started"), declared("init")))
+        assert "called rclpy.init() but created no node" in failing("node.exists", run, name=NODE)
+
+    def test_without_a_tracer_nothing_is_said_of_init(self):
+        found = failing("node.exists", nodeless(declarations=()), name=NODE)
+        assert "ran until the end, but no node appeared" in found
+        assert "never called" not in found
+
+    def test_a_node_that_the_process_declares_but_nobody_sees_is_not_judged(self):
+        run = nodeless(declarations=(declared("started"), declared("node", node=NODE)))
+        finding = judge("node.exists", run, name=NODE)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "never appeared in the ROS graph" in finding.observed
+
+    @pytest.mark.parametrize(
+        ("actual", "words"),
+        [
+            ("/Bot_Publisher", "upper and lower case differ"),
+            ("/robot/bot_publisher", "in the namespace `/robot`"),
+            ("/bot_publishr", "found the node `/bot_publishr`"),
+            ("/minimal", "super().__init__('bot_publisher')"),
+        ],
+    )
+    def test_near_misses_of_the_name(self, actual, words):
+        run = recording(nodes=(node(actual),), declarations=())
+        assert words in failing("node.exists", run, name=NODE)
+
+    def test_a_dead_process_explains_more_than_an_unrelated_node(self):
+        other = process("bot_publisher/other")
+        run = recording(
+            nodes=(node("/logger"),),
+            processes=(other, died(1)),
+            log=output(traceback("KeyError: 'x'")),
+        )
+        assert "KeyError: 'x'" in failing("node.exists", run, name=NODE)
+
+
+class TestAlive:
+    def test_a_node_that_runs_until_sigint_passes_whatever_its_exit_code(self):
+        for exit_code in (0, 1, -2, 130):
+            run = recording(processes=(process(exit_code=exit_code),))
+            assert judge("node.alive", run, name=NODE).status is Status.PASSED
+
+    def test_an_exception_in_a_callback(self):
+        run = recording(
+            processes=(died(1, 2.0),),
+            ending=Ending.EXITED,
+            stop_s=2.01,
+            log=output(traceback("ZeroDivisionError: division by zero", line=20)),
+        )
+        found = failing("node.alive", run)
+        assert f"2.00 s after launch with ZeroDivisionError: division by zero ({SOURCE}:20" in found
+
+    def test_the_first_of_chained_exceptions_is_the_cause(self):
+        log = output(
+            traceback("ZeroDivisionError: division by zero", line=20)
+            + "\n\nDuring handling of the above exception, another exception occurred:\n\n"
+            + traceback("RuntimeError: Context must be initialized", line=40)
+        )
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        found = failing("node.alive", run)
+        assert "ZeroDivisionError" in found
+        assert "RuntimeError" not in found
+
+    def test_a_main_without_spin(self):
+        run = recording(
+            processes=(died(0),), ending=Ending.EXITED, declarations=declarations(spin=False)
+        )
+        found = failing("node.alive", run)
+        assert "main() returned without rclpy.spin()" in found
+        assert "rclpy.spin(node) keeps a node alive" in found
+
+    def test_a_main_that_returned_although_it_spun(self):
+        run = recording(processes=(died(0),), ending=Ending.EXITED)
+        assert "spin_once() handles one round only" in failing("node.alive", run)
+
+    def test_a_node_that_was_destroyed_while_its_process_went_on(self):
+        run = recording(
+            nodes=(node(vanished_s=1.5),), messages=messages(every(0.3, 2)), calls=()
+        )
+        assert "left the ROS graph 1.50 s after launch" in failing("node.alive", run, name=NODE)
+
+    def test_a_graph_that_lost_a_working_node_for_a_moment_proves_nothing(self):
+        lost = (node(vanished_s=1.5),)
+        assert judge("node.alive", recording(nodes=lost)).status is Status.PASSED
+        quiet = recording(nodes=lost, messages={}, calls=(call(2.0),))
+        assert judge("node.alive", quiet).status is Status.PASSED
+        again = recording(nodes=(*lost, node(appeared_s=1.7)), messages={}, calls=())
+        assert judge("node.alive", again).status is Status.PASSED
+
+    def test_a_node_that_never_appeared(self):
+        found = failing("node.alive", recording(), name="/bot_pub")
+        assert "found the node `/bot_publisher`" in found
+
+    def test_the_death_of_another_process_does_not_count_for_a_named_node(self):
+        healthy = process("bot_publisher/bot_pub")
+        other = died(1, name="bot_publisher/other")
+        run = recording(processes=(healthy, other))
+        assert judge("node.alive", run, name=NODE).status is Status.PASSED
+        assert "`bot_publisher/other` ended" in failing("node.alive", run)
+
+    def test_an_end_after_the_observation_is_no_early_end(self):
+        run = recording(processes=(replace(died(0), exited_ns=at(4.55)),))
+        assert judge("node.alive", run).status is Status.PASSED
+
+
+class TestEnds:
+    def test_the_exit_status_does_not_matter(self):
+        log = output(traceback("KeyboardInterrupt", source="rclpy.spin(node)"), time_s=4.55)
+        run = recording(processes=(process(exit_code=1),), log=log)
+        assert judge("node.ends", run, within="2 s").status is Status.PASSED
+
+    def test_too_late(self):
+        run = recording(processes=(process(exited_s=7.7, stop_s=3.2),), end_s=7.7)
+        found = failing("node.ends", run, within="2 s")
+        assert "needed 3.2 s to end after SIGINT" in found
+
+    @pytest.mark.parametrize("signal", ["SIGTERM", "SIGKILL"])
+    def test_more_than_sigint_was_needed(self, signal):
+        stubborn = process(stopped_by=signal, stop_s=2.3, exited_s=6.8)
+        run = recording(processes=(stubborn,), end_s=6.8)
+        found = failing("node.ends", run, within="2 s")
+        assert f"did not end after SIGINT; {signal} was needed" in found
+        assert "bare `except:`" in found
+
+    def test_a_busy_machine_is_not_the_students_fault(self):
+        slow = process(exited_s=7.7, stop_s=3.2)
+        run = recording(processes=(slow,), end_s=7.7, disturbance=taken(4.5, 7.0, waited_s=1.5))
+        finding = judge("node.ends", run, within="2 s")
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "the machine took 1.5 s" in finding.observed
+
+    def test_a_machine_that_took_too_little_excuses_nothing(self):
+        slow = process(exited_s=7.7, stop_s=3.2)
+        run = recording(processes=(slow,), end_s=7.7, disturbance=taken(4.5, 7.0, waited_s=0.5))
+        assert "needed 3.2 s" in failing("node.ends", run, within="2 s")
+
+    def test_survivors_are_named(self):
+        run = recording(processes=(process(survivors=("sleep 100", "python3 x.py")),))
+        found = failing("node.ends", run, within="2 s")
+        assert "left 2 processes running behind it: `sleep 100` and `python3 x.py`" in found
+
+    def test_a_process_that_had_ended_before_says_why(self):
+        run = recording(
+            processes=(died(1),), ending=Ending.EXITED, log=output(traceback("KeyError: 'x'"))
+        )
+        found = failing("node.ends", run, within="2 s")
+        assert "had already ended before SIGINT" in found
+        assert "KeyError: 'x'" in found
+
+    def test_a_process_that_not_even_sigkill_ended_is_our_problem(self):
+        stuck = process(exited_s=None, stopped_by="SIGKILL", stop_s=None, exit_code=None)
+        finding = judge("node.ends", recording(processes=(stuck,)), within="2 s")
+        assert finding.status is Status.ERROR
+        assert f"`{BOT}` could not be ended" in finding.observed
+
+    def test_nothing_was_launched(self):
+        run = nodeless(ending=Ending.NOT_STARTED, processes=())
+        assert "nothing was launched" in failing("node.ends", run, within="2 s")
+
+    def test_a_limit_without_unit_is_refused(self):
+        with pytest.raises(ValueError, match="has no unit"):
+            judge("node.ends", recording(), within=2)
+
+
+def test_endpoints_of_others_are_not_the_students():
+    run = recording(nodes=(node("/probe"),), endpoints=(endpoint(node="/probe"),))
+    assert "found the node `/probe`" in text(judge("node.exists", run, name=NODE))

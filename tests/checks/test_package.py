@@ -1,0 +1,218 @@
+"""package.found, package.builds and package.executable."""
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.submission.record import BuildRecord, SourceError
+from tests.checks.builder import failing, judge, package, submission
+
+NAME = "bot_publisher"
+CULPRIT = SourceError("src/bot_publisher/setup.py", 12, "NameError: name 'x' is not defined")
+LOG = """\
+Starting >>> bot_publisher
+--- stderr: bot_publisher
+\x1b[31mTraceback (most recent call last):\x1b[0m
+  File "src/bot_publisher/setup.py", line 12, in <module>
+    x
+NameError: name 'x' is not defined
+---
+Failed   <<< bot_publisher [0.40s, exited with code 1]
+
+Summary: 0 packages finished [0.50s]
+  1 package failed: bot_publisher
+  1 package had stderr output: bot_publisher
+"""
+
+
+def failed_build(*failed, log=LOG, **changes):
+    defaults = {"succeeded": False, "duration_s": 0.5, "failed_packages": failed, "log": log}
+    return BuildRecord(**{**defaults, **changes})
+
+
+class TestFound:
+    def found(self, subject, **parameters):
+        return failing("package.found", subject, package=NAME, **parameters)
+
+    def test_passes(self):
+        finding = judge(
+            "package.found", submission(), package=NAME, build_type="ament_python"
+        )
+        assert finding.status is Status.PASSED
+        assert "src/bot_publisher" in finding.observed
+
+    def test_a_submission_that_cannot_be_read_says_why(self):
+        problem = "two packages are called bot_publisher: src/a and src/b"
+        assert problem in self.found(submission(problem=problem))
+
+    def test_no_package_at_all(self):
+        empty = submission()
+        empty = type(empty)(id="ada", sha256="0" * 64)
+        assert "no package.xml was found" in self.found(empty)
+
+    def test_a_misspelt_name(self):
+        found = self.found(submission(package("bot_publishr")))
+        assert "found package `bot_publishr`" in found
+        assert "<name>bot_publisher</name>" in found
+
+    def test_other_packages_only(self):
+        found = self.found(submission(package("alpha"), package("omega")))
+        assert "found `alpha` and `omega` only" in found
+
+    def test_broken_xml_is_named_with_its_line(self):
+        error = SourceError("src/bot_publisher/package.xml", 8, "mismatched tag")
+        finding = judge("package.found", submission(package(manifest_error=error)), package=NAME)
+        assert finding.status is Status.FAILED
+        assert "src/bot_publisher/package.xml:8: mismatched tag" in finding.observed
+        assert finding.evidence.places == (error,)
+
+    def test_broken_xml_may_hide_the_name(self):
+        error = SourceError("src/p/package.xml", 8, "mismatched tag")
+        found = self.found(submission(package("p", manifest_error=error)))
+        assert "src/p/package.xml:8: mismatched tag" in found
+
+    def test_a_wrong_build_type(self):
+        found = self.found(submission(package(build_type="cmake")), build_type="ament_python")
+        assert "its build type is cmake" in found
+        assert "<build_type>ament_python</build_type>" in found
+
+    def test_a_name_that_ros_does_not_allow_is_the_authors_mistake(self):
+        with pytest.raises(ValueError, match="is not a package name"):
+            judge("package.found", submission(), package="Bot-Publisher")
+
+
+class TestBuilds:
+    def found(self, **build):
+        return judge("package.builds", submission(**build), package=NAME)
+
+    def test_passes(self):
+        assert self.found().status is Status.PASSED
+
+    def test_the_students_line_comes_first(self):
+        finding = self.found(build=failed_build(NAME, culprit=CULPRIT))
+        assert finding.status is Status.FAILED
+        assert str(CULPRIT) in finding.observed
+        assert finding.evidence.places == (CULPRIT,)
+
+    def test_the_log_is_the_packages_own_without_colour_and_chatter(self):
+        finding = self.found(build=failed_build(NAME))
+        assert finding.evidence.log == (
+            "Traceback (most recent call last):",
+            '  File "src/bot_publisher/setup.py", line 12, in <module>',
+            "    x",
+            "NameError: name 'x' is not defined",
+        )
+
+    def test_a_log_without_a_block_of_its_own(self):
+        log = "Starting >>> bot_publisher\nCMake Error: no CMakeLists.txt\nFailed   <<< x\n"
+        finding = self.found(build=failed_build(NAME, log=log))
+        assert finding.evidence.log == ("CMake Error: no CMakeLists.txt",)
+
+    def test_no_more_than_the_last_lines(self):
+        log = "\n".join(f"line {n}" for n in range(100))
+        assert self.found(build=failed_build(NAME, log=log)).evidence.log == tuple(
+            f"line {n}" for n in range(85, 100)
+        )
+
+    def test_a_build_that_never_ends(self):
+        finding = self.found(build=failed_build(timed_out=True))
+        assert "did not finish within its time limit" in finding.observed
+        assert "setup.py" in finding.hint
+
+    def test_another_package_failed_first(self):
+        log = "Failed   <<< other [1s]\nAborted  <<< bot_publisher [1s]\n"
+        both = submission(package(), package("other"))
+        for failed in (("bot_publisher", "other"), ("other",)):
+            build = failed_build(*failed, log=log)
+            subject = type(both)(
+                id="ada", sha256="0", build=build,
+                packages=(package(executables=()), package("other")),
+            )  # fmt: skip
+            found = failing("package.builds", subject, package=NAME)
+            assert "because `other` failed to build" in found
+
+    def test_the_failure_of_another_package_does_not_count_when_it_was_built(self):
+        subject = submission(package(), package("other"), build=failed_build("other"))
+        assert judge("package.builds", subject, package=NAME).status is Status.PASSED
+        assert judge("package.builds", subject, package="other").status is Status.FAILED
+
+    def test_nothing_was_built(self):
+        assert self.found(build=None).status is Status.ERROR
+
+    def test_no_package(self):
+        found = failing("package.builds", submission(package("bot_publishr")), package=NAME)
+        assert "found package `bot_publishr`" in found
+
+
+class TestExecutable:
+    def judge(self, **changes):
+        return judge(
+            "package.executable",
+            submission(package(**changes)),
+            package=NAME,
+            executable="bot_pub",
+        )
+
+    def found(self, **changes):
+        finding = self.judge(**{"executables": (), **changes})
+        assert finding.status is Status.FAILED
+        return f"{finding.observed} | {finding.hint}"
+
+    def test_passes(self):
+        finding = self.judge()
+        assert finding.status is Status.PASSED
+        assert finding.expected == "the executable `bot_pub`, for `ros2 run bot_publisher bot_pub`"
+
+    def test_a_script_in_bin_shows_the_lines_of_setup_cfg(self):
+        found = self.found(misplaced_executables=("bot_pub",))
+        assert "was installed in bin/, where `ros2 run` does not look" in found
+        assert (
+            "[develop] / script_dir=$base/lib/bot_publisher / "
+            "[install] / install_scripts=$base/lib/bot_publisher"
+        ) in found
+
+    def test_a_misspelt_entry_point(self):
+        found = self.found(entry_points=(("bot_publisher", "bot_publisher.node:main"),))
+        assert "setup.py defines `bot_publisher`" in found
+        assert "'bot_pub = ...'" in found
+
+    def test_no_entry_point(self):
+        found = self.found(entry_points=())
+        assert "setup.py defines no console_scripts" in found
+        assert "'bot_pub = bot_publisher.<your module>:main'" in found
+
+    def test_a_target_that_does_not_exist(self):
+        target = SourceError("src/bot_publisher/setup.py", 22, "no function `main` in node.py")
+        finding = self.judge(missing_targets=(("bot_pub", target),))
+        assert finding.status is Status.FAILED
+        assert "`bot_pub = bot_publisher.node:main` leads nowhere" in finding.observed
+        assert "no function `main` in node.py" in finding.observed
+        assert finding.evidence.places == (target,)
+
+    def test_the_missing_target_of_another_executable_does_not_count(self):
+        target = SourceError("src/bot_publisher/setup.py", 22, "no module `x`")
+        assert self.judge(missing_targets=(("other", target),)).status is Status.PASSED
+
+    def test_an_executable_with_a_syntax_error_is_there_all_the_same(self):
+        error = SourceError("src/bot_publisher/bot_publisher/node.py", 9, "invalid syntax")
+        assert self.judge(syntax_errors=(error,)).status is Status.PASSED
+
+    def test_defined_but_not_installed(self):
+        assert "the build did not install it" in self.found()
+
+    def test_a_cmake_package(self):
+        found = self.found(build_type="ament_cmake", entry_points=(), executables=("bot_publ",))
+        assert "installed is `bot_publ`" in found
+        assert "install(TARGETS bot_pub DESTINATION lib/${PROJECT_NAME})" in found
+        assert "it was not installed" in self.found(build_type="ament_cmake", entry_points=())
+
+    def test_a_failed_build_is_the_deeper_cause(self):
+        subject = submission(
+            package(executables=()), build=failed_build(NAME, culprit=CULPRIT)
+        )
+        found = failing("package.executable", subject, package=NAME, executable="bot_pub")
+        assert str(CULPRIT) in found
+
+    def test_nothing_was_built(self):
+        subject = submission(build=None)
+        finding = judge("package.executable", subject, package=NAME, executable="bot_pub")
+        assert finding.status is Status.ERROR

@@ -1,0 +1,214 @@
+"""qos.offered, qos.requested and qos.depth."""
+
+from dataclasses import replace
+
+import pytest
+
+from grader.checks.compatibility import refusals
+from grader.checks.finding import Status
+from grader.recording.model import Kind, Qos
+from tests.checks.builder import (
+    RELIABLE,
+    declarations,
+    declared,
+    endpoint,
+    failing,
+    judge,
+    reader,
+    recording,
+)
+
+BEST_EFFORT = replace(RELIABLE, reliability="best_effort")
+LATCHED = replace(RELIABLE, durability="transient_local")
+
+
+def offering(*profiles: Qos, kind: Kind = Kind.PUBLISHER):
+    return recording(
+        messages={}, endpoints=(*(endpoint(qos=qos, kind=kind) for qos in profiles), reader())
+    )
+
+
+class TestRule:
+    """The table of the ROS docs, "QoS compatibilities"."""
+
+    @pytest.mark.parametrize(
+        ("offered", "requested", "matches"),
+        [
+            ("best_effort", "best_effort", True),
+            ("best_effort", "reliable", False),
+            ("reliable", "best_effort", True),
+            ("reliable", "reliable", True),
+        ],
+    )
+    def test_reliability(self, offered, requested, matches):
+        found = refusals(Qos(reliability=offered), Qos(reliability=requested))
+        assert (not found) == matches
+
+    @pytest.mark.parametrize(
+        ("offered", "requested", "matches"),
+        [
+            ("volatile", "volatile", True),
+            ("volatile", "transient_local", False),
+            ("transient_local", "volatile", True),
+            ("transient_local", "transient_local", True),
+        ],
+    )
+    def test_durability(self, offered, requested, matches):
+        found = refusals(Qos(durability=offered), Qos(durability=requested))
+        assert (not found) == matches
+
+    @pytest.mark.parametrize(
+        ("offered", "requested", "matches"),
+        [(None, None, True), (None, 1.0, False), (1.0, None, True), (1.0, 1.0, True),
+         (1.0, 2.0, True), (2.0, 1.0, False)],
+    )  # fmt: skip
+    def test_deadline_and_lease(self, offered, requested, matches):
+        for name in ("deadline_s", "liveliness_lease_s"):
+            found = refusals(Qos(**{name: offered}), Qos(**{name: requested}))
+            assert (not found) == matches
+
+    @pytest.mark.parametrize(
+        ("offered", "requested", "matches"),
+        [
+            ("automatic", "automatic", True),
+            ("automatic", "manual_by_topic", False),
+            ("manual_by_topic", "automatic", True),
+            ("manual_by_topic", "manual_by_topic", True),
+        ],
+    )
+    def test_liveliness(self, offered, requested, matches):
+        found = refusals(Qos(liveliness=offered), Qos(liveliness=requested))
+        assert (not found) == matches
+
+
+class TestOffered:
+    def test_passes(self):
+        finding = judge(
+            "qos.offered", recording(), topic="/cmd_vel", reliability="reliable",
+            durability="volatile", liveliness="automatic",
+        )  # fmt: skip
+        assert finding.status is Status.PASSED
+
+    def test_best_effort_against_a_reliable_reader(self):
+        run = offering(BEST_EFFORT)
+        finding = judge("qos.offered", run, topic="/cmd_vel", reliability="reliable")
+        assert finding.status is Status.FAILED
+        assert "offers reliability best_effort instead of reliable" in finding.observed
+        assert "a subscription that requests the expected profile does not match" in (
+            finding.observed
+        )
+        assert finding.evidence.tables[0].header == ("policy", "expected", "offered", "compatible")
+        assert finding.evidence.tables[0].rows == (
+            ("reliability", "reliable", "best_effort", "no"),
+        )
+        assert "qos_profile_sensor_data is best_effort" in finding.hint
+
+    def test_a_stronger_offer_is_told_to_match_all_the_same(self):
+        found = failing(
+            "qos.offered", offering(LATCHED), topic="/cmd_vel", durability="volatile"
+        )
+        assert "durability transient_local instead of volatile" in found
+        assert "would still match it" in found
+
+    def test_every_publisher_counts(self):
+        run = offering(RELIABLE, BEST_EFFORT)
+        assert "best_effort" in failing(
+            "qos.offered", run, topic="/cmd_vel", reliability="reliable"
+        )
+
+    def test_only_named_policies_count(self):
+        finding = judge("qos.offered", offering(LATCHED), topic="/cmd_vel", reliability="reliable")
+        assert finding.status is Status.PASSED
+
+    def test_durations(self):
+        # A fraction of 2**32 of a second is how DDS writes 300 ms.
+        seen = replace(RELIABLE, deadline_s=round(0.3 * 2**32) / 2**32, lifespan_s=1.0)
+        run = offering(seen)
+        good = judge(
+            "qos.offered", run, topic="/cmd_vel", deadline="300 ms", lifespan="1 s"
+        )
+        assert good.status is Status.PASSED
+        found = failing("qos.offered", offering(RELIABLE), topic="/cmd_vel", deadline="300 ms")
+        assert "deadline infinite instead of 300 ms" in found
+        assert "does not match" in found
+        assert "deadline=Duration(seconds=0.3)" in found
+
+    def test_what_dds_did_not_tell_is_not_judged(self):
+        finding = judge("qos.offered", offering(Qos()), topic="/cmd_vel", reliability="reliable")
+        assert finding.status is Status.ERROR
+        assert "reliability of the publisher was not discovered" in finding.observed
+
+    def test_no_publisher(self):
+        run = recording(messages={}, endpoints=(endpoint("/cmdvel"), reader()))
+        found = failing("qos.offered", run, topic="/cmd_vel", reliability="reliable")
+        assert "`/cmdvel` instead" in found
+
+    def test_nothing_asked_for_is_the_authors_mistake(self):
+        with pytest.raises(ValueError, match="name a policy: reliability, durability"):
+            judge("qos.offered", recording(), topic="/cmd_vel")
+
+    def test_how_to_write_another_profile(self):
+        found = failing(
+            "qos.offered", recording(), topic="/cmd_vel", durability="transient_local"
+        )
+        assert "durability=DurabilityPolicy.TRANSIENT_LOCAL" in found
+
+
+class TestRequested:
+    def test_passes(self):
+        run = offering(BEST_EFFORT, kind=Kind.SUBSCRIPTION)
+        finding = judge("qos.requested", run, topic="/cmd_vel", reliability="best_effort")
+        assert finding.status is Status.PASSED
+
+    def test_a_request_for_more_than_is_offered_gets_nothing(self):
+        run = offering(RELIABLE, kind=Kind.SUBSCRIPTION)
+        finding = judge("qos.requested", run, topic="/cmd_vel", reliability="best_effort")
+        assert "requests reliability reliable instead of best_effort" in finding.observed
+        assert "a publisher that offers the expected profile does not match" in finding.observed
+        assert finding.evidence.tables[0].rows[0][3] == "no"
+
+    def test_a_request_for_less_matches_all_the_same(self):
+        run = offering(BEST_EFFORT, kind=Kind.SUBSCRIPTION)
+        found = failing("qos.requested", run, topic="/cmd_vel", reliability="reliable")
+        assert "would still match it" in found
+
+
+class TestDepth:
+    def test_passes_and_says_where_it_is_known_from(self):
+        finding = judge("qos.depth", recording(), topic="/cmd_vel", depth=10)
+        assert finding.status is Status.PASSED
+        assert "declared by the process" in finding.observed
+
+    def test_another_depth(self):
+        run = recording(declarations=declarations(depth=1))
+        found = failing("qos.depth", run, topic="/cmd_vel", depth=10)
+        assert "depth 1, declared by the process" in found
+        assert "self.create_publisher(Type, 'topic', 10)" in found
+
+    def test_keep_all(self):
+        item = declared("publisher", topic="/cmd_vel", history="keep_all", depth=10)
+        found = failing("qos.depth", recording(declarations=(item,)), topic="/cmd_vel", depth=10)
+        assert "history keep_all" in found
+
+    @pytest.mark.parametrize("depth", [None, "10", True, float("nan"), 10**400])
+    def test_a_declaration_that_makes_no_sense_is_not_judged(self, depth):
+        item = declared("publisher", topic="/cmd_vel", history="keep_last", depth=depth)
+        finding = judge("qos.depth", recording(declarations=(item,)), topic="/cmd_vel", depth=10)
+        assert finding.status is Status.ERROR
+
+    def test_without_a_declaration_it_cannot_be_seen(self):
+        finding = judge("qos.depth", recording(declarations=()), topic="/cmd_vel", depth=10)
+        assert finding.status is Status.ERROR
+        assert "the depth cannot be seen" in finding.observed
+
+    def test_a_subscription(self):
+        item = declared("subscription", topic="/scan", history="keep_last", depth=5)
+        run = recording(
+            endpoints=(endpoint("/scan", kind=Kind.SUBSCRIPTION),), declarations=(item,)
+        )
+        found = failing("qos.depth", run, topic="/scan", depth=10, kind="subscription")
+        assert "create_subscription(Type, 'topic', callback, 10)" in found
+
+    def test_no_publisher(self):
+        run = recording(messages={}, endpoints=(endpoint("/cmdvel"),), declarations=())
+        assert "`/cmdvel` instead" in failing("qos.depth", run, topic="/cmd_vel", depth=10)

@@ -1,0 +1,417 @@
+"""timing.period: robust against the machine, strict with the student."""
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from grader.checks.finding import Status
+from grader.recording.model import NS, Disturbance, Ending, Kind
+from tests.checks.builder import (
+    PERIOD_S,
+    after,
+    at,
+    declarations,
+    died,
+    endpoint,
+    every,
+    failing,
+    judge,
+    message,
+    messages,
+    output,
+    reader,
+    recording,
+    silent,
+    taken,
+    traceback,
+)
+
+
+def period(run, **parameters):
+    return judge("timing.period", run, topic="/cmd_vel", **{"period": "300 ms", **parameters})
+
+
+def wrong(intervals_s, **changes):
+    """What is said of a run with these intervals."""
+    times = after(intervals_s)
+    changes.setdefault("stop_s", max(times) + 0.5)
+    run = recording(messages=messages(times), **changes)
+    return failing("timing.period", run, topic="/cmd_vel", period="300 ms")
+
+
+class TestGood:
+    def test_a_timer(self):
+        finding = period(recording())
+        assert finding.status is Status.PASSED
+        assert finding.observed == (
+            "median 300 ms, largest deviation from it 0 s, over 11 intervals"
+        )
+        assert finding.expected == (
+            "a message on `/cmd_vel` every 300 ms (median within 5 %, intervals within 10 %)"
+        )
+
+    def test_the_plot_shows_every_interval_and_the_allowed_band(self):
+        plot = period(recording()).evidence.plots[0]
+        assert plot.y == pytest.approx([300.0] * 11)
+        assert plot.x[0] == pytest.approx(1.0)
+        assert plot.band == pytest.approx((270.0, 330.0))
+        assert plot.y_label == "time between messages (ms)"
+
+    def test_one_late_message_is_forgiven_without_any_disturbance(self):
+        run = recording(messages=messages(after([0.3] * 4 + [0.36, 0.24] + [0.3] * 5)))
+        assert period(run).status is Status.PASSED
+
+    def test_messages_lost_on_the_way_are_no_long_intervals(self):
+        kept = [n for n in range(1, 13) if n not in (4, 8)]
+        stream = tuple(message(0.7 + 0.3 * n, sequence=n) for n in kept)
+        assert period(recording(messages={"/cmd_vel": stream})).status is Status.PASSED
+
+    def test_what_was_published_before_the_match_may_arrive_all_at_once(self):
+        stream = tuple(
+            message(t, sequence=n, received_s=max(t, 3.0) + 0.001)
+            for n, t in enumerate(every(0.3), 1)
+        )
+        run = recording(messages={"/cmd_vel": stream}, matched_s=3.0)
+        assert period(run).status is Status.PASSED
+
+    @given(st.lists(st.floats(-0.014, 0.014), min_size=5, max_size=40))
+    def test_any_jitter_within_the_tolerance_passes_in_any_order(self, jitter):
+        run = recording(messages=messages(after([0.3 + j for j in jitter])), stop_s=20)
+        assert period(run).status is Status.PASSED
+
+    @given(st.lists(st.floats(-0.014, 0.014), min_size=5, max_size=40), st.integers(0, 40))
+    def test_one_late_message_anywhere_never_decides(self, jitter, index):
+        intervals = [0.3 + j / 3 for j in jitter]
+        index %= len(intervals) - 1
+        intervals[index] += 0.12
+        intervals[index + 1] -= 0.12
+        run = recording(messages=messages(after(intervals)), stop_s=20)
+        assert period(run).status is Status.PASSED
+
+
+class TestProperties:
+    intervals = st.lists(st.floats(0.001, 2.0), min_size=5, max_size=25)
+
+    @given(intervals, st.floats(0.0, 100.0))
+    def test_when_it_happened_does_not_matter(self, intervals, shift):
+        def status(first_s):
+            times = after(intervals, first_s)
+            return period(recording(messages=messages(times), stop_s=times[-1] + 0.1)).status
+
+        # Whole nanoseconds, so that shifting rounds nothing.
+        intervals = [round(value * 1e9) / 1e9 for value in intervals]
+        assert status(0.7) == status(0.7 + round(shift))
+
+    @given(intervals, st.sampled_from([2, 3, 10]))
+    def test_scaling_stream_and_period_together_changes_nothing(self, intervals, factor):
+        # A figure at the very limit may be rounded to either side.
+        middle = sorted(intervals)[len(intervals) // 2]
+        assume(all(abs(abs(v - middle) - 0.03) > 1e-4 for v in intervals))
+        assume(abs(abs(middle - 0.3) - 0.015) > 1e-4 and len(intervals) % 2)
+
+        def status(scale):
+            times = after([value * scale for value in intervals])
+            run = recording(
+                messages=messages(times), stop_s=times[-1] + 0.1, declarations=()
+            )
+            return period(run, period=f"{300 * scale} ms").status
+
+        assert status(1) == status(factor)
+
+    @given(
+        intervals,
+        st.lists(st.tuples(st.floats(0.01, 6), st.floats(0, 1), st.floats(0, 1)), max_size=20),
+    )
+    def test_disturbance_never_turns_a_pass_into_a_failure(self, intervals, samples):
+        times = after(intervals)
+        quiet = recording(messages=messages(times), stop_s=times[-1] + 0.1)
+        noise = tuple(
+            Disturbance(at(t), round(late * NS), round(waited * NS))
+            for t, late, waited in sorted(samples)
+        )
+        before = period(quiet).status
+        now = period(recording(
+            messages=messages(times), stop_s=times[-1] + 0.1, disturbance=noise
+        )).status  # fmt: skip
+        if before is Status.PASSED:
+            assert now is Status.PASSED
+        else:
+            assert now in (Status.FAILED, Status.ERROR)
+
+    @given(
+        st.lists(st.floats(0.0, 0.4), min_size=11, max_size=11),
+        st.sets(st.integers(0, 11)),
+    )
+    def test_what_the_host_took_never_fails_a_right_timer(self, waits, late):
+        """Each message may be late by what the host took just before it."""
+        grid = every(0.3)
+        times, noise, clock = [], [], 0.6
+        for index, due in enumerate(grid):
+            lateness = waits[min(index, 10)] if index in late else 0.0
+            time_s = max(due + lateness, clock)
+            times.append(time_s)
+            noise.append(Disturbance(at(time_s), 0, round((time_s - due) * NS)))
+            clock = time_s + 1e-6
+        run = recording(
+            messages=messages(times), stop_s=times[-1] + 0.1, disturbance=tuple(noise)
+        )
+        assert period(run).status in (Status.PASSED, Status.ERROR)
+
+
+class TestDisturbance:
+    def test_a_late_stretch_that_the_host_explains(self):
+        intervals = [0.3] * 3 + [0.5, 0.1, 0.3, 0.45, 0.15, 0.3, 0.42, 0.18]
+        run = recording(
+            messages=messages(after(intervals)),
+            disturbance=(
+                Disturbance(at(1.8), 0, 0),
+                Disturbance(at(2.05), 0, int(0.2 * NS)),
+                Disturbance(at(2.85), 0, int(0.16 * NS)),
+                Disturbance(at(3.7), int(0.13 * NS), 0),
+            ),
+        )
+        finding = period(run)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "the machine took up to" in finding.observed
+
+    def test_the_same_stretch_without_disturbance_fails(self):
+        found = wrong([0.3] * 3 + [0.5, 0.1, 0.3, 0.45, 0.15, 0.3, 0.42, 0.18])
+        assert "3 intervals of 11 differ from the median by more than 30 ms" in found
+
+    def test_too_little_disturbance_excuses_nothing(self):
+        run = recording(
+            messages=messages(every(0.405, 11)), disturbance=taken(1.0, 4.0, waited_s=0.02)
+        )
+        assert period(run).status is Status.FAILED
+
+    def test_too_few_messages_on_a_busy_machine(self):
+        run = recording(
+            messages=messages(every(0.3, 4)), disturbance=taken(1.5, 4.4, waited_s=2.9)
+        )
+        finding = period(run)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_so_many_lost_messages_that_nothing_can_be_judged(self):
+        stream = tuple(message(0.7 + 0.3 * n, sequence=n) for n in range(1, 24, 2))
+        finding = period(recording(messages={"/cmd_vel": stream}, stop_s=9))
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "lost on their way to the probe" in finding.observed
+
+
+class TestMistakes:
+    def test_three_milliseconds(self):
+        found = wrong([0.003] * 500, declarations=declarations(timer_s=0.003))
+        assert "median 3 ms" in found
+        assert "1/100 of the expected period" in found
+        assert "declared a timer of 3 ms" in found
+        assert "create_timer takes its period in seconds: 300 ms is 0.3." in found
+
+    def test_thirty_milliseconds(self):
+        assert "1/10 of the expected period" in wrong([0.03] * 50)
+
+    def test_three_seconds_though_few_messages_came(self):
+        found = wrong([3.0, 3.0], declarations=declarations(timer_s=3.0))
+        assert "median 3 s" in found
+        assert "10 times the expected period" in found
+
+    def test_three_hundred_seconds(self):
+        run = silent(declarations=declarations(timer_s=300.0))
+        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
+        assert "the process declared a timer of 5 min" in found
+
+    def test_seconds_instead_of_milliseconds_the_other_way_round(self):
+        run = recording(messages=messages(every(0.003, 30)), declarations=())
+        found = failing("timing.period", run, topic="/cmd_vel", period="3 s")
+        assert "1/1000 of the expected period" in found
+        assert "3 s is 3." in found
+
+    def test_two_timers(self):
+        twice = (*declarations(), *declarations()[-2:])
+        found = wrong([0.05, 0.25] * 10, declarations=twice)
+        assert "messages come twice as often as expected" in found
+        assert "declared 2 timers" in found
+
+    def test_two_publishers(self):
+        found = wrong(
+            [0.15] * 20, endpoints=(endpoint(), endpoint(appeared_s=0.5, node="/twin"))
+        )
+        assert "twice as often as expected, from 2 publishers on the topic" in found
+
+    def test_one_callback_that_publishes_three_times(self):
+        found = wrong([0.0001, 0.0001, 0.2998] * 7)
+        assert "three times as often" in found
+        assert "publish once in its callback" in found
+
+    def test_half_of_the_period(self):
+        found = wrong([0.15] * 20, declarations=declarations(timer_s=0.15))
+        assert "twice as often as expected: the process declared a timer of 150 ms" in found
+
+    def test_a_declared_timer_of_another_period(self):
+        found = wrong([0.5] * 8, declarations=declarations(timer_s=0.5))
+        assert "the process declared a timer of 500 ms" in found
+
+    def test_sleeping_instead_of_a_timer(self):
+        found = wrong([0.405] * 10, declarations=declarations(timer_s=None))
+        assert "median 405 ms" in found
+        assert "the process declared no timer" in found
+        assert "it looks like 300 ms of sleeping plus 105 ms of work" in found
+        assert "self.create_timer(0.3, self.callback) keeps its period" in found
+
+    def test_without_a_tracer_a_timer_is_not_missed(self):
+        found = wrong([0.405] * 10, declarations=())
+        assert "declared" not in found
+        assert "300 ms of sleeping plus 105 ms of work" in found
+
+    def test_a_callback_that_takes_longer_than_the_period(self):
+        found = wrong([0.42] * 10)
+        assert "120 ms too long: the process declared a timer of 300 ms" in found
+        assert "Keep callbacks short" in found
+
+    def test_left_out_messages(self):
+        found = wrong([0.3, 0.3, 0.6] * 5)
+        assert "5 intervals of 15 differ" in found
+        assert "messages are left out" in found
+
+    def test_an_irregular_stream(self):
+        found = wrong([0.3, 0.21, 0.39, 0.3, 0.25, 0.42, 0.3, 0.2, 0.37])
+        assert "differ from the median by more than 30 ms" in found
+        assert "Let a timer call the callback" in found
+
+    def test_a_feedback_loop(self):
+        own = (endpoint(), endpoint(kind=Kind.SUBSCRIPTION), reader())
+        assert "may answer itself" in wrong([0.0002] * 900, endpoints=own)
+
+    def test_too_often_for_no_reason_that_can_be_seen(self):
+        assert "messages come too often" in wrong([0.2] * 20, declarations=())
+
+    def test_many_times_the_period(self):
+        assert "median 900 ms" in wrong([0.9] * 6, declarations=())
+
+    def test_a_death_after_three_messages(self):
+        run = recording(
+            messages=messages(every(0.3, 3)),
+            processes=(died(1, 1.4),),
+            ending=Ending.EXITED,
+            log=output(traceback("RuntimeError: out of fuel")),
+        )
+        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
+        assert "RuntimeError: out of fuel" in found
+
+    def test_the_worst_interval_is_a_moment(self):
+        times = after([0.3] * 6 + [0.9, 0.7] + [0.3] * 3)
+        run = recording(messages=messages(times), stop_s=6)
+        moment = period(run).evidence.moments[0]
+        assert moment.label == "worst interval: 900 ms"
+        assert moment.time_s == pytest.approx(times[7] , abs=1e-6)
+
+    def test_the_spread_of_a_bimodal_stream_is_not_hidden_by_its_median(self):
+        assert "differ from the median" in wrong([0.3, 0.3, 0.3, 0.15, 0.45] * 3)
+
+
+class TestForgery:
+    def forged(self, source_s, arrival_s, **changes):
+        stream = tuple(
+            message(0.7 + n * source_s, sequence=n + 1, received_s=0.701 + n * arrival_s)
+            for n in range(12)
+        )
+        return recording(messages={"/cmd_vel": stream}, stop_s=8, **changes)
+
+    def test_stamps_that_arrivals_contradict(self):
+        found = failing(
+            "timing.period", self.forged(0.3, 0.5), topic="/cmd_vel", period="300 ms"
+        )
+        assert "messages arrive every 500 ms" in found
+        assert "source timestamps are 300 ms apart" in found
+
+    def test_stamps_after_the_arrival(self):
+        found = failing(
+            "timing.period", self.forged(0.3, 0.03), topic="/cmd_vel", period="300 ms"
+        )
+        assert "not the times of publishing: one lies after its arrival" in found
+
+    def test_stamps_before_the_launch(self):
+        stream = tuple(
+            message(n * 0.3 - 10, sequence=n + 1, received_s=0.7 + 0.1 * n) for n in range(12)
+        )
+        found = failing(
+            "timing.period",
+            recording(messages={"/cmd_vel": stream}),
+            topic="/cmd_vel",
+            period="300 ms",
+        )
+        assert "before the launch" in found
+
+    def test_a_busy_machine_may_explain_it(self):
+        noise = tuple(Disturbance(at(0.7 + 0.5 * n), 0, int(0.2 * NS)) for n in range(13))
+        finding = period(self.forged(0.3, 0.5, disturbance=noise))
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_arrivals_in_pairs_are_no_proof_of_a_forgery(self):
+        stream = tuple(
+            message(0.7 + 0.3 * n, sequence=n + 1, received_s=0.701 + 0.6 * ((n + 1) // 2))
+            for n in range(12)
+        )
+        finding = period(recording(messages={"/cmd_vel": stream}))
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "held them up on their way" in finding.observed
+
+    def test_a_few_late_arrivals_do_not_matter(self):
+        stream = tuple(
+            message(t, sequence=n, received_s=t + (0.2 if n in (3, 7, 8) else 0.001))
+            for n, t in enumerate(every(0.3), 1)
+        )
+        assert period(recording(messages={"/cmd_vel": stream})).status is Status.PASSED
+
+
+class TestParameters:
+    @pytest.mark.parametrize(
+        ("tolerance", "median_s", "status"),
+        [
+            ("5 %", 0.314, Status.PASSED),
+            ("5 %", 0.316, Status.FAILED),
+            (0.05, 0.314, Status.PASSED),
+            ("20 ms", 0.319, Status.PASSED),
+            ("20 ms", 0.321, Status.FAILED),
+            ("20 ms", 0.281, Status.PASSED),
+            ("20 ms", 0.279, Status.FAILED),
+        ],
+    )
+    def test_a_tolerance_is_a_share_or_a_time(self, tolerance, median_s, status):
+        run = recording(messages=messages(every(median_s)), stop_s=6)
+        assert period(run, tolerance=tolerance).status is status
+
+    @pytest.mark.parametrize(
+        ("outliers", "late", "status"),
+        [
+            ("0 %", 0, Status.PASSED),
+            ("0 %", 1, Status.FAILED),
+            ("10 %", 1, Status.PASSED),
+            ("10 %", 2, Status.PASSED),
+            ("10 %", 3, Status.FAILED),
+        ],
+    )
+    def test_outliers_of_twenty_intervals(self, outliers, late, status):
+        intervals = [0.3] * 20
+        for index in range(late):
+            intervals[3 * index + 2] = 0.4
+        run = recording(messages=messages(after(intervals)), stop_s=9)
+        assert period(run, outliers=outliers).status is status
+
+    def test_intervals_needed(self):
+        run = recording(messages=messages(every(PERIOD_S, 6)))
+        assert period(run, at_least=5).status is Status.PASSED
+        assert "6 messages on `/cmd_vel`" in period(run, at_least=6).observed
+
+    @pytest.mark.parametrize(
+        ("name", "value", "words"),
+        [
+            ("period", "300", "has no unit"),
+            ("period", "0.3 m", "unit of length"),
+            ("tolerance", "5 m", "neither a share such as '5 %' nor a time"),
+            ("tolerance", "-5 %", "negative"),
+            ("spread", "wide", "neither a share"),
+        ],
+    )
+    def test_wrong_quantities_are_refused(self, name, value, words):
+        with pytest.raises(ValueError, match=words):
+            period(recording(), **{name: value})

@@ -1,0 +1,207 @@
+"""topic.published, topic.subscribed and topic.type: near misses are explained."""
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.recording.model import Ending, Kind
+from tests.checks.builder import (
+    NODE,
+    TWIST,
+    declarations,
+    died,
+    endpoint,
+    failing,
+    judge,
+    nodeless,
+    output,
+    process,
+    reader,
+    recording,
+    silent,
+    traceback,
+)
+
+OWN = (
+    endpoint("/rosout", type="rcl_interfaces/msg/Log"),
+    endpoint("/parameter_events", type="rcl_interfaces/msg/ParameterEvent"),
+)
+
+
+def with_endpoints(*endpoints, **changes):
+    return silent(
+        **{
+            "endpoints": (*OWN, *endpoints, reader()),
+            "declarations": declarations()[:3],
+            **changes,
+        }
+    )
+
+
+class TestPublished:
+    def test_a_publisher_on_the_topic_passes_though_nothing_came(self):
+        assert judge("topic.published", silent(), topic="/cmd_vel").status is Status.PASSED
+
+    def test_a_message_proves_a_publisher_that_the_graph_never_showed(self):
+        run = recording(endpoints=(reader(),))
+        assert judge("topic.published", run, topic="/cmd_vel").status is Status.PASSED
+
+    def test_relative_names_are_refused_in_the_assignment(self):
+        with pytest.raises(ValueError, match="'cmd_vel' is relative"):
+            judge("topic.published", recording(), topic="cmd_vel")
+
+    @pytest.mark.parametrize(
+        ("actual", "words"),
+        [
+            ("/cmdvel", "publishes on `/cmdvel` instead of `/cmd_vel`"),
+            ("/cmd_vels", "publishes on `/cmd_vels` instead of `/cmd_vel`"),
+            ("/Cmd_Vel", "upper and lower case differ"),
+            ("/bot_publisher/cmd_vel", "`~/cmd_vel` puts the node's name in front"),
+            ("/robot/cmd_vel", "`/robot` stands in front of the name"),
+        ],
+    )
+    def test_near_misses(self, actual, words):
+        found = failing("topic.published", with_endpoints(endpoint(actual)), topic="/cmd_vel")
+        assert words in found
+        assert f"`{actual}`" in found
+
+    def test_a_namespace_on_the_node(self):
+        run = with_endpoints(endpoint("/robot/cmd_vel", node="/robot/bot_publisher"))
+        found = failing("topic.published", run, topic="/cmd_vel")
+        assert "the node is in the namespace `/robot`" in found
+        assert "'/cmd_vel'" in found
+
+    def test_the_nodes_name_in_front_by_hand(self):
+        run = with_endpoints(endpoint("/bot_publisher/cmd_vel", node="/ns/bot_publisher"))
+        found = failing("topic.published", run, topic="/cmd_vel")
+        assert "the node's name stands in front" in found
+
+    def test_an_absolute_name_where_the_namespace_was_expected(self):
+        run = with_endpoints(endpoint("/cmd_vel", node="/robot/bot_publisher"))
+        found = failing("topic.published", run, topic="/robot/cmd_vel")
+        assert "stays outside of the node's namespace" in found
+        assert "'cmd_vel' is relative" in found
+
+    def test_a_subscription_where_a_publisher_was_expected(self):
+        run = with_endpoints(endpoint(kind=Kind.SUBSCRIPTION))
+        found = failing("topic.published", run, topic="/cmd_vel")
+        assert "found a subscription there, no publisher" in found
+        assert "self.create_publisher(...)" in found
+
+    def test_a_node_that_publishes_nothing(self):
+        found = failing("topic.published", with_endpoints(), topic="/cmd_vel")
+        assert "the node `/bot_publisher` publishes nothing" in found
+
+    def test_the_right_type_on_another_topic(self):
+        run = with_endpoints(endpoint("/turtle1/drive"))
+        found = failing("topic.published", run, topic="/cmd_vel")
+        assert "the right type of message, but on another topic" in found
+        assert "`/turtle1/drive`" in found
+
+    def test_something_else_altogether(self):
+        run = with_endpoints(endpoint("/chatter", type="std_msgs/msg/String"))
+        assert "publishes on `/chatter` only" in failing("topic.published", run, topic="/cmd_vel")
+
+    def test_a_death_before_the_publisher_was_created(self):
+        run = with_endpoints(
+            processes=(died(1),),
+            ending=Ending.EXITED,
+            log=output(traceback("NameError: name 'Twist' is not defined")),
+        )
+        found = failing("topic.published", run, topic="/cmd_vel")
+        assert "NameError: name 'Twist' is not defined" in found
+
+    def test_a_near_miss_explains_more_than_a_later_death(self):
+        run = with_endpoints(endpoint("/cmdvel"), processes=(died(1),), ending=Ending.EXITED)
+        assert "`/cmdvel` instead" in failing("topic.published", run, topic="/cmd_vel")
+
+    def test_without_a_node_the_reason_for_that_is_given(self):
+        run = nodeless(processes=(died(-11),), ending=Ending.EXITED)
+        assert "SIGSEGV" in failing("topic.published", run, topic="/cmd_vel")
+
+    def test_declared_but_never_seen_is_not_judged(self):
+        run = with_endpoints(declarations=declarations(), processes=(process(),))
+        finding = judge("topic.published", run, topic="/cmd_vel")
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_the_evidence_lists_what_there_is(self):
+        finding = judge(
+            "topic.published", with_endpoints(endpoint("/cmdvel")), topic="/cmd_vel"
+        )
+        assert finding.evidence.tables[0].rows == ((NODE, "publisher", "/cmdvel", TWIST),)
+        assert finding.evidence.moments[0].time_s == pytest.approx(0.35)
+
+
+class TestSubscribed:
+    def test_passes(self):
+        run = with_endpoints(endpoint("/scan", kind=Kind.SUBSCRIPTION))
+        assert judge("topic.subscribed", run, topic="/scan").status is Status.PASSED
+
+    def test_the_probes_own_subscription_does_not_count(self):
+        run = with_endpoints()
+        found = failing("topic.subscribed", run, topic="/cmd_vel")
+        assert "subscribes to nothing" in found
+
+    def test_a_publisher_instead(self):
+        run = with_endpoints(endpoint("/scan"))
+        found = failing("topic.subscribed", run, topic="/scan")
+        assert "found a publisher there, no subscription" in found
+
+    def test_near_miss(self):
+        run = with_endpoints(endpoint("/scann", kind=Kind.SUBSCRIPTION))
+        found = failing("topic.subscribed", run, topic="/scan")
+        assert "subscribes to `/scann` instead of `/scan`" in found
+
+    def test_messages_of_others_on_the_topic_prove_no_subscription(self):
+        run = recording(endpoints=(reader(),))
+        assert "subscribes to nothing" in failing("topic.subscribed", run, topic="/cmd_vel")
+
+
+class TestType:
+    def judge_type(self, actual, expected=TWIST):
+        run = with_endpoints(endpoint(type=actual))
+        return failing("topic.type", run, topic="/cmd_vel", type=expected)
+
+    def test_passes(self):
+        finding = judge("topic.type", recording(), topic="/cmd_vel", type=TWIST)
+        assert finding.status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("actual", "words"),
+        [
+            ("geometry_msgs/msg/TwistStamped", "adds a header with a time and a frame"),
+            ("geometry_msgs/msg/Vector3", "only a part of `Twist` (its linear and angular)"),
+            ("my_msgs/msg/Twist", "the same short name, but of the package `my_msgs`"),
+            ("geometry_msgs/msg/Twists", "another message than `Twist`"),
+            ("std_msgs/msg/String", "the publisher has the type `std_msgs/msg/String`"),
+        ],
+    )
+    def test_confusions(self, actual, words):
+        found = self.judge_type(actual)
+        assert words in found
+        assert "from geometry_msgs.msg import Twist" in found
+
+    def test_the_plain_message_where_a_stamped_one_is_expected(self):
+        found = self.judge_type(TWIST, "geometry_msgs/msg/TwistStamped")
+        assert "`TwistStamped` adds a header" in found
+
+    def test_the_whole_where_a_part_is_expected(self):
+        assert "is a part of it" in self.judge_type(TWIST, "geometry_msgs/msg/Vector3")
+
+    def test_one_wrong_publisher_of_two_fails(self):
+        run = with_endpoints(endpoint(), endpoint(type="std_msgs/msg/String"))
+        found = failing("topic.type", run, topic="/cmd_vel", type=TWIST)
+        assert "another publisher on the topic has the type `std_msgs/msg/String`" in found
+
+    def test_without_a_publisher_the_near_miss_is_explained(self):
+        run = with_endpoints(endpoint("/cmdvel"))
+        assert "`/cmdvel` instead" in failing("topic.type", run, topic="/cmd_vel", type=TWIST)
+
+    def test_the_type_of_a_subscription(self):
+        scan = "sensor_msgs/msg/LaserScan"
+        run = with_endpoints(endpoint("/scan", type=scan, kind=Kind.SUBSCRIPTION))
+        finding = judge("topic.type", run, topic="/scan", type=scan, kind="subscription")
+        assert finding.status is Status.PASSED
+
+    def test_a_short_interface_name_is_refused_with_the_full_one(self):
+        with pytest.raises(ValueError, match="Did you mean 'geometry_msgs/msg/Twist'"):
+            judge("topic.type", recording(), topic="/cmd_vel", type="geometry_msgs/Twist")

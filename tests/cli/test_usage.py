@@ -1,0 +1,120 @@
+"""Wrong use ends with one clear message, exit code 2, and no traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import ROOT, Rosgrade
+
+ASSIGNMENT = """\
+rosgrade: 1
+id: {folder}
+title: Test
+packages:
+  - name: bot
+    executables: [bot]
+scenarios:
+  - id: run
+    launch: [{{executable: bot}}]
+    record: [{{topic: /cmd_vel, type: geometry_msgs/msg/Twist}}]
+    timeout: 5 s
+checks:
+  - id: alive
+    uses: node.alive
+    points: 1
+"""
+
+
+def lesson(folder: Path, old: str = "", new: str = "") -> Path:
+    """An assignment with one thing changed."""
+    place = folder / "lesson"
+    place.mkdir()
+    text = ASSIGNMENT.format(folder="lesson").replace(old, new)
+    (place / "assignment.yaml").write_text(text, encoding="utf-8")
+    return place
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "said"),
+    [
+        ("    points: 1", "    poinst: 1", 15, "unknown key 'poinst'. Did you mean 'points'?"),
+        ("uses: node.alive", "uses: node.alife", 14, "Did you mean 'node.alive'?"),
+        ("timeout: 5 s", "timeout: 5 m", 11, "'m' is a unit of length, but a time is needed"),
+        ("timeout: 5 s", "timeout: 5", 11, "has no unit: write for example '5 s'"),
+        ("title: Test", "title: Test\ntitle: Again", 4, "the key 'title' stands twice"),
+        ("/cmd_vel", "cmd_vel", 10, "is relative: write the full name, '/cmd_vel'"),
+    ],
+)
+def test_a_mistake_in_the_yaml_is_named_with_its_line(  # noqa: PLR0913
+    rosgrade: Rosgrade, tmp_path: Path, old: str, new: str, line: int, said: str
+) -> None:
+    place = lesson(tmp_path, old, new)
+    for arguments in (["validate", place], ["check", place, tmp_path]):
+        ended = rosgrade(*arguments)
+        assert ended.returncode == 2
+        assert f"assignment.yaml:{line}: " in ended.stderr
+        assert said in ended.stderr
+        assert "Traceback" not in ended.stderr
+        assert not (tmp_path / "rosgrade-report").exists()
+
+
+def test_an_assignment_that_does_not_exist_names_the_nearest(rosgrade: Rosgrade) -> None:
+    ended = rosgrade("check", "timed_publsher", ".")
+    assert ended.returncode == 2
+    assert "Did you mean 'timed_publisher'?" in ended.stderr
+
+
+def test_a_submission_that_does_not_exist_is_named(rosgrade: Rosgrade) -> None:
+    ended = rosgrade("check", "timed_publisher", "homework.zip")
+    assert ended.returncode == 2
+    assert "homework.zip" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "said"),
+    [("--only", "periode", "'period'"), ("--scenario", "rum", "'run'")],
+)
+def test_a_part_that_does_not_exist_names_the_nearest(
+    rosgrade: Rosgrade, option: str, name: str, said: str
+) -> None:
+    ended = rosgrade("check", "timed_publisher", ".", option, name)
+    assert ended.returncode == 2
+    assert f"Did you mean {said}?" in ended.stderr
+
+
+def test_another_distribution_in_the_shell_is_not_the_student_s_fault(
+    rosgrade: Rosgrade, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_DISTRO", "humble")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "/opt/ros/humble")
+    ended = rosgrade("check", "timed_publisher", ROOT / "reference" / "timed_publisher")
+    assert ended.returncode == 3
+    assert "ROS 2 humble is sourced" in ended.stderr
+
+
+def test_every_assignment_of_ours_is_valid(rosgrade: Rosgrade) -> None:
+    names = [folder.name for folder in sorted((ROOT / "assignments").iterdir())]
+    ended = rosgrade("validate", *names, columns=300)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.count(": valid") == len(names)
+
+
+def test_the_lists_and_the_catalogue_are_printed(rosgrade: Rosgrade) -> None:
+    assert "timed_publisher" in rosgrade("list").stdout
+    assert "/cmd_vel" in rosgrade("show", "timed_publisher").stdout
+    assert "timing.period" in rosgrade("checks").stdout
+    assert "tolerance" in rosgrade("checks", "timing.period").stdout
+    ended = rosgrade("checks", "timing.perod")
+    assert ended.returncode == 2
+    assert "Did you mean 'timing.period'?" in ended.stderr
+
+
+@pytest.mark.parametrize("document", ["assignment", "mutants", "result"])
+def test_the_schemas_are_json_schemas(rosgrade: Rosgrade, document: str) -> None:
+    import json
+
+    schema = json.loads(rosgrade("schema", document).stdout)
+    assert schema["$defs"]

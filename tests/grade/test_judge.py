@@ -1,0 +1,246 @@
+"""What a grade promises to a student, and what it promises to the author of an assignment."""
+
+import pytest
+
+from grader.checks.check import Subject
+from grader.checks.finding import Finding, Status
+from grader.errors import GraderFault
+from grader.grade import grade
+from grader.recording.model import Ending
+from grader.submission.record import BuildRecord, SourceError
+from tests.grade.sample import (
+    FAIL,
+    PASS,
+    Told,
+    make_loaded,
+    make_recording,
+    make_submission,
+)
+
+
+def judge(*checks, scenarios=("listen",), submission=None, recordings=None):
+    submission = submission or make_submission()
+    if recordings is None:
+        recordings = {name: make_recording(name) for name in scenarios}
+    return grade(make_loaded(checks, scenarios), submission, recordings)
+
+
+def statuses(result):
+    return {item.id: item.status.value for item in result.results}
+
+
+class TestRequirements:
+    def test_everything_passes(self):
+        result = judge(Told("node", points=1.5), Told("topic", requires=("node",), points=2))
+        assert (result.score, result.max_score, result.graded) == (3.5, 3.5, True)
+        assert result.full_points
+        assert result.first_to_fix() is None
+
+    def test_a_check_whose_requirement_failed_is_skipped_and_not_a_second_mistake(self):
+        topic = Told("topic", requires=("node",), title="It publishes on /cmd_vel")
+        result = judge(Told("node", FAIL, title="The node is there"), topic)
+        assert statuses(result) == {"node": "failed", "topic": "skipped"}
+        assert topic.asked == []
+        finding = result.result("topic").decisive.finding
+        assert finding.observed == "“The node is there” did not pass, so this could not be judged"
+        assert finding.hint == "Fix “The node is there” first: this is not a second mistake."
+
+    def test_a_chain_of_skips_names_the_mistake_at_its_bottom(self):
+        result = judge(
+            Told("values", requires=("topic",)),
+            Told("topic", requires=("node",)),
+            Told("node", FAIL, title="The node is there"),
+        )
+        assert result.result("values").waits_for == ("node",)
+        assert "“The node is there”" in result.result("values").decisive.finding.expected
+
+    def test_results_stay_in_the_authors_order(self):
+        result = judge(Told("topic", requires=("node",)), Told("node"), Told("alone"))
+        assert list(statuses(result)) == ["topic", "node", "alone"]
+
+    def test_a_check_behind_an_error_is_skipped_and_the_student_is_told_it_is_not_his(self):
+        result = judge(Told("node", Finding.error("", "")), Told("topic", requires=("node",)))
+        assert statuses(result) == {"node": "error", "topic": "skipped"}
+        assert not result.graded
+        finding = result.result("topic").decisive.finding
+        assert finding.observed == "“Title of node” could not be judged, so neither could this"
+        assert finding.hint == "Nothing to fix on your side: tell whoever runs the grader."
+
+
+class TestFirstToFix:
+    def test_it_is_the_failed_check_that_most_others_wait_for(self):
+        result = judge(
+            Told("dependencies", FAIL),
+            Told("node", FAIL),
+            Told("topic", requires=("node",)),
+            Told("values", requires=("topic",)),
+        )
+        assert result.first_to_fix() is result.result("node")
+        assert [item.id for item in result.waiting_for("node")] == ["topic", "values"]
+
+    def test_of_equals_it_is_the_one_that_the_author_wrote_first(self):
+        result = judge(Told("a"), Told("b", FAIL), Told("c", FAIL))
+        assert result.first_to_fix() is result.result("b")
+
+
+class TestScenarios:
+    def test_a_check_passes_only_where_every_scenario_passes(self):
+        says = {"listen": PASS, "renamed": FAIL}
+        result = judge(Told("node", says), scenarios=("listen", "renamed"))
+        node = result.result("node")
+        assert (node.status, node.points) == (Status.FAILED, 0.0)
+        assert [(item.scenario, item.finding) for item in node.findings] == list(says.items())
+        assert node.decisive.scenario == "renamed"
+
+    def test_partial_credit_is_that_of_the_worst_scenario(self):
+        says = {
+            "near": Finding.failed("0.1 m", "0.2 m", credit=0.5),
+            "far": Finding.failed("0.1 m", "0.4 m", credit=0.25),
+        }
+        result = judge(Told("reaches", says, points=4), scenarios=("near", "far"))
+        assert result.score == 1.0
+        assert result.result("reaches").decisive.scenario == "far"
+
+    def test_partial_credit_in_one_scenario_does_not_outweigh_a_plain_failure_in_another(self):
+        says = {"near": Finding.failed("", "", credit=0.9), "far": FAIL}
+        assert judge(Told("reaches", says), scenarios=("near", "far")).score == 0.0
+
+    def test_a_check_judges_only_the_scenarios_that_it_names(self):
+        told = Told("node", scenarios=("renamed",))
+        result = judge(told, scenarios=("listen", "renamed"))
+        assert [subject.scenario for subject in told.asked] == ["renamed"]
+        assert result.result("node").scenarios == ("renamed",)
+
+    def test_a_check_of_the_submission_is_asked_once(self):
+        told = Told("builds", subject=Subject.SUBMISSION)
+        result = judge(told, scenarios=("listen", "renamed"))
+        assert told.asked == [make_submission()]
+        assert result.result("builds").findings[0].scenario is None
+
+    def test_a_check_without_any_scenario_is_an_error_and_no_gift(self):
+        result = judge(Told("node"), scenarios=())
+        assert statuses(result) == {"node": "error"}
+        observed = result.result("node").decisive.finding.observed
+        assert observed == "there is no scenario that this check could judge"
+
+
+class TestOurFaults:
+    def test_a_check_that_raises_costs_no_point_and_keeps_its_traceback(self):
+        result = judge(Told("node", KeyError("depth")), Told("topic", points=2))
+        node = result.result("node")
+        assert statuses(result) == {"node": "error", "topic": "passed"}
+        assert not result.graded
+        assert node.decisive.finding.observed == "the check itself failed: KeyError: 'depth'"
+        assert node.decisive.traceback.startswith("Traceback (most recent call last):")
+        assert "raise says" in node.decisive.traceback
+
+    def test_even_our_own_exceptions_are_not_let_through(self):
+        assert not judge(Told("node", GraderFault("no memory"))).graded
+
+    @pytest.mark.parametrize(
+        ("says", "observed"),
+        [
+            (None, "the check 'told.told' returned NoneType instead of a Finding"),
+            (True, "the check 'told.told' returned bool instead of a Finding"),
+            (
+                Finding(Status.SKIPPED, "", ""),
+                "the check 'told.told' returned 'skipped', which only its requirements may decide",
+            ),
+            (
+                Finding.failed("", "", credit=1.0),
+                "the check 'told.told' failed with a credit of 1.0; it must be in [0, 1)",
+            ),
+            (
+                Finding.failed("", "", credit=float("nan")),
+                "the check 'told.told' failed with a credit of nan; it must be in [0, 1)",
+            ),
+        ],
+    )
+    def test_a_check_that_returns_nonsense_is_an_error(self, says, observed):
+        node = judge(Told("node", says)).result("node")
+        assert (node.status, node.decisive.finding.observed) == (Status.ERROR, observed)
+
+    def test_a_missing_recording_is_an_error_that_names_the_scenario(self):
+        result = judge(
+            Told("node"),
+            scenarios=("listen", "renamed"),
+            recordings={"listen": make_recording("listen")},
+        )
+        decisive = result.result("node").decisive
+        assert (decisive.scenario, decisive.finding.status) == ("renamed", Status.ERROR)
+        assert decisive.finding.observed == "there is no recording of the scenario 'renamed'"
+
+    @pytest.mark.parametrize(
+        ("changes", "observed"),
+        [
+            (
+                {"faults": ("the node /stranger is nobody's", "the disk is full")},
+                "the node /stranger is nobody's; the disk is full",
+            ),
+            ({"ending": Ending.FAULT}, "the run was ended by a fault that left no message"),
+            (
+                {"scenario": "renamed"},
+                "the recording is of another scenario, 'renamed'",
+            ),
+            (
+                {"submission": make_submission(id="eve", sha256="00" * 32)},
+                "the recording is of another submission, 'eve'",
+            ),
+        ],
+    )
+    def test_a_recording_that_cannot_be_trusted_is_not_judged(self, changes, observed):
+        told = Told("node", FAIL)
+        recording = make_recording(**({"scenario": "listen"} | changes))
+        node = judge(told, recordings={"listen": recording}).result("node")
+        assert told.asked == []
+        assert (node.status, node.decisive.finding.observed) == (Status.ERROR, observed)
+
+    def test_scenarios_that_the_host_disturbed_are_named_for_another_run(self):
+        disturbed = Finding.error("", "the host took 0.3 s", disturbed=True)
+        result = judge(
+            Told("period", {"a": disturbed, "b": PASS, "c": disturbed}),
+            Told("node", {"a": PASS, "b": Finding.error("", "broken"), "c": disturbed}),
+            scenarios=("a", "b", "c"),
+        )
+        assert result.disturbed_scenarios() == ("a", "c")
+
+
+class TestNotRun:
+    BROKEN = BuildRecord(
+        succeeded=False,
+        duration_s=0.6,
+        failed_packages=("bot_publisher",),
+        culprit=SourceError("src/bot_publisher/setup.py", 24, "SyntaxError: '(' was never closed"),
+    )
+
+    def test_behind_the_check_of_the_build_everything_is_skipped(self):
+        result = judge(
+            Told("builds", FAIL, subject=Subject.SUBMISSION),
+            Told("node", requires=("builds",)),
+            submission=make_submission(build=self.BROKEN),
+            recordings={},
+        )
+        assert statuses(result) == {"builds": "failed", "node": "skipped"}
+        assert result.graded
+
+    def test_without_that_requirement_the_check_fails_and_shows_the_file_and_line(self):
+        result = judge(Told("node"), submission=make_submission(build=self.BROKEN), recordings={})
+        finding = result.result("node").decisive.finding
+        assert (finding.status, result.graded) == (Status.FAILED, True)
+        assert finding.observed.startswith("was not run because the package was not built: ")
+        assert (
+            "src/bot_publisher/setup.py:24: SyntaxError: '(' was never closed" in finding.observed
+        )
+        assert finding.evidence.places == (self.BROKEN.culprit,)
+
+    def test_a_submission_that_cannot_be_read_fails_with_its_problem(self):
+        submission = make_submission(problem="the archive is empty", packages=(), build=None)
+        result = judge(Told("node"), submission=submission, recordings={})
+        finding = result.result("node").decisive.finding
+        assert finding.status is Status.FAILED
+        assert finding.observed.endswith(": the archive is empty")
+
+    def test_a_package_that_was_never_built_is_our_fault(self):
+        submission = make_submission(build=None)
+        result = judge(Told("node"), submission=submission, recordings={})
+        assert result.result("node").status is Status.ERROR

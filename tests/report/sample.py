@@ -1,0 +1,211 @@
+"""Grades made by hand for the reports to show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from grader.checks.check import Subject
+from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
+from grader.grade import Grade, grade
+from grader.recording.model import (
+    NS,
+    Call,
+    Disturbance,
+    LogLine,
+    Message,
+    Node,
+    Owner,
+    Process,
+    Recording,
+)
+from grader.report.facts import RunFacts
+from grader.submission.record import BuildRecord, SourceError
+from tests.grade.sample import (
+    LAUNCHED_NS,
+    Told,
+    make_loaded,
+    make_recording,
+    make_submission,
+)
+
+PLACE = SourceError("src/bot_publisher/bot_publisher/node.py", 18, "time.sleep(0.3)")
+PERIOD = Finding.failed(
+    "a period of 300 ms within 5 % (285 to 315 ms)",
+    "a median of 322.4 ms; 2 of 3 periods are longer than 315 ms, the longest is 612 ms",
+    "The period grows with the work in the callback. A timer keeps the period.",
+    Evidence(
+        moments=(Moment("a gap of 612 ms begins", 0.75),),
+        places=(PLACE,),
+        log=("loop took 0.31 s",),
+        plots=(
+            Plot(
+                "Period of /cmd_vel",
+                "time since launch (s)",
+                "period (ms)",
+                (0.75, 1.36, 1.69),
+                (300.0, 612.0, 331.0),
+                (285.0, 315.0),
+            ),
+        ),
+        tables=(Table("The longest periods", ("after message", "period"), (("2", "612 ms"),)),),
+    ),
+    credit=0.34,
+)
+PROCESS = "bot_publisher/bot_pub"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What a report is made from."""
+
+    grade: Grade
+    recordings: dict[str, Recording]
+    facts: RunFacts
+
+
+def make_facts(**changes: object) -> RunFacts:
+    facts = RunFacts(
+        started="2026-03-04T09:12:33+01:00",
+        duration_s=5.84,
+        environment={"ros_distro": "jazzy", "rmw": "rmw_fastrtps_cpp"},
+        rosgrade_version="0.1.0",
+        recordings={"listen": "recordings/listen.mcap"},
+    )
+    return replace(facts, **changes)  # type: ignore[arg-type]
+
+
+def at(seconds: float) -> int:
+    """Nanoseconds of a time since launch."""
+    return LAUNCHED_NS + round(seconds * NS)
+
+
+def make_run(**changes: object) -> Recording:
+    stamps = [at(0.45), at(0.75), at(1.36), at(1.69)]
+    return make_recording(
+        stop_ns=at(1.8),
+        end_ns=at(2.0),
+        **{
+            "matched_ns": at(0.44),
+            "nodes": (Node("/bot_publisher", Owner.STUDENT, at(0.39)),),
+            "messages": {
+                "/cmd_vel": tuple(
+                    Message("/cmd_vel", "geometry_msgs/msg/Twist", {}, stamp, stamp, number)
+                    for number, stamp in enumerate(stamps, 1)
+                )
+            },
+            "processes": (Process(PROCESS, 4711, at(0.0), at(1.9), 0, "SIGINT", 0.1),),
+            "log": (
+                LogLine(at(0.40), PROCESS, "stderr", "[INFO] [bot_publisher]: up"),
+                LogLine(at(0.40), "bot_publisher", "rosout", "up", "INFO"),
+            ),
+            "calls": (
+                Call("/bot_publisher/list_parameters", "", at(0.5), at(0.51)),
+                Call("/bot_publisher/list_parameters", "", at(1.0)),
+            ),
+            "disturbance": (Disturbance(at(1.0), 400_000, 1_700_000),),
+        }
+        | changes,
+    )
+
+
+def lost_points() -> Sample:
+    """A period that is too long; one check waits for it, one is not yet for students."""
+    checks = [
+        Told(
+            "builds",
+            Finding.passed("`colcon build` to succeed", "built in 1.3 s"),
+            subject=Subject.SUBMISSION,
+            title="The package builds",
+        ),
+        Told(
+            "period",
+            PERIOD,
+            points=3,
+            title="It publishes every 300 ms",
+            hint="Let a timer do the waiting: `create_timer(0.3, callback)`.",
+        ),
+        Told("steady", requires=("period",), points=2, title="The period is steady"),
+        Told("ends", title="The node ends after SIGINT", visibility="hidden"),
+    ]
+    loaded = make_loaded(checks, titles={"listen": "Listen for two seconds"})
+    recordings = {"listen": make_run()}
+    return Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+
+
+def full_points() -> Sample:
+    loaded = make_loaded([Told("node"), Told("topic", points=2)])
+    recordings = {"listen": make_run()}
+    return Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+
+
+def not_built() -> Sample:
+    """A build that failed, with its log."""
+    culprit = SourceError("src/bot_publisher/setup.py", 24, "SyntaxError: invalid syntax")
+    build = BuildRecord(
+        False, 0.6, failed_packages=("bot_publisher",), culprit=culprit, log="Failed <<< bot"
+    )
+    checks = [
+        Told(
+            "builds",
+            Finding.failed("`colcon build` to succeed", "it failed"),
+            subject=Subject.SUBMISSION,
+            title="The package builds",
+        ),
+        Told("node", requires=("builds",)),
+    ]
+    return Sample(grade(make_loaded(checks), make_submission(build=build), {}), {}, make_facts())
+
+
+def not_graded() -> Sample:
+    """One check has a bug, one was disturbed, one passed."""
+    checks = [
+        Told("node", points=2),
+        Told("depth", KeyError("depth"), title="The queue depth is 10"),
+        Told("period", Finding.error("300 ms", "the host took 212 ms", disturbed=True)),
+    ]
+    recordings = {"listen": make_run()}
+    return Sample(
+        grade(make_loaded(checks), make_submission(), recordings), recordings, make_facts()
+    )
+
+
+def everywhere(text: str) -> Sample:
+    """The same text in every place that a student or an author can write to."""
+    place = SourceError(text, 3, text)
+    evidence = Evidence(
+        moments=(Moment(text, 0.5),),
+        places=(place,),
+        log=(text,),
+        plots=(Plot(text, text, text, (0.0, 1.0), (0.0, 2.0), (0.0, 1.0)),),
+        tables=(Table(text, (text,), ((text,),)),),
+    )
+    failed = Finding.failed(text, text, text, evidence)
+    checks = [
+        Told("a", failed, title=text, hint=text, subject=Subject.SUBMISSION),
+        Told("b", failed, title=text, hint=text),
+        Told("c", requires=("a",), title=text),
+        Told("d", Finding.passed(text, text, evidence), title=text),
+        Told("e", ValueError(text), title=text),
+        Told("f", Finding.error(text, text, hint=text), title=text),
+    ]
+    build = BuildRecord(False, 1.0, failed_packages=(text,), culprit=place, log=text)
+    submission = make_submission(id=text, sha256=text, build=build, problem=text)
+    run = make_run()
+    run = replace(
+        run,
+        submission=submission,
+        messages={text: run.messages["/cmd_vel"]},
+        nodes=(replace(run.nodes[0], name=text),),
+        processes=(replace(run.processes[0], name=text, dropped_bytes=9, survivors=(text,)),),
+        log=tuple(LogLine(at(0.1), text, stream, text) for stream in ("stdout", text)),
+        environment={text: text},
+    )
+    recordings = {"listen": run}
+    facts = make_facts(
+        started=text,
+        rosgrade_version=text,
+        environment={text: text},
+        recordings={"listen": text},
+    )
+    loaded = make_loaded(checks, titles={"listen": text}, title=text)
+    return Sample(grade(loaded, submission, recordings), recordings, facts)

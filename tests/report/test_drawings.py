@@ -1,0 +1,192 @@
+"""Plots and time lines: what is drawn, and that nothing breaks them."""
+
+import math
+import xml.etree.ElementTree as ET
+from itertools import combinations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.checks.finding import Moment, Plot
+from grader.recording.model import Ending, Message, Process
+from grader.report.flags import Flag, place
+from grader.report.plot import draw_plot
+from grader.report.svg import NARROW, WIDE, Scale, fitted, ticks
+from grader.report.timeline import draw_timeline
+from tests.report.sample import PROCESS, at, make_run
+
+
+def make_plot(y, band=(285.0, 315.0), x=None):
+    x = tuple(float(i) for i in range(len(y))) if x is None else x
+    return Plot("Period of /cmd_vel", "time since launch (s)", "period (ms)", x, tuple(y), band)
+
+
+def parsed(svg):
+    return ET.fromstring(str(svg))
+
+
+def of_class(svg, name):
+    return [item for item in parsed(svg).iter() if item.get("class") == name]
+
+
+def words(svg):
+    return " ".join(item.text or "" for item in parsed(svg).iter("text"))
+
+
+class TestPlot:
+    def test_values_outside_the_band_are_crosses_and_counted(self):
+        figure = draw_plot(make_plot([300.0, 612.0, 310.0, 284.9]), "p")
+        assert len(of_class(figure.wide, "dot")) == len(of_class(figure.narrow, "dot")) == 2
+        assert len(of_class(figure.wide, "out")) == 2
+        assert figure.caption == (
+            "Period of /cmd_vel: allowed 285 to 315 (shaded), 2 of 4 outside (marked ×)."
+        )
+
+    def test_the_edges_belong_to_the_band(self):
+        assert not of_class(draw_plot(make_plot([285.0, 315.0]), "p").wide, "out")
+
+    def test_axes_name_their_units(self):
+        shown = words(draw_plot(make_plot([300.0, 310.0]), "p").wide)
+        assert "time since launch (s)" in shown and "period (ms)" in shown
+        assert "290" in shown and "310" in shown
+
+    def test_the_whole_band_is_in_sight(self):
+        (band,) = of_class(draw_plot(make_plot([300.0, 300.1]), "p").wide, "band")
+        assert float(band.get("height")) > 100
+
+    @pytest.mark.parametrize(
+        ("band", "said"),
+        [
+            ((-math.inf, 0.1), "allowed up to 0.1"),
+            ((0.2, math.inf), "allowed from 0.2"),
+        ],
+    )
+    def test_a_band_that_is_open_on_one_side(self, band, said):
+        figure = draw_plot(make_plot([0.05, 0.3], band), "p")
+        assert said in figure.caption
+        assert len(of_class(figure.wide, "out")) == 1
+
+    def test_values_that_cannot_be_drawn_are_told(self):
+        figure = draw_plot(make_plot([300.0, math.nan, math.inf], None), "p")
+        assert figure.caption == (
+            "Period of /cmd_vel: 1 value, 2 without a finite value not drawn."
+        )
+
+    def test_no_values_at_all(self):
+        assert "no values" in draw_plot(make_plot([]), "p").caption
+
+    def test_of_a_flood_every_extreme_stays(self):
+        y = [300.0 + (i % 7) for i in range(50_000)]
+        y[31_415], y[27_182] = 900.0, 1.0
+        svg = draw_plot(make_plot(y), "p").wide
+        assert len(of_class(svg, "dot")) < 2000
+        assert len(of_class(svg, "out")) == 2
+
+    @given(
+        st.lists(st.tuples(st.floats(), st.floats()), max_size=30),
+        st.none() | st.tuples(st.floats(), st.floats()),
+    )
+    def test_whatever_the_values_the_drawing_is_whole_and_finite(self, points, band):
+        x, y = tuple(p[0] for p in points), tuple(p[1] for p in points)
+        figure = draw_plot(make_plot(y, band, x), "p")
+        for svg in (figure.wide, figure.narrow):
+            for item in parsed(svg).iter():
+                numbers = [item.get(key) for key in ("x", "y", "cx", "cy", "x1", "y1", "height")]
+                assert all(math.isfinite(float(value)) for value in numbers if value)
+                assert "nan" not in item.get("d", "")
+
+
+@given(st.floats(-1e12, 1e12), st.floats(1e-6, 1e12), st.integers(2, 10))
+def test_ticks_are_round_few_and_inside(low, length, count):
+    high = low + length
+    if high - low <= 1e-9 * max(abs(low), abs(high)):
+        return
+    found = ticks(low, high, count)
+    slack = 1e-6 * length
+    assert len(found) <= 2.6 * count + 1
+    assert all(low - slack <= value <= high + slack for value, _ in found)
+
+
+def test_ticks_are_written_with_the_digits_that_they_need():
+    assert [text for _, text in ticks(0.0, 4.4, 5)] == ["0", "1", "2", "3", "4"]
+    assert [text for _, text in ticks(0.3, 0.5, 4)] == ["0.30", "0.35", "0.40", "0.45", "0.50"]
+    assert [text for _, text in ticks(-3e6, 3e6, 3)] == ["-2e+06", "0", "2e+06"]
+
+
+def test_a_long_name_keeps_its_ends():
+    assert fitted("/very/long/namespace/of/a/robot/cmd_vel", 100) == "/very/l…cmd_vel"
+
+
+class TestFlags:
+    def test_labels_that_have_room_share_a_row(self):
+        placed = place([Flag(0.0, "launch"), Flag(5.0, "matched")], Scale(0.0, 10.0, 0.0, 700.0))
+        assert [item.row for item in placed] == [0, 0]
+
+    def test_labels_that_would_collide_go_down(self):
+        flags = [Flag(0.39, "node"), Flag(0.44, "matched"), Flag(0.45, "first message")]
+        placed = place(flags, Scale(0.0, 5.0, 0.0, 700.0))
+        assert [item.row for item in placed] == [0, 1, 2]
+
+    def test_at_the_right_end_labels_lie_left_of_their_time(self):
+        flags = [Flag(9.9, "SIGINT"), Flag(10.0, "exit 0")]
+        placed = place(flags, Scale(0.0, 10.0, 0.0, 700.0))
+        assert [(item.left, item.row) for item in placed] == [(True, 1), (True, 0)]
+
+    @given(
+        st.lists(st.floats(0, 10), min_size=1, max_size=9),
+        st.sampled_from([NARROW, WIDE]),
+        st.integers(1, 25),
+    )
+    def test_no_label_meets_another_label(self, times, width, length):
+        flags = [Flag(time_s, "x" * length) for time_s in sorted(times)]
+        placed = place(flags, Scale(0.0, 10.0, 0.0, float(width)))
+        assert [item.flag for item in placed] == flags
+        for one, other in combinations(placed, 2):
+            if one.row == other.row:
+                first, second = sorted([one.extent, other.extent])
+                assert first[1] <= second[0] + 1
+
+
+class TestTimeline:
+    def test_what_happened_is_labelled_with_its_time(self):
+        shown = words(draw_timeline(make_run(), (), "t").wide)
+        for label in (
+            "launch",
+            "node /bot_publisher 0.39 s",
+            "matched 0.44 s",
+            "first message 0.45 s",
+            "SIGINT 1.80 s",
+            "exit 0 at 1.90 s",
+        ):
+            assert label in shown
+
+    def test_every_lane_says_in_words_what_is_in_it(self):
+        svg = draw_timeline(make_run(), (Moment("a gap", 0.75),), "t").wide
+        description = next(item.text for item in parsed(svg).iter() if item.tag.endswith("desc"))
+        for text in (
+            "bot_publisher/bot_pub: ran for 1.90 s",
+            "/cmd_vel: 4 messages",
+            "parameter service: 2 calls, 1 without an answer",
+            "output: 1 line",
+            "findings: 1 moment",
+        ):
+            assert text in description
+
+    def test_a_process_that_a_signal_ended(self):
+        process = Process(PROCESS, 1, at(0.0), at(0.9), -11, "itself")
+        shown = words(draw_timeline(make_run(processes=(process,)), (), "t").wide)
+        assert "ended by signal 11 at 0.90 s" in shown
+        assert "SIGINT" not in shown
+
+    def test_where_nothing_was_launched_there_is_no_time_line(self):
+        assert draw_timeline(make_run(processes=(), ending=Ending.NOT_STARTED), (), "t") is None
+
+    def test_a_flood_of_messages_stays_small(self):
+        messages = tuple(
+            Message("/cmd_vel", "geometry_msgs/msg/Twist", {}, at(i * 1e-5), at(i * 1e-5), i + 1)
+            for i in range(100_000)
+        )
+        svg = draw_timeline(make_run(messages={"/cmd_vel": messages}), (), "t").wide
+        assert len(of_class(svg, "tick")) < 2 * WIDE
+        assert "100000 messages" in words(svg)

@@ -1,0 +1,50 @@
+"""A file is written whole or not at all."""
+
+import os
+
+import pytest
+
+from grader.errors import UsageError
+from grader.report.files import write_whole
+
+
+def test_folders_are_made_and_text_is_utf_8(tmp_path):
+    file = tmp_path / "reports" / "ada" / "result.json"
+    write_whole(file, "π\n")
+    assert file.read_bytes() == b"\xcf\x80\n"
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_the_users_umask_decides_who_may_read_it(tmp_path):
+    file = tmp_path / "result.json"
+    before = os.umask(0o027)
+    try:
+        write_whole(file, "")
+    finally:
+        os.umask(before)
+    assert file.stat().st_mode & 0o777 == 0o640
+
+
+def test_the_old_file_stays_when_the_new_one_cannot_be_written(tmp_path):
+    file = tmp_path / "result.json"
+    file.write_text("old")
+    with pytest.raises(UnicodeEncodeError):
+        write_whole(file, "new \ud800")
+    assert file.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "report").write_text("a file where a folder is needed")
+    with pytest.raises(
+        UsageError, match=r"report/result\.json cannot be written: Not a dir|exists"
+    ):
+        write_whole(tmp_path / "report" / "result.json", "")
+
+
+def test_a_folder_in_its_place_is_named_and_no_draft_is_left(tmp_path):
+    folder = tmp_path / "result.json"
+    folder.mkdir()
+    with pytest.raises(UsageError, match=r"result\.json cannot be written: Is a directory"):
+        write_whole(folder, "text")
+    assert list(tmp_path.iterdir()) == [folder]

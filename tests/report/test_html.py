@@ -1,0 +1,230 @@
+"""The HTML report: complete, inert, the same every time."""
+
+import re
+import subprocess
+import sys
+from itertools import pairwise
+
+import pytest
+
+from grader import resources
+from grader.checks.finding import Finding
+from grader.grade import grade
+from grader.recording.model import LogLine
+from grader.report.html import render_report
+from tests.grade.sample import FAIL, Told, make_loaded, make_submission
+from tests.report.page import Page
+from tests.report.sample import (
+    PROCESS,
+    Sample,
+    at,
+    everywhere,
+    full_points,
+    lost_points,
+    make_facts,
+    make_run,
+    not_built,
+    not_graded,
+)
+
+SAMPLES = [full_points, lost_points, not_built, not_graded]
+ATTACKS = [
+    "<script>alert(1)</script>",
+    "</script><script src=//example.org/x.js></script>",
+    "</style><script>alert(1)</script>",
+    "</title></head><body onload=alert(1)>",
+    '"><img src=x onerror=alert(1)>',
+    "' onmouseover='alert(1)' x='",
+    "--><iframe src=https://example.org></iframe><!--",
+    "]]></desc></svg><svg onload=alert(1)>",
+    "</pre></details><form action=https://example.org><input name=a>",
+    "`</code><script>alert(1)</script>`",
+    "{{ 7 * 7 }}{% include '/etc/passwd' %}",
+    "&lt;script&gt;",
+    "javascript:alert(1)",
+    "<meta http-equiv=refresh content='0;url=https://example.org'>",
+    "\x1b]8;;https://example.org\x07<b>\x1b[0m\u202e\x00",
+]
+
+
+def page(sample: Sample) -> Page:
+    return Page(render(sample))
+
+
+def render(sample: Sample) -> str:
+    return render_report(sample.grade, sample.recordings, sample.facts)
+
+
+def squeezed(text: str) -> str:
+    return " ".join(text.split())
+
+
+@pytest.mark.parametrize("make", SAMPLES)
+class TestEveryReport:
+    def test_is_well_formed_and_says_its_language(self, make):
+        found = page(make())
+        assert found.problems == []
+        assert found.all("html", lang="en")
+        assert len(found.all("h1")) == len(found.all("main")) == len(found.all("footer")) == 1
+
+    def test_loads_nothing_and_runs_nothing(self, make):
+        found = page(make())
+        assert not found.tags & {"script", "link", "iframe", "object", "embed", "form", "img"}
+        (policy,) = found.all("meta", http_equiv="Content-Security-Policy")
+        assert policy["content"].startswith(
+            "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+        )
+        assert "url(" not in render(make()) and "@import" not in render(make())
+
+    def test_is_the_same_every_time(self, make):
+        assert render(make()) == render(make())
+
+    def test_names_every_drawing_for_a_screen_reader(self, make):
+        found = page(make())
+        ids = [attributes["id"] for _, attributes in found.elements if "id" in attributes]
+        assert len(ids) == len(set(ids))
+        for drawing in found.all("svg", role="img"):
+            assert set(drawing["aria-labelledby"].split()) <= set(ids)
+
+    def test_has_headings_without_a_gap(self, make):
+        levels = [int(tag[1]) for tag, _ in page(make()).elements if re.fullmatch("h[1-6]", tag)]
+        assert levels[0] == 1
+        assert all(after - before <= 1 for before, after in pairwise(levels))
+
+    def test_links_only_within_itself(self, make):
+        found = page(make())
+        ids = {attributes.get("id") for _, attributes in found.elements}
+        assert {link["href"][1:] for link in found.all("a") + found.all("use")} <= ids
+
+
+class TestContent:
+    def test_full_points(self):
+        text = squeezed(page(full_points()).text)
+        assert "3 / 3 points" in text and "Full points." in text and "2 passed" in text
+        assert "Fix this first" not in text
+
+    def test_lost_points_are_explained(self):
+        text = squeezed(page(lost_points()).text)
+        assert "3.02 / 7 points" in text
+        assert "1 check failed, 1 other waits for it." in text
+        assert "Fix this first It publishes every 300 ms" in text
+        assert "Expected a period of 300 ms within 5 % (285 to 315 ms)" in text
+        assert "Observed a median of 322.4 ms" in text
+        assert "Try next The period grows with the work in the callback." in text
+        assert "Also Let a timer do the waiting: create_timer(0.3, callback)." in text
+        assert "src/bot_publisher/bot_publisher/node.py:18 time.sleep(0.3)" in text
+        assert "0.750 s a gap of 612 ms begins" in text
+        assert "loop took 0.31 s" in text
+        assert "after message period 2 612 ms" in text
+
+    def test_a_status_is_told_in_words(self):
+        text = squeezed(page(lost_points()).text)
+        assert "passed The package builds" in text
+        assert "failed It publishes every 300 ms" in text
+        assert "skipped The period is steady waits for “It publishes every 300 ms”" in text
+
+    def test_the_check_to_fix_first_is_linked(self):
+        found = page(lost_points())
+        assert found.all("a", href="#check-period")
+        assert found.all("article", id="check-period")
+
+    def test_a_check_that_students_do_not_see_says_so(self):
+        assert "never shown to students" in page(lost_points()).text
+
+    def test_a_build_that_failed_shows_its_log_and_the_place(self):
+        text = squeezed(page(not_built()).text)
+        assert "Output of the build src/bot_publisher/setup.py:24 SyntaxError" in text
+        assert "Failed <<< bot" in text
+
+    def test_what_was_not_graded_shows_no_score_and_blames_nobody(self):
+        text = squeezed(page(not_graded()).text)
+        assert "Not graded" in text and "This is not a fault of the submission." in text
+        assert "2 / 4 points" not in text.split("The checks that could be judged")[0]
+        assert "the check itself failed: KeyError: 'depth' the host took 212 ms" in text
+        assert "Traceback (most recent call last):" in text
+
+    def test_the_output_of_the_node_without_its_double_on_rosout(self):
+        text = squeezed(page(lost_points()).text)
+        assert "What the node printed (1 line) 0.400 stderr [INFO] [bot_publisher]: up" in text
+
+    def test_a_flood_of_output_is_cut_in_the_middle_and_says_so(self):
+        log = tuple(
+            LogLine(at(0.1), PROCESS, "stdout", f"line {i} " + "x" * i) for i in range(3000)
+        )
+        sample = full_points()
+        recordings = {"listen": make_run(log=log)}
+        text = squeezed(page(Sample(sample.grade, recordings, sample.facts)).text)
+        assert "line 149 x" in text and "line 150 x" not in text
+        assert "2700 lines left out here; the recording has all of them." in text
+        assert "line 2999 x" in text and "… (1,009 more characters)" in text
+
+    def test_facts_of_the_run(self):
+        text = squeezed(page(lost_points()).text)
+        for fact in (
+            "Graded 2026-03-04 09:12:33+01:00",
+            "rosgrade 0.1.0",
+            "ROS distribution jazzy",
+            "RMW rmw_fastrtps_cpp",
+            "ab" * 32,
+            "cd" * 32,
+            "listen 7 2.00 s 2.1 ms everything that was waited for had been seen",
+            "recordings/listen.mcap",
+        ):
+            assert fact in text
+
+    def test_findings_of_several_scenarios_are_told_apart(self):
+        says = {"listen": FAIL, "renamed": Finding.passed("x", "y")}
+        loaded = make_loaded([Told("node", says)], ("listen", "renamed"))
+        recordings = {name: make_run(scenario=name) for name in ("listen", "renamed")}
+        result = grade(loaded, make_submission(), recordings)
+        text = squeezed(page(Sample(result, recordings, make_facts())).text)
+        assert "In several scenarios 0 / 1 points" in text
+        assert "Scenario listen: failed" in text and "Scenario renamed: passed" in text
+
+    def test_text_between_backticks_is_code_and_a_single_backtick_is_not(self):
+        loaded = make_loaded([Told("node", Finding.failed("`ros2 run`", "a ` and nothing else"))])
+        recordings = {"listen": make_run()}
+        sample = Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+        html = render(sample)
+        assert "<code>ros2 run</code>" in html and "a ` and nothing else" in html
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+class TestHostileText:
+    def test_adds_no_element_and_no_attribute(self, attack):
+        harmless = page(everywhere("harmless `text`" if "`" in attack else "harmless"))
+        found = page(everywhere(attack))
+        assert found.problems == []
+        assert [(tag, list(attributes)) for tag, attributes in found.elements] == [
+            (tag, list(attributes)) for tag, attributes in harmless.elements
+        ]
+
+    def test_is_never_active(self, attack):
+        found = page(everywhere(attack))
+        for _, attributes in found.elements:
+            for name, value in attributes.items():
+                assert not name.startswith("on")
+                assert name not in ("src", "srcdoc", "action", "formaction", "xlink:href")
+                assert name != "href" or value.startswith("#")
+                assert name != "style" or re.fullmatch(r"flex-grow: [0-9.]+", value)
+
+    def test_leaves_no_control_character(self, attack):
+        html = render(everywhere(attack))
+        assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202e]", html)
+
+    def test_is_shown(self, attack):
+        visible = "<U+202E>␀" if "\x1b" in attack else attack.replace("`", "")
+        assert page(everywhere(attack)).text.count(visible) > 10
+
+
+def test_text_that_cannot_be_encoded_is_still_a_file(tmp_path):
+    (tmp_path / "report.html").write_text(render(everywhere("\udcff")), encoding="utf-8")
+
+
+def test_commands_that_write_no_report_do_not_load_jinja2():
+    code = (
+        "import sys, grader.report.result, grader.report.terminal, grader.report.html; "
+        "sys.exit('jinja2' in sys.modules)"
+    )
+    root = resources.PACKAGE.parent
+    assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0

@@ -1,0 +1,185 @@
+"""``result.json``: what programs rely on."""
+
+import json
+import re
+
+import pytest
+
+from grader.checks.finding import Evidence, Finding, Plot
+from grader.errors import UsageError
+from grader.grade import grade
+from grader.report.result import make_result, read_result, result_json, result_schema, write_result
+from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
+from tests.report.sample import Sample, everywhere, full_points, lost_points, not_built, not_graded
+
+
+def written(sample: Sample):
+    return json.loads(result_json(make_result(sample.grade, sample.recordings, sample.facts)))
+
+
+def test_the_keys_of_the_contract():
+    data = written(lost_points())
+    assert list(data) == [
+        "schema",
+        "rosgrade_version",
+        "assignment",
+        "submission",
+        "score",
+        "max_score",
+        "graded",
+        "first_to_fix",
+        "checks",
+        "scenarios",
+        "build",
+        "environment",
+        "started",
+        "duration_s",
+    ]
+    assert {
+        "id",
+        "title",
+        "status",
+        "points",
+        "max_points",
+        "visibility",
+        "expected",
+        "observed",
+        "hint",
+        "scenario",
+        "evidence",
+    } <= set(data["checks"][0])
+
+
+def test_the_score_and_what_to_fix():
+    data = written(lost_points())
+    assert (data["schema"], data["score"], data["max_score"]) == (1, 3.02, 7.0)
+    assert (data["graded"], data["first_to_fix"]) == (True, "period")
+    assert data["assignment"] == {"id": "timed_publisher", "sha256": "ab" * 32}
+
+
+def test_a_check_with_its_evidence():
+    period = written(lost_points())["checks"][1]
+    assert (period["status"], period["points"], period["max_points"]) == ("failed", 1.02, 3.0)
+    assert period["scenario"] == "listen"
+    assert period["author_hint"].startswith("Let a timer do the waiting")
+    assert period["evidence"]["places"] == [
+        {
+            "file": "src/bot_publisher/bot_publisher/node.py",
+            "line": 18,
+            "message": "time.sleep(0.3)",
+        }
+    ]
+    assert period["evidence"]["plots"][0]["band"] == [285.0, 315.0]
+
+
+def test_the_hint_of_an_author_is_not_given_away_where_a_check_passed():
+    sample = full_points()
+    assert all(check["author_hint"] == "" for check in written(sample)["checks"])
+
+
+def test_a_run():
+    (scenario,) = written(lost_points())["scenarios"]
+    assert scenario == {
+        "id": "listen",
+        "seed": 7,
+        "recording": "recordings/listen.mcap",
+        "ending": "until",
+        "duration_s": 2.0,
+        "disturbance": {"taken_s": 0.0021, "worst_late_s": 0.0004},
+        "faults": [],
+    }
+
+
+def test_a_check_of_several_scenarios_tells_the_one_that_decided_and_the_others():
+    loaded = make_loaded([Told("node", {"a": PASS, "b": FAIL, "c": PASS})], ("a", "b", "c"))
+    recordings = {name: make_recording(name) for name in "abc"}
+    result = grade(loaded, make_submission(), recordings)
+    (check,) = written(Sample(result, recordings, lost_points().facts))["checks"]
+    assert (check["scenario"], check["observed"]) == ("b", "no node at all")
+    assert [(other["scenario"], other["status"]) for other in check["other_scenarios"]] == [
+        ("a", "passed"),
+        ("c", "passed"),
+    ]
+
+
+def test_a_build_that_failed():
+    data = written(not_built())
+    assert data["build"]["culprit"]["line"] == 24
+    assert data["build"]["log"] == "Failed <<< bot"
+    assert data["scenarios"] == []
+
+
+def test_without_a_verdict_there_is_no_number_that_a_gradebook_could_take():
+    data = written(not_graded())
+    assert (data["graded"], data["score"], data["max_score"]) == (False, None, 4.0)
+    assert "KeyError: 'depth'" in data["checks"][1]["traceback"]
+
+
+def test_numbers_that_json_does_not_know_become_strings():
+    values = (float("nan"), float("inf"), float("-inf"), 0.1 + 0.2)
+    plot = Plot("", "", "", values, values)
+    loaded = make_loaded([Told("node", Finding.passed("", "", Evidence(plots=(plot,))))])
+    recordings = {"listen": make_recording()}
+    sample = Sample(grade(loaded, make_submission(), recordings), recordings, full_points().facts)
+    text = result_json(make_result(sample.grade, sample.recordings, sample.facts))
+    assert not re.search(r"[:\[,]\s*-?(NaN|Infinity)", text)
+    plot_part = json.loads(text)["checks"][0]["evidence"]["plots"][0]
+    assert plot_part["x"] == ["NaN", "Infinity", "-Infinity", 0.3]
+
+
+SAMPLES = [lost_points, full_points, not_built, not_graded, lambda: everywhere("\udcff<\x1b[0m>")]
+
+
+@pytest.mark.parametrize("make", SAMPLES)
+def test_what_is_written_is_read_again(make, tmp_path):
+    sample = make()
+    file = tmp_path / "result.json"
+    result = write_result(sample.grade, sample.recordings, sample.facts, file)
+    assert read_result(file) == result
+    assert result_json(read_result(file)) == file.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("make", SAMPLES)
+def test_the_same_grade_gives_the_same_bytes(make):
+    one, other = make(), make()
+    assert result_json(make_result(one.grade, one.recordings, one.facts)) == result_json(
+        make_result(other.grade, other.recordings, other.facts)
+    )
+
+
+def test_the_order_of_the_environment_does_not_matter():
+    sample = lost_points()
+    environment = dict(reversed(list(sample.facts.environment.items())))
+    turned = Sample(
+        sample.grade,
+        sample.recordings,
+        type(sample.facts)(**vars(sample.facts) | {"environment": environment}),
+    )
+    assert json.dumps(written(turned)) == json.dumps(written(sample))
+
+
+def test_the_schema_describes_what_is_written():
+    schema = result_schema()
+    assert schema["properties"]["schema"] == {"const": 1, "title": "Schema", "type": "integer"}
+    assert set(schema["required"]) == set(written(full_points()))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", r"result\.json is not JSON: "),
+        ("[]", r"its schema is None, not 1"),
+        ('{"schema": 2}', r"not a result that this rosgrade reads: its schema is 2, not 1"),
+        ('{"schema": 1}', r"is not a result: rosgrade_version: Field required"),
+    ],
+)
+def test_a_file_that_is_no_result_is_refused(text, message, tmp_path):
+    file = tmp_path / "result.json"
+    file.write_text(text)
+    with pytest.raises(UsageError, match=message):
+        read_result(file)
+
+
+def test_a_file_that_does_not_exist(tmp_path):
+    with pytest.raises(UsageError, match=r"result\.json cannot be read: No such file"):
+        read_result(tmp_path / "result.json")

@@ -1,0 +1,107 @@
+"""The grade in a terminal."""
+
+import io
+import unicodedata
+
+import pytest
+from rich.console import Console
+
+from grader.report.terminal import print_grade
+from tests.report.sample import everywhere, full_points, lost_points, not_built, not_graded
+
+AT_80 = """\
+Publish a Twist every 300 ms   ada_lovelace
+
+✓ passed   The package builds                1 / 1
+✗ failed   It publishes every 300 ms      1.02 / 3
+– skipped  The period is steady              0 / 2
+✓ passed   The node ends after SIGINT        1 / 1
+
+✗ failed  It publishes every 300 ms
+  expected  a period of 300 ms within 5 % (285 to 315 ms)
+  observed  a median of 322.4 ms; 2 of 3 periods are longer than 315 ms, the
+            longest is 612 ms
+  try next  The period grows with the work in the callback. A timer keeps the
+            period.
+  try next  Let a timer do the waiting: `create_timer(0.3, callback)`.
+  where     src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)
+  printed   loop took 0.31 s
+
+Fix this first: It publishes every 300 ms. 1 other check waits for it.
+Score: 3.02 of 7 points
+"""
+
+
+def printed(sample, width=80, **options):
+    stream = io.StringIO()
+    console = Console(file=stream, width=width, highlight=False, emoji=False, **options)
+    print_grade(console, sample.grade)
+    return stream.getvalue()
+
+
+def test_lost_points_at_80_columns():
+    # The points of the title column end where the longest title does.
+    lines = [line.split() for line in printed(lost_points()).splitlines()]
+    assert lines == [line.split() for line in AT_80.splitlines()]
+
+
+@pytest.mark.parametrize("width", [40, 80, 120])
+@pytest.mark.parametrize("make", [lost_points, not_built, not_graded, full_points])
+def test_no_line_is_wider_than_the_terminal(make, width):
+    assert max(len(line) for line in printed(make(), width).splitlines()) <= width
+
+
+def test_a_wide_terminal_also_tells_what_was_observed():
+    text = printed(lost_points(), 120)
+    assert "1 / 1  built in 1.3 s" in text
+    assert "0 / 2  waits for It publishes every 300 ms" in text
+
+
+def test_full_points():
+    text = printed(full_points())
+    assert text.endswith("\nScore: 3 of 3 points\n")
+    assert "Fix this first" not in text
+
+
+def test_what_was_not_graded_has_no_score():
+    text = printed(not_graded())
+    assert "Score" not in text
+    assert "! error" in text and "? / 1" in text
+    assert "Not graded. Something of the grader or of the machine failed" in text
+
+
+def test_a_file_or_a_pipe_gets_no_escape_sequences():
+    assert "\x1b" not in printed(lost_points())
+
+
+def test_a_terminal_gets_colours_unless_they_are_unwanted(monkeypatch):
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    options = {"force_terminal": True, "color_system": "standard"}
+    assert "\x1b[32m" in printed(lost_points(), **options)
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b[32m" not in printed(lost_points(), **options)
+
+
+@pytest.mark.parametrize(
+    "attack",
+    ["[bold red]passed[/]", "[link=https://example.org]x[/link]", ":smile:", "[/]", "\\[b]"],
+)
+def test_markup_is_printed_as_it_is(attack):
+    assert attack in printed(everywhere(attack), 200)
+
+
+@pytest.mark.parametrize("attack", ["\x1b[2J", "\x1b]0;title\x07", "\x9b31m", "\r\x08", "\u202e"])
+@pytest.mark.parametrize("width", [80, 120])
+def test_nothing_of_a_students_reaches_the_terminal_as_a_command(attack, width):
+    text = printed(everywhere(f"before{attack}after"), width)
+    commands = {char for char in text if unicodedata.category(char) in ("Cc", "Cf")}
+    assert commands == {"\n"}
+
+
+def test_a_terminal_without_unicode_gets_other_symbols():
+    stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    print_grade(Console(file=stream, width=80), everywhere("Grüße").grade)
+    stream.flush()
+    text = stream.buffer.getvalue().decode("ascii")
+    assert "x failed" in text and "+ passed" in text
+    assert "Gr\\xfc\\xdfe" in text

@@ -1,0 +1,74 @@
+"""Cells are admitted within bounds, starts are spread, and "alone" means alone."""
+
+from __future__ import annotations
+
+import threading
+
+from grader.run.admission import Admission
+
+LIMIT_S = 10.0
+
+
+class Visitor(threading.Thread):
+    """Takes a place, says so, and keeps it until it is told to go."""
+
+    def __init__(self, admission: Admission, *, alone: bool = False, starts: bool = True) -> None:
+        super().__init__(daemon=True)
+        self.admission = admission
+        self.alone = alone
+        self.starts = starts
+        self.inside = threading.Event()
+        self.leave = threading.Event()
+        self.start()
+
+    def run(self) -> None:
+        with self.admission.cell(alone=self.alone) as ticket:
+            if self.starts:
+                ticket.started()
+            self.inside.set()
+            self.leave.wait(LIMIT_S)
+
+    def is_inside(self) -> bool:
+        return self.inside.wait(LIMIT_S)
+
+    def go(self) -> None:
+        self.leave.set()
+        self.join(LIMIT_S)
+
+
+def test_no_more_than_the_bound_are_inside() -> None:
+    admission = Admission(cells=2, starts=2)
+    first, second = Visitor(admission), Visitor(admission)
+    assert first.is_inside() and second.is_inside()
+    third = Visitor(admission)
+    assert not third.inside.wait(0.1)
+    first.go()
+    assert third.is_inside()
+    second.go()
+    third.go()
+
+
+def test_the_next_starts_when_one_has_started() -> None:
+    admission = Admission(cells=8, starts=1)
+    first = Visitor(admission, starts=False)
+    assert first.is_inside()
+    second = Visitor(admission)
+    assert not second.inside.wait(0.1)
+    first.go()
+    assert second.is_inside()
+    second.go()
+
+
+def test_alone_waits_for_the_others_and_keeps_them_out() -> None:
+    admission = Admission(cells=8, starts=8)
+    first = Visitor(admission)
+    assert first.is_inside()
+    lonely = Visitor(admission, alone=True)
+    assert not lonely.inside.wait(0.1)
+    first.go()
+    assert lonely.is_inside()
+    later = Visitor(admission)
+    assert not later.inside.wait(0.1)
+    lonely.go()
+    assert later.is_inside()
+    later.go()

@@ -1,0 +1,77 @@
+"""Output is drained whatever is written, and what is kept stays within bounds."""
+
+from __future__ import annotations
+
+import json
+import os
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.recording.model import LogLine
+from grader.run.output import OutputReader
+
+
+def read(*chunks: bytes, stream: str = "stdout", limit: int = 1 << 16) -> tuple[LogLine, ...]:
+    """Write chunks into a pipe that is being read; all lines."""
+    reader = OutputReader(limit)
+    read_end, write_end = os.pipe()
+    reader.add(read_end, "p/e", stream)
+    for chunk in chunks:
+        rest = chunk
+        while rest:
+            rest = rest[os.write(write_end, rest) :]
+    os.close(write_end)
+    return reader.close(10.0)
+
+
+def test_lines_keep_their_order_and_lose_their_ends() -> None:
+    assert [line.text for line in read(b"one\ntwo\r\nthr", b"ee\n", b"four")] == [
+        "one",
+        "two",
+        "three",
+        "four",
+    ]
+
+
+def test_bytes_that_are_not_text_are_replaced() -> None:
+    assert read(b"\xff\xfe ok\n")[0].text == "\ufffd\ufffd ok"
+
+
+def test_the_first_and_the_last_lines_are_kept() -> None:
+    lines = [line.text for line in read(*[b"%06d\n" % n for n in range(10_000)], limit=1000)]
+    assert lines[0] == "000000"
+    assert lines[-1] == "009999"
+    assert sum(len(line) + 1 for line in lines) <= 1000
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.binary(max_size=20_000), max_size=8))
+def test_whatever_is_written_is_read_within_bounds(chunks: list[bytes]) -> None:
+    lines = read(*chunks, limit=10_000)
+    # A line may exceed the bound alone, but never the longest line.
+    assert sum(len(line.text) for line in lines) <= 5_000 + max(5_000, 8192)
+
+
+def test_declarations_are_read_and_nonsense_is_dropped() -> None:
+    reader = OutputReader(1 << 16)
+    read_end, write_end = os.pipe()
+    reader.add(read_end, "p/e", "tracer")
+    good = json.dumps({"kind": "timer", "period_s": 0.3}).encode()
+    for line in (b"nonsense", b"[1, 2]", b"{}", b"[" * 100_000, good, b'"text"'):
+        os.write(write_end, line + b"\n")
+    os.close(write_end)
+    assert reader.close(10.0) == ()
+    (declaration,) = reader.declarations
+    assert (declaration.kind, declaration.data) == ("timer", {"period_s": 0.3})
+
+
+def test_a_pipe_that_stays_open_does_not_hold_us_up() -> None:
+    reader = OutputReader(1000)
+    read_end, write_end = os.pipe()
+    reader.add(read_end, "p/e", "stdout")
+    os.write(write_end, b"still there\n")
+    try:
+        assert [line.text for line in reader.close(0.2)] == ["still there"]
+    finally:
+        os.close(write_end)
