@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import inspect
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,29 +17,57 @@ from typing import Any
 from pydantic import BaseModel
 
 from grader import resources
-from grader.assignment import model, mutant, own_check
+from grader.assignment import model, mutant
 from grader.assignment.quantity import UNITS, Dimension, format_duration
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 
 _MADE = "<!-- Made by `python -m grader.docs` from the code: change it there. -->"
 
-_ASSIGNMENT_MODELS: tuple[type[BaseModel], ...] = (
-    model.Assignment,
-    model.Package,
-    model.Scenario,
-    model.Launch,
-    model.RecordedTopic,
-    model.ListParameters,
-    model.Until,
-    model.CheckSpec,
-)
-_MUTANT_MODELS: tuple[type[BaseModel], ...] = (
-    mutant.MutantFile,
-    mutant.Mutant,
-    mutant.Variant,
-    mutant.Edit,
-)
+# Heading of a section -> the model that it describes, in the order of reading.
+_ASSIGNMENT_SECTIONS: dict[str, type[BaseModel]] = {
+    "The whole file": model.Assignment,
+    "packages": model.Package,
+    "scenarios": model.Scenario,
+    "launch": model.Launch,
+    "record": model.RecordedTopic,
+    "stimuli": model.ListParameters,
+    "until": model.Until,
+    "checks": model.CheckSpec,
+}
+_MUTANT_SECTIONS: dict[str, type[BaseModel]] = {
+    "The whole of mutants.yaml": mutant.MutantFile,
+    "mutants": mutant.Mutant,
+    "variants": mutant.Variant,
+    "edits": mutant.Edit,
+}
+_HEADINGS = {
+    one.__name__: heading
+    for sections in (_ASSIGNMENT_SECTIONS, _MUTANT_SECTIONS)
+    for heading, one in sections.items()
+}
+_OWN_CHECKS = """\
+`python: checks.py:drives_straight` names a function in a file beside assignment.yaml:
+
+```python
+from grader.assignment.quantity import Angle
+from grader.checks.finding import Finding
+from grader.recording.model import Recording
+
+
+def drives_straight(recording: Recording, topic: str, tolerance: Angle = 0.01) -> Finding:
+    \"""The robot drives straight ahead.\"""
+    turns = [abs(message.value["angular"]["z"]) for message in recording.on(topic)]
+    if max(turns, default=0.0) <= tolerance:
+        return Finding.passed("no turn", "none")
+    return Finding.failed("no turn", f"turns with {max(turns):g} rad/s", "Leave angular.z at 0.")
+```
+
+Its first argument is the recording; the others are the keys of `with`, validated by their
+annotations. The first line of its docstring is its title. It must be a pure function: it is
+called again when a recording is judged again. An exception in it costs no student a point; the
+submission counts as not graded. The file runs in the grader's own process, so its author must
+be trusted."""
 _EXAMPLES = {
     Dimension.TIME: "300 ms",
     Dimension.FREQUENCY: "10 Hz",
@@ -70,17 +99,17 @@ def assignment_markdown() -> str:
         "`README.md` and `mutants.yaml`. `rosgrade validate` checks the files and names the "
         "line of every mistake; `rosgrade schema` prints a JSON Schema for editors.",
         "Scalars are those of YAML 1.2: `on`, `yes` and `12:30` are text, `1e-3` is a number.",
-        *(_model_section(one) for one in _ASSIGNMENT_MODELS),
+        *(_model_section(*item) for item in _ASSIGNMENT_SECTIONS.items()),
         "## Quantities",
         "A quantity is a number with its unit; zero may stand without, and so may a ratio "
         "below one (`0.05` is `5 %`).",
         _table(("quantity", "units", "example"), _quantity_rows()),
         "## Own checks",
-        (inspect.getdoc(own_check) or "").partition("\n")[2].strip(),
+        _OWN_CHECKS,
         "## Example",
         f"```yaml\n{example.read_text(encoding='utf-8').strip()}\n```",
         "# mutants.yaml",
-        *(_model_section(one) for one in _MUTANT_MODELS),
+        *(_model_section(*item) for item in _MUTANT_SECTIONS.items()),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -88,8 +117,7 @@ def assignment_markdown() -> str:
 def checks_markdown(catalogue: Mapping[str, Check] = CATALOGUE) -> str:
     """The catalogue of checks."""
     rows = [
-        (f"[`{check.name}`](#{check.name.replace('.', '')})", check.title)
-        for check in catalogue.values()
+        (f"[`{check.name}`]({_anchor(check.name)})", check.title) for check in catalogue.values()
     ]
     parts = [
         "# Checks",
@@ -105,20 +133,28 @@ def checks_markdown(catalogue: Mapping[str, Check] = CATALOGUE) -> str:
 
 def check_markdown(check: Check) -> str:
     """One check: what it asks for, what it explains, its parameters."""
-    judged = {
-        Subject.SUBMISSION: "Judges what was handed in.",
-        Subject.RECORDING: "Judges the recording of a run.",
-    }[check.subject]
-    parts = [f"## {check.name}", check.documentation, judged]
+    parts = [f"## {check.name}", _outside_code(check.documentation)]
+    if check.subject is Subject.SUBMISSION:
+        parts.append("A check of what was handed in: it has no `scenarios`.")
     if check.parameters.model_fields:
         parts.append(_fields_table(check.parameters))
-    else:
-        parts.append("It has no parameters.")
     return "\n\n".join(parts)
 
 
-def _model_section(one: type[BaseModel]) -> str:
-    return f"## {one.__name__}\n\n{inspect.getdoc(one)}\n\n{_fields_table(one)}"
+def _model_section(heading: str, one: type[BaseModel]) -> str:
+    return f"## {heading}\n\n{inspect.getdoc(one)}\n\n{_fields_table(one)}"
+
+
+def _anchor(heading: str) -> str:
+    """The link to a heading, as Markdown renderers make it."""
+    return "#" + re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-")
+
+
+def _outside_code(text: str) -> str:
+    """Escape what HTML would take for tags, but not in `code`."""
+    parts = text.split("`")
+    parts[::2] = [part.replace("<", "&lt;") for part in parts[::2]]
+    return "`".join(parts)
 
 
 def _fields_table(one: type[BaseModel]) -> str:
@@ -128,21 +164,22 @@ def _fields_table(one: type[BaseModel]) -> str:
     rows = []
     for key, found in schema.get("properties", {}).items():
         default = "required" if key in required else _default(found)
-        meaning = str(found.get("description", "")).replace("\n", " ")
+        meaning = _outside_code(str(found.get("description", "")).replace("\n", " "))
         rows.append((f"`{key}`", _value(found, definitions), default, meaning))
     return _table(("key", "value", "default", "meaning"), rows)
 
 
 def _value(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
     """What may be written, in words."""
+    if "x-words" in schema:
+        return str(schema["x-words"])
     if "x-dimension" in schema:
         dimension = Dimension(schema["x-dimension"])
         return f"{dimension.value}, such as `{_EXAMPLES[dimension]}`"
     if "$ref" in schema:
         name = str(schema["$ref"]).rpartition("/")[2]
-        target = definitions[name]
-        is_section = any(one.__name__ == name for one in (*_ASSIGNMENT_MODELS, *_MUTANT_MODELS))
-        return f"[{name}](#{name.lower()})" if is_section else _value(target, definitions)
+        heading = _HEADINGS.get(name)
+        return f"[{heading}]({_anchor(heading)})" if heading else _value(definitions[name], {})
     for key in ("anyOf", "oneOf"):
         if key in schema:
             forms = [form for form in schema[key] if form.get("type") != "null"]
@@ -155,7 +192,8 @@ def _value(schema: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
         return f"list of {_value(schema.get('items', {}), definitions)}"
     inner = schema.get("additionalProperties")
     if kind == "object" and isinstance(inner, dict):
-        return f"keys, each with {_value(inner, definitions)}"
+        nullable = " or `null`" if {"type": "null"} in inner.get("anyOf", ()) else ""
+        return f"keys, each with {_value(inner, definitions)}{nullable}"
     return _TYPES.get(str(kind), "anything") + _bounds(schema)
 
 

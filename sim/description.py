@@ -30,7 +30,7 @@ from grader.assignment.quantity import (
     Ratio,
 )
 from grader.assignment.source import Model, read_source
-from sim.coordinates import Metres, PoseInPlane, PositiveMetres
+from sim.coordinates import PoseInPlane, PositiveMetres
 from sim.motion import ORIGIN, Pose
 
 TopicName = Annotated[str, AfterValidator(topic_name)]
@@ -127,9 +127,8 @@ class DriftOptions(Model):
     separation: Ratio = Field(
         0.0, description="Standard deviation of the wheel separation, constant in a run."
     )
-    slip: Annotated[float, Metres()] = Field(
+    slip: LengthOrZero = Field(
         0.0,
-        ge=0.0,
         description="Standard deviation of a wheel's way after one metre; it grows with the "
         "square root of the way.",
     )

@@ -27,17 +27,23 @@ from grader.assignment.quantity import Duration, DurationOrZero
 from grader.assignment.source import Model
 
 
-def _pattern(pattern: str) -> WithJsonSchema:
-    """The rule for a name, for editors."""
-    return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$"})
+def _form(pattern: str, words: str) -> WithJsonSchema:
+    """The rule for a name, for editors and for the documentation."""
+    return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$", "x-words": words})
 
 
-Id = Annotated[str, AfterValidator(check_id), _pattern(ID)]
-PackageName = Annotated[str, AfterValidator(package_name), _pattern(ID)]
-NodeName = Annotated[str, AfterValidator(node_name), _pattern(NODE)]
-Namespace = Annotated[str, AfterValidator(namespace), _pattern(rf"(/|{TOPIC})")]
-TopicName = Annotated[str, AfterValidator(topic_name), _pattern(TOPIC)]
-InterfaceName = Annotated[str, AfterValidator(interface_name), _pattern(INTERFACE)]
+Id = Annotated[str, AfterValidator(check_id), _form(ID, "id, such as `period_2`")]
+PackageName = Annotated[str, AfterValidator(package_name), _form(ID, "package name")]
+NodeName = Annotated[str, AfterValidator(node_name), _form(NODE, "node name")]
+Namespace = Annotated[
+    str, AfterValidator(namespace), _form(rf"(/|{TOPIC})", "namespace, such as `/robot`")
+]
+TopicName = Annotated[str, AfterValidator(topic_name), _form(TOPIC, "topic, such as `/cmd_vel`")]
+InterfaceName = Annotated[
+    str,
+    AfterValidator(interface_name),
+    _form(INTERFACE, "interface, such as `geometry_msgs/msg/Twist`"),
+]
 
 Reliability = Literal["reliable", "best_effort"]
 Durability = Literal["volatile", "transient_local"]

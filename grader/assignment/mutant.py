@@ -50,7 +50,7 @@ class Change(Model):
     """What is different from the reference: `edits` first, then `files`, then `move`."""
 
     id: Id = Field(description="Short name, unique in the file.")
-    title: str = Field(description="What was done, in the words of a student.")
+    title: str = Field(description="What is different, in the words of a student.")
     edits: tuple[Edit, ...] = Field((), description="Texts to replace, one after the other.")
     files: dict[FilePath, str | None] = Field(
         default_factory=dict,
@@ -65,7 +65,7 @@ class Change(Model):
 
 
 class Mutant(Change):
-    """A mistake."""
+    """The reference with one mistake in it."""
 
     loses: tuple[Id, ...] = Field(
         min_length=1,

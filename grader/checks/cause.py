@@ -28,9 +28,7 @@ class Cause:
     def finding(self, expected: str) -> Finding:
         """The finding of a check that expected something else."""
         if self.ours:
-            return Finding.error(
-                expected, self.observed, disturbed=self.disturbed, hint=self.hint
-            )
+            return Finding.error(expected, self.observed, disturbed=self.disturbed, hint=self.hint)
         return Finding.failed(expected, self.observed, self.hint, self.evidence)
 
     def after(self, beginning: str) -> Cause:

@@ -32,8 +32,7 @@ def refusals(offered: Qos, requested: Qos) -> tuple[str, ...]:
     ):
         if request_s is not None and (offer_s is None or offer_s > request_s):
             found.append(
-                f"{policy} {duration_words(offer_s)} offered, "
-                f"{duration_words(request_s)} requested"
+                f"{policy} {duration_words(offer_s)} offered, {duration_words(request_s)} requested"
             )
     return tuple(found)
 

@@ -10,6 +10,7 @@ from grader.checks.finding import Evidence, Finding, Table
 from grader.checks.unbuilt import existing_package, why_no_package
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
+from grader.submission.dependencies import meant
 from grader.submission.record import (
     Dependency,
     Import,
@@ -21,28 +22,6 @@ from grader.submission.record import (
 # Tags that make a package be there when the code runs or is built (REP-149).
 _COUNTING = frozenset(
     {"depend", "exec_depend", "build_depend", "build_export_depend", "run_depend"}
-)
-_COMMON = (
-    "action_msgs",
-    "ament_index_python",
-    "builtin_interfaces",
-    "cv_bridge",
-    "example_interfaces",
-    "geometry_msgs",
-    "launch",
-    "launch_ros",
-    "nav_msgs",
-    "python3-numpy",
-    "rclcpp",
-    "rclpy",
-    "rosidl_default_generators",
-    "rosidl_default_runtime",
-    "sensor_msgs",
-    "std_msgs",
-    "std_srvs",
-    "tf2_ros",
-    "turtlesim",
-    "visualization_msgs",
 )
 
 
@@ -109,9 +88,7 @@ def _missing(package: PackageRecord) -> list[Import]:
 
 def _unknown(submission: SubmissionRecord, package: PackageRecord) -> list[Dependency]:
     own = {item.name for item in submission.packages}
-    return [
-        item for item in package.dependencies if item.known is False and item.name not in own
-    ]
+    return [item for item in package.dependencies if item.known is False and item.name not in own]
 
 
 def _fault(
@@ -130,9 +107,9 @@ def _fault(
     if missing:
         tags = codes(f"<depend>{item.module}</depend>" for item in missing)
         hints.append(f"Don't forget the dependencies: add {tags} to package.xml.")
-    candidates = {*_COMMON, *(item.module for item in package.ros_imports)}
+    imported = {item.module for item in package.ros_imports}
     for entry in unknown:
-        match = nearest(entry.name, candidates)
+        match = nearest(entry.name, imported) or meant(entry.name)
         parts.append(f"package.xml names {code(entry.name)}, which does not exist")
         places.append(SourceError(manifest, entry.line, f"{entry.name} does not exist"))
         remedy = f"<{entry.kind}>{match}</{entry.kind}>" if match else "remove it"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, field_validator
 
 from grader.assignment.quantity import Duration, Ratio, format_duration
 from grader.checks import testimony
@@ -29,13 +29,19 @@ class Responsive(Parameters):
     within: Duration = Field(1.0, description="How long an answer may take, by default 1 s.")
     share: Ratio = Field(
         0.9,
-        le=1.0,
         description="Share of the calls that must be answered in time. Of three calls or more "
         "one may be late, unless it is 100 %.",
     )
     node: Annotated[str, AfterValidator(node_name)] | None = Field(
         None, description="Name of the node; by default every node of the student."
     )
+
+    @field_validator("share")
+    @classmethod
+    def _not_more_than_all(cls, share: float) -> float:
+        if share > 1.0:
+            raise ValueError("more than 100 % of the calls cannot be answered")
+        return share
 
 
 @dataclass(frozen=True)
@@ -73,9 +79,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     `rclpy.spin()` that was never called. For a node without parameter services it relies on
     what the process declared: that it spins and has a timer.
     """
-    expected = (
-        f"parameter services of the node answer within {format_duration(parameters.within)}"
-    )
+    expected = f"parameter services of the node answer within {format_duration(parameters.within)}"
     if parameters.node:
         missing = why_not_node(recording, parameters.node)
     else:
@@ -121,9 +125,7 @@ def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answer
 def _working_from(recording: Recording, node: str) -> int:
     """When a node began to publish, or when it appeared if it publishes nothing."""
     topics = {
-        item.topic
-        for item in recording.student_endpoints(Kind.PUBLISHER)
-        if item.node == node
+        item.topic for item in recording.student_endpoints(Kind.PUBLISHER) if item.node == node
     }
     stamps = [recording.on(topic)[0].received_ns for topic in topics if recording.on(topic)]
     appeared = [item.appeared_ns for item in recording.student_nodes if item.name == node]

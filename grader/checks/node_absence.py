@@ -12,6 +12,8 @@ from grader.nearest import nearest
 from grader.recording.model import Ending, Process, Recording
 
 _LOG_LINES = 10
+# How the cell calls the wait for a process that it could not start.
+_START = "start of "
 
 
 def why_no_node(recording: Recording) -> Cause | None:
@@ -47,12 +49,14 @@ def _not_started(recording: Recording) -> Cause:
             "Mend the build first: `colcon build` names the line.",
             Evidence(places=(build.culprit,) if build.culprit else ()),
         )
-    installed = [
-        name for package in recording.submission.packages for name in package.executables
-    ]
-    there = f"; installed are {codes(installed)}" if installed else "; none was installed"
+    installed = [name for package in recording.submission.packages for name in package.executables]
+    there = f"; installed are {codes(installed)}" if installed else ""
+    start = next((w.what for w in recording.waits if w.what.startswith(_START)), "")
+    what, _, why = start.removeprefix(_START).partition(": ")
     return Cause(
-        f"nothing was launched, because the executable does not exist{there}",
+        f"{code(what)} could not be started: {why}{there}"
+        if why
+        else f"nothing was launched, because the executable does not exist{there}",
         "The executable's name is the left side of an entry of console_scripts in setup.py.",
     )
 

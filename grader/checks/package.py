@@ -71,16 +71,47 @@ class Builds(Parameters):
 def builds(submission: SubmissionRecord, parameters: Builds) -> Finding:
     """The package builds with colcon.
 
-    Judged by `colcon build` on a copy of what was handed in.
+    Judged by `colcon build` on a copy of what was handed in. A syntax error in the module of
+    an executable counts too, if the package has no other executable: colcon only prints it and
+    goes on.
 
     Explains the first error with your file and line and the end of the build's output, a build
     that never ends, and a package that was not built because another one failed.
     """
     expected = f"`colcon build` builds {code(parameters.package)}"
     cause = why_not_built(submission, parameters.package)
+    if cause is None:
+        cause = _why_unreadable(existing_package(submission, parameters.package))
     if cause is not None:
         return cause.finding(expected)
     return Finding.passed(expected, "it builds")
+
+
+def _why_unreadable(package: PackageRecord) -> Cause | None:
+    """A syntax error that leaves no executable of the package to run."""
+    origins = dict(package.files)
+    broken = {error.file: error for error in package.syntax_errors}
+    errors: list[SourceError] = []
+    for _, target in package.entry_points:
+        found = [origins.get(path, "") for path in _modules(target.partition(":")[0])]
+        error = next((broken[path] for path in found if path in broken), None)
+        if error is None:
+            return None
+        errors.append(error)
+    if not errors:
+        return None
+    return Cause(
+        f"Python cannot read {errors[0]}",
+        "Mend this line or the one before it; `colcon build` prints the error too, but goes on.",
+        Evidence(places=tuple(dict.fromkeys(errors))),
+    )
+
+
+def _modules(dotted: str) -> list[str]:
+    """Installed paths that the import of a module reads: ``a.b`` reads a/__init__.py first."""
+    steps = dotted.strip().split(".")
+    folders = ["/".join(steps[:end]) for end in range(1, len(steps) + 1)]
+    return [*(f"{folder}/__init__.py" for folder in folders), f"{folders[-1]}.py"]
 
 
 class Executable(Parameters):

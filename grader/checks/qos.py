@@ -142,9 +142,7 @@ def _judge(recording: Recording, parameters: Profile, side: _Side) -> Finding:
     if hidden or not endpoints:
         names = ", ".join(hidden) or "QoS"
         return Finding.error(expected, f"{names} of the {side.kind.value} was not discovered")
-    return Finding.passed(
-        expected, f"{side.did} by {counted(len(endpoints), side.kind.value)}"
-    )
+    return Finding.passed(expected, f"{side.did} by {counted(len(endpoints), side.kind.value)}")
 
 
 def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:

@@ -16,6 +16,8 @@ _TENS_TOLERANCE = 0.1
 _MOST_TIMES = 5
 _TIMES_TOLERANCE = 0.08
 _SAME = 0.05
+# So many timers of one period are not made by hand.
+_MADE_ANEW = 4
 _WORDS = {2: "twice", 3: "three times", 4: "four times", 5: "five times"}
 _ONE_TIMER = "Create one timer in the constructor, once, and publish once in its callback."
 
@@ -99,9 +101,7 @@ def _wrong_period(
     said = f"; the process declared a timer of {format_duration(same)}" if same else ""
     for factor in _TENS:
         for ratio, words in ((factor, "times"), (1.0 / factor, "of")):
-            if median_s > 0.0 and math.isclose(
-                median_s / wanted_s, ratio, rel_tol=_TENS_TOLERANCE
-            ):
+            if median_s > 0.0 and math.isclose(median_s / wanted_s, ratio, rel_tol=_TENS_TOLERANCE):
                 amount = f"{factor:g} times" if words == "times" else f"1/{factor:g} of"
                 return Explanation(f"{amount} the expected period{said}", _seconds_hint(limits))
     if same:
@@ -109,7 +109,15 @@ def _wrong_period(
     if median_s < wanted_s:
         return _too_fast(recording, topic)
     longer = format_duration(median_s - wanted_s)
-    if any(math.isclose(item, wanted_s, rel_tol=_SAME) for item in declared):
+    right = [item for item in declared if math.isclose(item, wanted_s, rel_tol=_SAME)]
+    if len(right) >= _MADE_ANEW:
+        return Explanation(
+            f"{longer} too long: the process declared {len(right)} timers of {wanted}, as if the "
+            "callback made a new one each time",
+            "Create one timer in the constructor: it goes on by itself, and keeps its period "
+            "whatever the callback needs.",
+        )
+    if right:
         return Explanation(
             f"{longer} too long: the process declared a timer of {wanted}, but the executor "
             "cannot call it again before the callbacks are done",

@@ -14,9 +14,7 @@ _FACTORS = {1000.0: "1000 times", 100.0: "100 times", 10.0: "10 times"}
 _FACTOR_TOLERANCE = 1e-6
 
 
-def explain(
-    wrong: tuple[Difference, ...], observed: Mapping[str, Any], tolerance: float
-) -> str:
+def explain(wrong: tuple[Difference, ...], observed: Mapping[str, Any], tolerance: float) -> str:
     """Say which slip explains the differences, or nothing.
 
     Args:

@@ -140,9 +140,7 @@ def _figures(measured: tuple[Interval, ...], verdict: Verdict) -> str:
     )
 
 
-def _evidence(
-    recording: Recording, parameters: Period, measured: tuple[Interval, ...]
-) -> Evidence:
+def _evidence(recording: Recording, parameters: Period, measured: tuple[Interval, ...]) -> Evidence:
     limits = parameters.limits
     worst = max(measured, key=lambda item: abs(item.seconds - limits.period_s))
     return Evidence(

@@ -63,9 +63,7 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
     return _elsewhere(recording, kind, topic, own, evidence)
 
 
-def _near_miss(
-    kind: Kind, topic: str, own: list[Endpoint], evidence: Evidence
-) -> Cause | None:
+def _near_miss(kind: Kind, topic: str, own: list[Endpoint], evidence: Evidence) -> Cause | None:
     base = topic.rpartition("/")[2]
     for item in own:
         found = f"the node {_DOES[kind]} {code(item.topic)} instead"

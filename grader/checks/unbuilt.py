@@ -13,9 +13,10 @@ from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecor
 _LOG_LINES = 15
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 # What colcon says of its own doings around the tool's output.
-_CHATTER = re.compile(
-    r"^(Starting +>>>|Finished +<<<|Failed +<<<|Aborted +<<<|Summary:|---|\s+\d+ packages? )"
-)
+_CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
+_ABORTED = re.compile(r"^Aborted +<<< (\S+)", re.MULTILINE)
+# What the build adds at the end when it ended colcon itself.
+_OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
 
 
 def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
@@ -69,6 +70,9 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
         return Cause("nothing was built, so this cannot be judged", ours=True)
     if build.succeeded:
         return None
+    # A package that is not among those that failed was built, whatever became of the others.
+    if build.failed_packages and name not in build.failed_packages:
+        return None
     if build.timed_out:
         return Cause(
             "`colcon build` did not finish within its time limit and was ended",
@@ -76,15 +80,9 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
             "CMakeLists.txt.",
             _evidence(build, name),
         )
-    failed = build.failed_packages
-    aborted = {found[1] for found in re.finditer(r"^Aborted +<<< (\S+)", _clean(build), re.M)}
-    others = [other for other in failed if other != name and other not in aborted]
-    if name in failed and not (name in aborted and others):
-        return _failed(build, name)
-    package = existing_package(submission, name)
-    if name not in failed and (package.executables or package.misplaced_executables):
-        return None
-    if not others:
+    aborted = {found[1] for found in _ABORTED.finditer(_clean(build))}
+    others = [other for other in build.failed_packages if other not in {name, *aborted}]
+    if name not in aborted or not others:
         return _failed(build, name)
     return Cause(
         f"it was not built, because {codes(others)} failed to build",
@@ -94,9 +92,10 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
 
 
 def _failed(build: BuildRecord, name: str) -> Cause:
-    where = f": {build.culprit}" if build.culprit else ""
+    ended = _OURS.search(build.log)
+    why = str(build.culprit) if build.culprit else ended[1] if ended else ""
     return Cause(
-        f"`colcon build` failed{where}",
+        f"`colcon build` failed: {why}" if why else "`colcon build` failed",
         f"Run `colcon build --packages-select {name}` in the workspace and mend the first error "
         "that it prints.",
         _evidence(build, name),
@@ -116,12 +115,15 @@ def _clean(build: BuildRecord) -> str:
 def _relevant(log: str, name: str) -> tuple[str, ...]:
     """The end of what the build of the package wrote, without colcon's own lines."""
     lines = log.splitlines()
-    marks = [i for i, line in enumerate(lines) if line.startswith(f"--- stderr: {name}")]
-    if marks:
-        block = lines[marks[-1] + 1 :]
-        end = next((i for i, line in enumerate(block) if line.strip() == "---"), len(block))
-        block = [line for line in block[:end] if line.strip()]
-        if block:
-            return tuple(block[-_LOG_LINES:])
+    begin = _last(lines, f"Starting >>> {name}")
+    if begin is not None:
+        lines = lines[begin:]
+        end = _last(lines, f"Failed   <<< {name}", f"Aborted  <<< {name}")
+        lines = lines[:end]
     kept = [line for line in lines if line.strip() and not _CHATTER.match(line)]
     return tuple(kept[-_LOG_LINES:])
+
+
+def _last(lines: list[str], *beginnings: str) -> int | None:
+    found = [i for i, line in enumerate(lines) if line.startswith(beginnings)]
+    return found[-1] if found else None

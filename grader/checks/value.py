@@ -67,9 +67,7 @@ def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> 
     return found
 
 
-def _expect(
-    names: list[str], item: Any, message: Any, path: str, found: dict[str, Any]
-) -> None:
+def _expect(names: list[str], item: Any, message: Any, path: str, found: dict[str, Any]) -> None:
     if names:
         name, here = names[0], path or "the message"
         if not isinstance(message, Mapping):

@@ -87,6 +87,7 @@ class Cell:
         self._faults: list[str] = []
         self._next_graph = 0.0
         self._next_call = 0.0
+        self._told = 0
         self._matched_ns: int | None = None
 
     def run(self) -> Recording:
@@ -284,13 +285,34 @@ class Cell:
             # A message ends the wait at once; only the graph has to be polled.
             self._probe.spin_once(_TICK_S if self._matched_ns is None else _CALM_TICK_S)
             now = time.monotonic()
-            if now >= self._next_graph:
+            leaving = self._leaving()
+            if now >= self._next_graph or len(leaving) > self._told:
                 self._next_graph = now + _GRAPH_PERIOD_S
                 self._graph.poll()
                 self._find_foreign()
                 _raise_if_abandoned()
+            self._let_leave(leaving)
             self._call_services(now)
             yield watch
+
+    def _leaving(self) -> list[str]:
+        """Processes that wait to be seen before they end, by their tracers' word."""
+        return [item.process for item in self._output.declarations if item.kind == "leaving"]
+
+    def _let_leave(self, leaving: list[str]) -> None:
+        if len(leaving) == self._told:
+            return
+        nodes = {node.name for node in self._graph.nodes}
+        topics = {endpoint.topic for endpoint in self._graph.endpoints}
+        for declaration in self._output.declarations:
+            kind, data = declaration.kind, declaration.data
+            if kind == "node" and data.get("node") not in nodes:
+                return
+            if kind in ("publisher", "subscription") and data.get("topic") not in topics:
+                return
+        for name in leaving[self._told :]:
+            self._students.let_leave(name)
+        self._told = len(leaving)
 
     def _call_services(self, now: float) -> None:
         every_s = self._order.list_parameters_s
@@ -317,6 +339,7 @@ class Cell:
 
     def _stop(self) -> None:
         """SIGINT, SIGTERM, SIGKILL, each with a bounded wait."""
+        self._students.let_leave()
         limits = self._order.limits
         watch = Stopwatch(self._meter)
         for number, limit_s in (

@@ -21,6 +21,7 @@ class _Running:
     name: str
     popen: subprocess.Popen[bytes]
     started_ns: int
+    seen_fd: int | None
     exited_ns: int | None = None
     stopped_by: str = "itself"
     stop_s: float | None = None
@@ -51,23 +52,30 @@ class StudentProcesses:
             OSError: It cannot be executed.
         """
         tracer_read, tracer_write = os.pipe()
+        seen_read, seen_write = os.pipe()
         try:
             popen = subprocess.Popen(
                 argv,
                 cwd=folder,
-                env={**environment, "ROSGRADE_TRACER_FD": str(tracer_write)},
+                env={
+                    **environment,
+                    "ROSGRADE_TRACER_FD": str(tracer_write),
+                    "ROSGRADE_SEEN_FD": str(seen_read),
+                },
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
-                pass_fds=(tracer_write,),
+                pass_fds=(tracer_write, seen_read),
                 start_new_session=True,
             )
         except OSError:
             os.close(tracer_read)
+            os.close(seen_write)
             raise
         finally:
             os.close(tracer_write)
-        self._running.append(_Running(name, popen, time.time_ns()))
+            os.close(seen_read)
+        self._running.append(_Running(name, popen, time.time_ns(), seen_write))
         for pipe, stream in ((popen.stdout, "stdout"), (popen.stderr, "stderr")):
             assert pipe is not None
             self._output.add(os.dup(pipe.fileno()), name, stream)
@@ -90,6 +98,13 @@ class StudentProcesses:
             if process.exited_ns is None and process.popen.poll() is not None:
                 process.exited_ns = time.time_ns()
         return any(process.exited_ns is None for process in self._running)
+
+    def let_leave(self, name: str | None = None) -> None:
+        """Let a process end, or all: their tracers wait until what they declared was seen."""
+        for process in self._running:
+            if name in (None, process.name) and process.seen_fd is not None:
+                os.close(process.seen_fd)
+                process.seen_fd = None
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the process group of every process that still runs."""

@@ -22,7 +22,7 @@ from grader.ros import RosInstallation
 from grader.submission import buildlog
 from grader.submission.bounded import Outcome, OutputLimits, run_bounded
 from grader.submission.build_cache import INSTALL, BuildCache, CachedBuild
-from grader.submission.culprit import Sources, find_culprit
+from grader.submission.culprit import Sources, find_culprit, last_started
 from grader.submission.installed import site_packages
 from grader.submission.locate import Located
 from grader.submission.members import MIB
@@ -34,6 +34,7 @@ VERSION = 1
 
 _CMAKE_INCLUDE = Path(__file__).with_name("wheels.cmake")
 _PROGRESS = re.compile(r"(Starting >>>|Finished <<<) (\S+)")
+_UNSAID = "colcon could not build this package; the log says why"
 _COMPILE_S = 60.0
 _LEAST_FREE_BYTES = 64 * MIB
 
@@ -231,7 +232,10 @@ class _Workshop:
         log = buildlog.clean(outcome.output, paths)
         failed = sorted(set(self.sources.folders) - finished)
         succeeded = outcome.status == 0 and not failed and problem is None
-        culprit = None if succeeded else find_culprit(log, failed, self.sources)
+        culprit = None
+        if not succeeded:
+            culprit = find_culprit(log, failed, self.sources)
+            culprit = culprit or last_started(log, self.sources, problem or _UNSAID)
         if problem is not None:
             log += f"\n[rosgrade: {problem}]\n"
         return BuildRecord(

@@ -5,16 +5,16 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from grader.submission.paths import join, shown
+from grader.submission.paths import is_within, join, shown
 from grader.submission.record import SourceError
 
 _STARTED = re.compile(r"Starting >>> (\S+)")
 _TRACEBACK = "Traceback (most recent call last):"
 _FRAME = re.compile(r'\s*File "([^"]+)", line (\d+)')
 _SYNTAX_ERROR = re.compile(r"(SyntaxError|IndentationError|TabError): .+")
-_CMAKE = re.compile(r"CMake Error at (.+?):(\d+) \((\w+)\):")
+_CMAKE = re.compile(r"CMake Error at (.+?):(\d+)(?: \((\w+)\))?:")
 _CMAKE_PLAIN = re.compile(r"CMake Error: (.+)")
 _CMAKE_CALLER = re.compile(r"\s+(\S+):(\d+) \(\w+\)")
 _COMPILER = re.compile(r"([^\s:]+):(\d+)(?::\d+)?: (?:fatal )?error: (.+)")
@@ -26,6 +26,11 @@ _QUOTED = re.compile(r"'([^']+)'")
 _RUN_SETUP = ", in run_setup"
 _INTERFACE = re.compile(r"Error processing '([^']+)' of package '[^']+': (.+)")
 _INSTALLED = re.compile(r"(?:install|build/[^/]+/build)/lib/(?:python3[^/]*/site-packages/)?(.+)")
+_IDENTIFYING = re.compile(r"ERROR:.*Exception in package identification extension '\w+' in '(.+?)'")
+_NO_CMAKELISTS = "does not appear to contain CMakeLists.txt"
+_ABSOLUTE_DATA = "os.path.isabs(dest)"
+_DIED = re.compile(r".*setup\.py.* died with <Signals\.(\w+): \d+>")
+_INTERFACES = (".msg", ".srv", ".action")
 _MAX_MESSAGE = 500
 
 
@@ -36,13 +41,13 @@ class Sources:
     Attributes:
         files: Paths of all its files.
         folders: Package -> its folder.
-        setup_py: Package -> lines of its setup.py.
+        texts: Lines of each setup.py and interface file, in which quoted names are looked up.
         malformed: Package -> entry points that setuptools will not accept.
     """
 
     files: Collection[str]
     folders: Mapping[str, str]
-    setup_py: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
     malformed: Mapping[str, tuple[SourceError, ...]] = field(default_factory=dict)
 
 
@@ -59,7 +64,7 @@ def find_culprit(log: str, failed: Collection[str], sources: Sources) -> SourceE
         blames no file of the student.
     """
     lines = log.splitlines()
-    package = next(iter(sources.folders), "") if len(sources.folders) == 1 else ""
+    package = ""
     for number, line in enumerate(lines):
         started = _STARTED.match(line)
         if started:
@@ -70,6 +75,17 @@ def find_culprit(log: str, failed: Collection[str], sources: Sources) -> SourceE
                 message = shown(blamed.message)[:_MAX_MESSAGE]
                 return SourceError(shown(blamed.file), blamed.line, message)
     return None
+
+
+def last_started(log: str, sources: Sources, message: str) -> SourceError | None:
+    """Blame the build file of the package that was being built when the log ends."""
+    started = _STARTED.findall(log)
+    folder = sources.folders.get(started[-1] if started else "")
+    if folder is None:
+        return None
+    files = [join(folder, name) for name in ("setup.py", "CMakeLists.txt", "package.xml")]
+    file = next((file for file in files if file in sources.files), files[-1])
+    return SourceError(shown(file), None, message)
 
 
 @dataclass(frozen=True)
@@ -99,7 +115,7 @@ class _Place:
         if match := _CMAKE.match(line):
             return self._cmake(match)
         if match := _CMAKE_PLAIN.match(line):
-            return self._at("CMakeLists.txt", None, match[1])
+            return self._plain_cmake(match[1])
         if match := _INTERFACE.match(line):
             return self._at(match[1], None, match[2])
         if match := _COMPILER.match(line):
@@ -109,6 +125,8 @@ class _Place:
             return self._at(match[1], None, reason or line)
         if _NO_SETUP_PY.match(line):
             return SourceError(self.setup_py, None, "there is no setup.py")
+        if match := _DIED.match(line):
+            return self._setup(f"setup.py died with {match[1]}")
         if match := _SETUPTOOLS.match(line):
             return self._setup(match[1])
         return None
@@ -139,6 +157,8 @@ class _Place:
     def _traceback(self) -> SourceError | None:
         block = self._block()
         message = block[-1] if block else ""
+        if not self.package:
+            return self._while_identifying()
         file, at, in_setup = None, None, False
         for line in block:
             frame = _FRAME.match(line)
@@ -156,7 +176,27 @@ class _Place:
             if malformed:
                 return malformed[0]
             return self._setup("setup() is never called, or refuses its arguments")
+        if any(_ABSOLUTE_DATA in line for line in block):
+            return self._setup("data_files names an absolute folder; write 'share/<package>'")
         return None
+
+    def _while_identifying(self) -> SourceError | None:
+        """Colcon says only afterwards whose setup.py it ran to learn the package's name."""
+        for line in self.lines[self.number + 1 : self.number + 60]:
+            match = _IDENTIFYING.match(line)
+            for package, folder in self.sources.folders.items():
+                if match and posixpath.normpath(match[1]) == folder:
+                    return replace(self, package=package)._traceback()
+        return None
+
+    def _plain_cmake(self, message: str) -> SourceError | None:
+        if _NO_CMAKELISTS not in message:
+            return self._at("CMakeLists.txt", None, message)
+        if self.setup_py in self.sources.files:
+            message = "names no <build_type>; a Python package has ament_python in its <export>"
+        else:
+            message = "there is no CMakeLists.txt beside it, which this build type needs"
+        return self._at("package.xml", None, message)
 
     def _syntax_error(self, frame: re.Match[str]) -> SourceError | None:
         following = self.lines[self.number + 1 : self.number + 5]
@@ -164,15 +204,16 @@ class _Place:
         return self._at(frame[1], int(frame[2]), found) if found else None
 
     def _cmake(self, match: re.Match[str]) -> SourceError | None:
-        text: list[str] = []
-        for line in self._block():
-            if text and not line.strip():
-                break
-            text.append(line.strip())
-        message = " ".join(part for part in text if part) or f"{match[3]} failed"
+        paragraphs = _paragraphs(self._block())
+        message = paragraphs[0] if paragraphs else f"{match[3]} failed"
+        if any(_TRACEBACK in paragraph for paragraph in paragraphs):
+            # The generators of interfaces: what they raise is the last that they say.
+            message = paragraphs[-1]
+            quoted = self._quoted(message, _INTERFACES)
+            if quoted is not None:
+                return quoted
         blamed = self._at(match[1], int(match[2]), message)
-        callers = map(_CMAKE_CALLER.match, self._block_after("Call Stack"))
-        for caller in callers:
+        for caller in map(_CMAKE_CALLER.match, self._block_after("Call Stack")):
             if blamed is None and caller is not None:
                 blamed = self._at(caller[1], int(caller[2]), message)
         return blamed
@@ -186,9 +227,30 @@ class _Place:
     def _setup(self, message: str) -> SourceError | None:
         if self.setup_py not in self.sources.files:
             return None
-        source = self.sources.setup_py.get(self.package, [])
+        return self._quoted(message, ("setup.py",)) or SourceError(self.setup_py, None, message)
+
+    def _quoted(self, message: str, endings: tuple[str, ...]) -> SourceError | None:
+        """The first line of such a file of the package that has what the message quotes."""
+        folder = self.sources.folders.get(self.package, ".")
         for quoted in _QUOTED.findall(message):
-            for number, line in enumerate(source, start=1):
-                if f"'{quoted}'" in line or f'"{quoted}"' in line:
-                    return SourceError(self.setup_py, number, message)
-        return SourceError(self.setup_py, None, message)
+            word = re.compile(rf"(?<![\w-]){re.escape(quoted)}(?![\w-])")
+            for file, lines in sorted(self.sources.texts.items()):
+                if not (is_within(file, folder) and file.endswith(endings)):
+                    continue
+                for number, line in enumerate(lines, start=1):
+                    if word.search(line):
+                        return SourceError(file, number, message)
+        return None
+
+
+def _paragraphs(block: Sequence[str]) -> list[str]:
+    """Join the indented lines of a message of CMake to paragraphs."""
+    paragraphs: list[list[str]] = [[]]
+    for line in block:
+        if line and not line[0].isspace():
+            break
+        if line.strip():
+            paragraphs[-1].append(line.strip())
+        elif paragraphs[-1]:
+            paragraphs.append([])
+    return [" ".join(lines) for lines in paragraphs if lines]

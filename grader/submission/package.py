@@ -21,6 +21,8 @@ from grader.submission.record import Dependency, Import, PackageRecord, SourceEr
 from grader.submission.rosdistro import PYTHON_MODULES
 from grader.submission.targets import Modules, missing_target
 
+_INTERFACES = (".msg", ".srv", ".action")
+_MAX_INTERFACE_BYTES = 256 * 1024
 _CONDITIONS = {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
 
 
@@ -33,7 +35,7 @@ class Package:
         folder: In the submission.
         manifest: What package.xml says.
         setup: What setup.py and setup.cfg say.
-        setup_py: The lines of setup.py, none where there is no such file.
+        texts: Lines of setup.py and of the interface files, by path in the submission.
         hashes: Hash of each Python file and script, by path in the submission.
         trees: Syntax tree of each, or what is wrong with it.
     """
@@ -42,7 +44,7 @@ class Package:
     folder: str
     manifest: Manifest
     setup: Setup
-    setup_py: Sequence[str]
+    texts: Mapping[str, Sequence[str]]
     hashes: Mapping[str, str]
     trees: Mapping[str, ast.Module | SourceError]
 
@@ -51,7 +53,8 @@ class Package:
         """As colcon takes it; guessed where package.xml is broken before it says."""
         if self.manifest.build_type is not None:
             return self.manifest.build_type
-        return "ament_python" if self.setup_py else "ament_cmake"
+        has_setup_py = join(self.folder, "setup.py") in self.texts
+        return "ament_python" if has_setup_py else "ament_cmake"
 
     @property
     def module_root(self) -> str:
@@ -91,9 +94,12 @@ def read_package(located: Located, folder: str, ros: RosInstallation) -> Package
     setup = read_setup(setup_py, _bytes(located, join(folder, "setup.cfg")), shown(folder))
     hashes: dict[str, str] = {}
     trees: dict[str, ast.Module | SourceError] = {}
+    texts = {join(folder, "setup.py"): _lines(setup_py)} if setup_py is not None else {}
     for file in located.files:
         if not is_within(file.path, folder):
             continue
+        if file.path.endswith(_INTERFACES) and file.size <= _MAX_INTERFACE_BYTES:
+            texts[file.path] = _lines(_bytes(located, file.path) or b"")
         suffixed = file.path.endswith(".py")
         if not suffixed and "." in file.path.rpartition("/")[2]:
             continue
@@ -107,7 +113,7 @@ def read_package(located: Located, folder: str, ros: RosInstallation) -> Package
         folder=folder,
         manifest=manifest,
         setup=setup,
-        setup_py=(setup_py or b"").decode("utf-8", "replace").splitlines(),
+        texts=texts,
         hashes=hashes,
         trees=trees,
     )
@@ -232,6 +238,10 @@ def _told(dependency: Dependency, ros: RosInstallation, submitted: set[str]) -> 
 
 def _below(path: str, folder: str) -> str:
     return path if folder == "." else path[len(folder) + 1 :]
+
+
+def _lines(data: bytes) -> list[str]:
+    return data.decode("utf-8", "replace").splitlines()
 
 
 def _bytes(located: Located, path: str) -> bytes | None:

@@ -105,7 +105,7 @@ def _prepare(
     sources = Sources(
         files={file.path for file in located.files},
         folders={package.name: package.folder for package in packages},
-        setup_py={package.name: package.setup_py for package in packages},
+        texts={path: lines for package in packages for path, lines in package.texts.items()},
         malformed={package.name: package.setup.malformed for package in packages},
     )
     built = build(

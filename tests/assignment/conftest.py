@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from grader.assignment.quantity import Duration
 from grader.assignment.model import InterfaceName, TopicName
+from grader.assignment.quantity import Duration
 from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.checks.finding import Finding
 from tests.assignment.lessons import GOOD
@@ -72,7 +71,7 @@ def write(tmp_path: Path) -> Callable[..., Path]:
         folder.mkdir(exist_ok=True)
         (folder / "assignment.yaml").write_text(yaml, encoding="utf-8")
         for name, content in beside.items():
-            (folder / f"{name}.py").write_text(textwrap.dedent(content), encoding="utf-8")
+            (folder / f"{name}.py").write_text(content, encoding="utf-8")
         return folder
 
     return _write

@@ -172,8 +172,9 @@ def test_a_variant_keeps_every_check() -> None:
 def test_every_check_is_lost_or_below_a_lost_one_or_passes(data: st.DataObject) -> None:
     names = [f"c{index}" for index in range(6)]
     requires = {
-        name: data.draw(st.lists(st.sampled_from(names[:index]), unique=True) if index else
-                        st.just([]))
+        name: data.draw(
+            st.lists(st.sampled_from(names[:index]), unique=True) if index else st.just([])
+        )
         for index, name in enumerate(names)
     }
     lost = data.draw(st.sampled_from(names))

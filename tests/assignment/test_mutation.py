@@ -104,8 +104,7 @@ variants:
     assert str(caught.value).splitlines() == [
         f"{file}:10: mutants[0].edits[1].replace: the text stands never in bot/setup.py, not once",
         f"{file}:12: mutants[0].loses[0]: there is no check 'topics'. Did you mean 'topic'?",
-        f"{file}:16: mutants[1].loses[0]: 'values' requires 'node', so it is skipped: "
-        "leave it out",
+        f"{file}:16: mutants[1].loses[0]: 'values' requires 'node', so it is skipped: leave it out",
         f"{file}:18: variants[0].id: 'a' stands twice (first in line 3)",
         f"{file}:18: variants[0]: changes nothing",
     ]
@@ -118,7 +117,11 @@ variants:
         ("loses: [topic]", "loses: []", "6: mutants[0].loses: expected at least 1 entry"),
         ("    title: In a", "    loses: [topic]\n    title: In a", "9: variants[0].loses: unknown"),
         ("with: /cmdvel", "with_: /cmdvel", "5: mutants[0].edits[0].with_: unknown key 'with_'"),
-        ("file: bot", "file: /bot", "5: mutants[0].edits[0].file: '/bot/bot/node.py' is not a path"),
+        (
+            "file: bot",
+            "file: /bot",
+            "5: mutants[0].edits[0].file: '/bot/bot/node.py' is not a path",
+        ),
     ],
 )
 def test_a_mistake_in_the_form_is_told(

@@ -60,9 +60,7 @@ def positional(recording, a, /):
 
 
 def yaml(python: str, with_: str = "{}") -> str:
-    return HEAD + (
-        f"  - id: mine\n    python: {python}\n    points: 1\n    with: {with_}\n"
-    )
+    return HEAD + (f"  - id: mine\n    python: {python}\n    points: 1\n    with: {with_}\n")
 
 
 def test_an_own_check_judges_with_its_validated_parameters(write: Write) -> None:

@@ -179,7 +179,7 @@ class _Box(Model):
 
 class _Scene(Model):
     shapes: tuple[Annotated[_Circle | _Box, Field(discriminator="shape")], ...] = ()
-    named: dict[str, _Circle] = {}
+    named: dict[str, _Circle] = Field(default_factory=dict)
     wait: int | Duration = 0
     flag: bool = False
 
@@ -232,9 +232,13 @@ def test_a_part_that_was_not_written_is_read_as_empty() -> None:
 
 _value = st.recursive(
     st.none() | st.booleans() | st.integers(-5, 5) | st.sampled_from(["", "x", "5 s", "/a", "a"]),
-    lambda inner: st.lists(inner, max_size=2)
-    | st.dictionaries(
-        st.sampled_from(["id", "launch", "until", "with", "points", "x", "0"]), inner, max_size=3
+    lambda inner: (
+        st.lists(inner, max_size=2)
+        | st.dictionaries(
+            st.sampled_from(["id", "launch", "until", "with", "points", "x", "0"]),
+            inner,
+            max_size=3,
+        )
     ),
     max_leaves=8,
 )

@@ -169,9 +169,7 @@ def process(name: str = BOT, **changes: Any) -> Process:
 
 def died(exit_code: int | None, exited_s: float = 1.2, name: str = BOT) -> Process:
     """A process that ended before it was asked to."""
-    return process(
-        name, exited_s=exited_s, exit_code=exit_code, stopped_by="itself", stop_s=None
-    )
+    return process(name, exited_s=exited_s, exit_code=exit_code, stopped_by="itself", stop_s=None)
 
 
 def output(

@@ -44,9 +44,7 @@ def test_a_forgotten_dependency_names_the_import_and_the_tag_to_add():
 def test_every_forgotten_dependency_is_listed_once():
     again = Import("geometry_msgs", SOURCE, 30)
     finding = judged(ros_imports=(*package().ros_imports, again))
-    assert finding.observed == (
-        f"{SOURCE}:1 imports `rclpy`; {SOURCE}:3 imports `geometry_msgs`"
-    )
+    assert finding.observed == (f"{SOURCE}:1 imports `rclpy`; {SOURCE}:3 imports `geometry_msgs`")
     assert "`<depend>rclpy</depend>` and `<depend>geometry_msgs</depend>`" in finding.hint
 
 

@@ -151,7 +151,7 @@ class TestNotJudged:
 
 @pytest.mark.parametrize(
     ("parameters", "words"),
-    [({"within": "0 s"}, "too small"), ({"share": "150 %"}, "less than or equal to 1")],
+    [({"within": "0 s"}, "too small"), ({"share": "150 %"}, "more than 100 % of the calls")],
 )
 def test_parameters_out_of_range_are_refused(parameters, words):
     with pytest.raises(ValueError, match=words):

@@ -117,16 +117,12 @@ class TestCount:
         assert f"IndexError: list index out of range ({SOURCE}:14)" in found
 
     def test_too_few_because_the_machine_was_busy(self):
-        run = recording(
-            messages=messages(every(0.3, 6)), disturbance=taken(1.0, 4.0, waited_s=2.5)
-        )
+        run = recording(messages=messages(every(0.3, 6)), disturbance=taken(1.0, 4.0, waited_s=2.5))
         finding = count(run, at_least=12)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
     def test_a_busy_machine_does_not_excuse_half_of_the_messages(self):
-        run = recording(
-            messages=messages(every(0.6, 6)), disturbance=taken(1.0, 4.0, waited_s=1.0)
-        )
+        run = recording(messages=messages(every(0.6, 6)), disturbance=taken(1.0, 4.0, waited_s=1.0))
         assert count(run, at_least=12).status is Status.FAILED
 
     def test_too_few_names_the_declared_timer(self):
@@ -235,7 +231,8 @@ class TestSilence:
 
 class TestEqual:
     def test_passes_for_nested_values_and_for_paths(self):
-        for value in (VALUE, {"linear.x": 1.0, "angular.z": 0.5}, {"linear": {"x": 1}, "angular.z": 0.5}):
+        paths = {"linear.x": 1.0, "angular.z": 0.5}
+        for value in (VALUE, paths, {"linear": {"x": 1}, "angular.z": 0.5}):
             finding = equal(recording(), value)
             assert finding.status is Status.PASSED
             assert finding.observed == "all of 12 messages"
@@ -339,9 +336,7 @@ class TestEqual:
     )  # fmt: skip
     def test_exactly_what_lies_within_the_tolerance_passes(self, x, z, tolerance, off):
         run = recording(messages=messages([1.0, 1.3], twist((x + off, 0, 0), (0, 0, z))))
-        finding = equal(
-            run, {"linear": {"x": x}, "angular": {"z": z}}, tolerance=tolerance
-        )
+        finding = equal(run, {"linear": {"x": x}, "angular": {"z": z}}, tolerance=tolerance)
         distance = abs((x + off) - x)
         if distance < 0.99 * tolerance:
             assert finding.status is Status.PASSED

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.recording.model import Ending
+from grader.recording.model import Ending, Wait
 from grader.submission.record import BuildRecord, SourceError
 from tests.checks.builder import (
     BOT,
@@ -47,12 +47,16 @@ class TestExists:
         found = failing("node.exists", run, name=NODE)
         assert "executable does not exist; installed are `bot_pub`" in found
 
+    def test_what_could_not_be_started_is_named(self):
+        wait = Wait("start of bot_publisher/bot_pub: Permission denied", 0.0, at(0))
+        run = nodeless(ending=Ending.NOT_STARTED, processes=(), waits=(wait,))
+        found = failing("node.exists", run, name=NODE)
+        assert "`bot_publisher/bot_pub` could not be started: Permission denied" in found
+
     def test_nothing_launched_because_the_build_failed(self):
         culprit = SourceError("src/bot_publisher/setup.py", 7, "SyntaxError: invalid syntax")
         build = BuildRecord(False, 1.0, failed_packages=("bot_publisher",), culprit=culprit)
-        run = nodeless(
-            ending=Ending.NOT_STARTED, processes=(), submission=submission(build=build)
-        )
+        run = nodeless(ending=Ending.NOT_STARTED, processes=(), submission=submission(build=build))
         finding = judge("node.exists", run, name=NODE)
         assert "did not build" in finding.observed
         assert finding.evidence.places == (culprit,)
@@ -109,9 +113,7 @@ class TestExists:
         ],
     )
     def test_frequent_exceptions_come_with_what_to_do(self, raised, hint):
-        run = nodeless(
-            processes=(died(1),), ending=Ending.EXITED, log=output(traceback(raised))
-        )
+        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=output(traceback(raised)))
         assert hint in judge("node.exists", run, name=NODE).hint
 
     @pytest.mark.parametrize(
@@ -223,9 +225,7 @@ class TestAlive:
         assert "spin_once() handles one round only" in failing("node.alive", run)
 
     def test_a_node_that_was_destroyed_while_its_process_went_on(self):
-        run = recording(
-            nodes=(node(vanished_s=1.5),), messages=messages(every(0.3, 2)), calls=()
-        )
+        run = recording(nodes=(node(vanished_s=1.5),), messages=messages(every(0.3, 2)), calls=())
         assert "left the ROS graph 1.50 s after launch" in failing("node.alive", run, name=NODE)
 
     def test_a_graph_that_lost_a_working_node_for_a_moment_proves_nothing(self):

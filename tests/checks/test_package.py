@@ -9,13 +9,14 @@ from tests.checks.builder import failing, judge, package, submission
 NAME = "bot_publisher"
 CULPRIT = SourceError("src/bot_publisher/setup.py", 12, "NameError: name 'x' is not defined")
 LOG = """\
+Starting >>> other
+running egg_info
+Finished <<< other [0.30s]
 Starting >>> bot_publisher
---- stderr: bot_publisher
 \x1b[31mTraceback (most recent call last):\x1b[0m
   File "src/bot_publisher/setup.py", line 12, in <module>
     x
 NameError: name 'x' is not defined
----
 Failed   <<< bot_publisher [0.40s, exited with code 1]
 
 Summary: 0 packages finished [0.50s]
@@ -34,9 +35,7 @@ class TestFound:
         return failing("package.found", subject, package=NAME, **parameters)
 
     def test_passes(self):
-        finding = judge(
-            "package.found", submission(), package=NAME, build_type="ament_python"
-        )
+        finding = judge("package.found", submission(), package=NAME, build_type="ament_python")
         assert finding.status is Status.PASSED
         assert "src/bot_publisher" in finding.observed
 
@@ -118,22 +117,62 @@ class TestBuilds:
         assert "did not finish within its time limit" in finding.observed
         assert "setup.py" in finding.hint
 
+    def test_a_build_that_was_ended_for_another_reason_says_which(self):
+        log = "spam\nspam\n\n[rosgrade: the build was ended because it wrote too much output]\n"
+        finding = self.found(build=failed_build(NAME, log=log))
+        assert "failed: the build was ended because it wrote too much output" in finding.observed
+
     def test_another_package_failed_first(self):
         log = "Failed   <<< other [1s]\nAborted  <<< bot_publisher [1s]\n"
-        both = submission(package(), package("other"))
-        for failed in (("bot_publisher", "other"), ("other",)):
-            build = failed_build(*failed, log=log)
-            subject = type(both)(
-                id="ada", sha256="0", build=build,
-                packages=(package(executables=()), package("other")),
-            )  # fmt: skip
-            found = failing("package.builds", subject, package=NAME)
-            assert "because `other` failed to build" in found
+        subject = submission(
+            package(), package("other"), build=failed_build("bot_publisher", "other", log=log)
+        )
+        found = failing("package.builds", subject, package=NAME)
+        assert "because `other` failed to build" in found
 
-    def test_the_failure_of_another_package_does_not_count_when_it_was_built(self):
+    def test_both_packages_failed(self):
+        log = "Failed   <<< other [1s]\nFailed   <<< bot_publisher [1s]\n"
+        subject = submission(
+            package(), package("other"), build=failed_build("bot_publisher", "other", log=log)
+        )
+        found = failing("package.builds", subject, package=NAME)
+        assert "because" not in found
+
+    def test_the_failure_of_another_package_does_not_count(self):
         subject = submission(package(), package("other"), build=failed_build("other"))
         assert judge("package.builds", subject, package=NAME).status is Status.PASSED
         assert judge("package.builds", subject, package="other").status is Status.FAILED
+
+    @pytest.mark.parametrize("file", ["node.py", "__init__.py"])
+    def test_a_syntax_error_that_leaves_nothing_to_run(self, file):
+        error = SourceError(f"src/bot_publisher/bot_publisher/{file}", 9, "SyntaxError: ':'")
+        subject = submission(package(syntax_errors=(error,)))
+        finding = judge("package.builds", subject, package=NAME)
+        assert finding.status is Status.FAILED
+        assert f"Python cannot read {error}" in finding.observed
+        assert finding.evidence.places == (error,)
+
+    def test_a_syntax_error_in_a_file_that_is_not_needed(self):
+        unused = SourceError("src/bot_publisher/bot_publisher/old.py", 9, "SyntaxError: ':'")
+        subject = submission(package(syntax_errors=(unused,)))
+        assert judge("package.builds", subject, package=NAME).status is Status.PASSED
+
+    def test_a_syntax_error_in_another_executable_of_the_package(self):
+        other = SourceError("src/bot_publisher/bot_publisher/next.py", 9, "SyntaxError: ':'")
+        subject = submission(
+            package(
+                syntax_errors=(other,),
+                entry_points=(
+                    ("bot_pub", "bot_publisher.node:main"),
+                    ("next", "bot_publisher.next:main"),
+                ),
+                files=(
+                    ("bot_publisher/node.py", "src/bot_publisher/bot_publisher/node.py"),
+                    ("bot_publisher/next.py", "src/bot_publisher/bot_publisher/next.py"),
+                ),
+            )
+        )
+        assert judge("package.builds", subject, package=NAME).status is Status.PASSED
 
     def test_nothing_was_built(self):
         assert self.found(build=None).status is Status.ERROR
@@ -206,9 +245,7 @@ class TestExecutable:
         assert "it was not installed" in self.found(build_type="ament_cmake", entry_points=())
 
     def test_a_failed_build_is_the_deeper_cause(self):
-        subject = submission(
-            package(executables=()), build=failed_build(NAME, culprit=CULPRIT)
-        )
+        subject = submission(package(executables=()), build=failed_build(NAME, culprit=CULPRIT))
         found = failing("package.executable", subject, package=NAME, executable="bot_pub")
         assert str(CULPRIT) in found
 

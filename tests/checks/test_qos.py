@@ -104,9 +104,7 @@ class TestOffered:
         assert "qos_profile_sensor_data is best_effort" in finding.hint
 
     def test_a_stronger_offer_is_told_to_match_all_the_same(self):
-        found = failing(
-            "qos.offered", offering(LATCHED), topic="/cmd_vel", durability="volatile"
-        )
+        found = failing("qos.offered", offering(LATCHED), topic="/cmd_vel", durability="volatile")
         assert "durability transient_local instead of volatile" in found
         assert "would still match it" in found
 
@@ -124,9 +122,7 @@ class TestOffered:
         # A fraction of 2**32 of a second is how DDS writes 300 ms.
         seen = replace(RELIABLE, deadline_s=round(0.3 * 2**32) / 2**32, lifespan_s=1.0)
         run = offering(seen)
-        good = judge(
-            "qos.offered", run, topic="/cmd_vel", deadline="300 ms", lifespan="1 s"
-        )
+        good = judge("qos.offered", run, topic="/cmd_vel", deadline="300 ms", lifespan="1 s")
         assert good.status is Status.PASSED
         found = failing("qos.offered", offering(RELIABLE), topic="/cmd_vel", deadline="300 ms")
         assert "deadline infinite instead of 300 ms" in found
@@ -148,9 +144,7 @@ class TestOffered:
             judge("qos.offered", recording(), topic="/cmd_vel")
 
     def test_how_to_write_another_profile(self):
-        found = failing(
-            "qos.offered", recording(), topic="/cmd_vel", durability="transient_local"
-        )
+        found = failing("qos.offered", recording(), topic="/cmd_vel", durability="transient_local")
         assert "durability=DurabilityPolicy.TRANSIENT_LOCAL" in found
 
 

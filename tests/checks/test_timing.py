@@ -111,9 +111,7 @@ class TestProperties:
 
         def status(scale):
             times = after([value * scale for value in intervals])
-            run = recording(
-                messages=messages(times), stop_s=times[-1] + 0.1, declarations=()
-            )
+            run = recording(messages=messages(times), stop_s=times[-1] + 0.1, declarations=())
             return period(run, period=f"{300 * scale} ms").status
 
         assert status(1) == status(factor)
@@ -152,9 +150,7 @@ class TestProperties:
             times.append(time_s)
             noise.append(Disturbance(at(time_s), 0, round((time_s - due) * NS)))
             clock = time_s + 1e-6
-        run = recording(
-            messages=messages(times), stop_s=times[-1] + 0.1, disturbance=tuple(noise)
-        )
+        run = recording(messages=messages(times), stop_s=times[-1] + 0.1, disturbance=tuple(noise))
         assert period(run).status in (Status.PASSED, Status.ERROR)
 
 
@@ -185,9 +181,7 @@ class TestDisturbance:
         assert period(run).status is Status.FAILED
 
     def test_too_few_messages_on_a_busy_machine(self):
-        run = recording(
-            messages=messages(every(0.3, 4)), disturbance=taken(1.5, 4.4, waited_s=2.9)
-        )
+        run = recording(messages=messages(every(0.3, 4)), disturbance=taken(1.5, 4.4, waited_s=2.9))
         finding = period(run)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
@@ -232,9 +226,7 @@ class TestMistakes:
         assert "declared 2 timers" in found
 
     def test_two_publishers(self):
-        found = wrong(
-            [0.15] * 20, endpoints=(endpoint(), endpoint(appeared_s=0.5, node="/twin"))
-        )
+        found = wrong([0.15] * 20, endpoints=(endpoint(), endpoint(appeared_s=0.5, node="/twin")))
         assert "twice as often as expected, from 2 publishers on the topic" in found
 
     def test_one_callback_that_publishes_three_times(self):
@@ -266,6 +258,12 @@ class TestMistakes:
         found = wrong([0.42] * 10)
         assert "120 ms too long: the process declared a timer of 300 ms" in found
         assert "Keep callbacks short" in found
+
+    def test_a_timer_made_anew_in_each_callback(self):
+        anew = (*declarations(), *(declarations()[4:5] * 9))
+        found = wrong([0.35] * 10, declarations=anew)
+        assert "50 ms too long: the process declared 10 timers of 300 ms" in found
+        assert "Create one timer in the constructor" in found
 
     def test_left_out_messages(self):
         found = wrong([0.3, 0.3, 0.6] * 5)
@@ -302,7 +300,7 @@ class TestMistakes:
         run = recording(messages=messages(times), stop_s=6)
         moment = period(run).evidence.moments[0]
         assert moment.label == "worst interval: 900 ms"
-        assert moment.time_s == pytest.approx(times[7] , abs=1e-6)
+        assert moment.time_s == pytest.approx(times[7], abs=1e-6)
 
     def test_the_spread_of_a_bimodal_stream_is_not_hidden_by_its_median(self):
         assert "differ from the median" in wrong([0.3, 0.3, 0.3, 0.15, 0.45] * 3)
@@ -317,16 +315,12 @@ class TestForgery:
         return recording(messages={"/cmd_vel": stream}, stop_s=8, **changes)
 
     def test_stamps_that_arrivals_contradict(self):
-        found = failing(
-            "timing.period", self.forged(0.3, 0.5), topic="/cmd_vel", period="300 ms"
-        )
+        found = failing("timing.period", self.forged(0.3, 0.5), topic="/cmd_vel", period="300 ms")
         assert "messages arrive every 500 ms" in found
         assert "source timestamps are 300 ms apart" in found
 
     def test_stamps_after_the_arrival(self):
-        found = failing(
-            "timing.period", self.forged(0.3, 0.03), topic="/cmd_vel", period="300 ms"
-        )
+        found = failing("timing.period", self.forged(0.3, 0.03), topic="/cmd_vel", period="300 ms")
         assert "not the times of publishing: one lies after its arrival" in found
 
     def test_stamps_before_the_launch(self):

@@ -124,9 +124,7 @@ class TestPublished:
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
     def test_the_evidence_lists_what_there_is(self):
-        finding = judge(
-            "topic.published", with_endpoints(endpoint("/cmdvel")), topic="/cmd_vel"
-        )
+        finding = judge("topic.published", with_endpoints(endpoint("/cmdvel")), topic="/cmd_vel")
         assert finding.evidence.tables[0].rows == ((NODE, "publisher", "/cmdvel", TWIST),)
         assert finding.evidence.moments[0].time_s == pytest.approx(0.35)
 

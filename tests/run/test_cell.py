@@ -262,3 +262,12 @@ def test_nothing_survives_the_death_of_whoever_ordered_the_run(tmp_path: Path) -
     while is_running(marker):
         assert time.monotonic() < deadline, "the student's process is still there"
         time.sleep(0.05)
+
+
+@pytest.mark.parametrize("source", [nodes.timed().replace("rclpy.spin(node)\n", "")])
+def test_a_node_that_ends_at_once_is_seen_every_time(run_node: RunNode, source: str) -> None:
+    for _ in range(5):
+        recording = run_node(source)
+        assert [node.name for node in recording.student_nodes] == ["/bot_publisher"]
+        assert recording.student_endpoints(Kind.PUBLISHER, "/cmd_vel")
+        assert recording.ending is Ending.EXITED

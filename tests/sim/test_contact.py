@@ -13,7 +13,7 @@ from sim.contact import RESOLUTION_M, TOUCH_M, ContactFinder
 from sim.motion import Pose, Twist, integrate
 from sim.robot import BURGER
 from sim.shapes import Shape, box, circle, wall
-from sim.simulation import Robot, Sensors, Simulation
+from sim.simulation import Robot, Sensors, Simulation, Step
 from sim.world import World, parse_world
 
 RADIUS_M = 0.1
@@ -147,7 +147,7 @@ def test_a_robot_can_turn_and_leave_a_wall() -> None:
     assert left.pose.x_m < 0.85
 
 
-def drive_on(simulation: Simulation, command: Twist, steps: int):  # noqa: ANN201
+def drive_on(simulation: Simulation, command: Twist, steps: int) -> Step:
     step = simulation.advance(command)
     for _ in range(steps - 1):
         step = simulation.advance()

@@ -96,7 +96,7 @@ def test_a_mirrored_world_gives_the_mirrored_scan(
     # Beam k looks where beam -k looks in the mirror. A beam that just misses an end may just
     # hit it there, which few do.
     differs = ~np.isclose(np.roll(there[::-1], 1), here, rtol=1e-7, atol=1e-9)
-    assert np.count_nonzero(differs) <= 3
+    assert np.count_nonzero(differs) <= 8
 
 
 @given(POSE, st.integers(0, 359))

@@ -43,7 +43,10 @@ def test_it_is_there_from_appearing_until_before_disappearing() -> None:
 
 
 def test_it_turns_the_short_way_round() -> None:
-    path = (Waypoint(0, Pose(0, 0, math.radians(170))), Waypoint(NS, Pose(0, 0, math.radians(-170))))
+    path = (
+        Waypoint(0, Pose(0, 0, math.radians(170))),
+        Waypoint(NS, Pose(0, 0, math.radians(-170))),
+    )
     turning = obstacle(path=path, radius_m=None, size_m=(1.0, 0.5))
     pose = turning.pose_at(NS // 4)
     assert pose is not None

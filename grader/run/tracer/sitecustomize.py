@@ -21,10 +21,12 @@ if TYPE_CHECKING:
     from typing import Any
 
 _FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
+_SEEN_FD = int(os.environ.get("ROSGRADE_SEEN_FD", "-1"))
 _HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
 _HOLD_LIMIT_S = 2.0
 _HOLD_POLL_S = 0.002
 _FLUSH_LIMIT_S = 0.5
+_SEEN_LIMIT_S = 2.0
 _OWN_TOPICS = ("/parameter_events", "/rosout")
 # Writes up to PIPE_BUF (4096 bytes) are atomic, so lines of several processes do not mix.
 _LONGEST_LINE = 4000
@@ -109,15 +111,27 @@ def _hold(publisher: Any) -> None:
 
 
 _publishers: list[Any] = []
+_nodes: list[bool] = []
 
 
 def _flush() -> None:
-    """Let what was published arrive before the publisher goes away."""
+    """Let what was published arrive, and what was created be seen, before it goes away.
+
+    Discovery takes a moment: of a process that ends at once, the graph might show the node or
+    not, by chance. So it waits until the cell says that it has seen everything declared.
+    """
     from rclpy.duration import Duration
 
     while _publishers:
         publisher = _publishers.pop()
         _quietly(publisher.wait_for_all_acked, Duration(seconds=_FLUSH_LIMIT_S))
+    if _nodes:
+        import select
+
+        _nodes.clear()
+        _report("leaving")
+        # The cell closes its end.
+        select.select([_SEEN_FD], [], [], _SEEN_LIMIT_S)
 
 
 def _wrap(owner: Any, name: str, before: Any = None, after: Any = None) -> None:
@@ -141,6 +155,10 @@ def _wrap(owner: Any, name: str, before: Any = None, after: Any = None) -> None:
 def _patch_node(module: Any) -> None:
     node_class = module.Node
 
+    def made(node: Any, _: Any) -> None:
+        _nodes.append(True)
+        _report("node", node=_full_name(node))
+
     def published(node: Any, publisher: Any) -> None:
         _endpoint("publisher", node, publisher)
         _hold(publisher)
@@ -157,7 +175,7 @@ def _patch_node(module: Any) -> None:
     def subscribed(node: Any, subscription: Any) -> None:
         _endpoint("subscription", node, subscription)
 
-    _wrap(node_class, "__init__", after=lambda node, _: _report("node", node=_full_name(node)))
+    _wrap(node_class, "__init__", after=made)
     _wrap(node_class, "create_publisher", after=published)
     _wrap(node_class, "create_subscription", after=subscribed)
     _wrap(node_class, "create_timer", after=timer_made)

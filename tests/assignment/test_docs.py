@@ -1,0 +1,85 @@
+"""The documentation is made from the code, and is never behind it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from grader import docs, resources
+from grader.assignment.own_check import load_own_check
+from grader.checks.catalogue import CATALOGUE
+from grader.checks.check import Check
+from grader.recording.model import Message
+
+
+def test_the_files_in_docs_are_up_to_date(capsys: pytest.CaptureFixture[str]) -> None:
+    assert docs.main(["--check"]) == 0, capsys.readouterr().err
+
+
+def test_a_stale_or_missing_file_is_told_and_mended(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["--folder", str(tmp_path)]
+    assert docs.main(["--check", *arguments]) == 1
+    assert f"{tmp_path / 'checks.md'} is stale: run python -m grader.docs" in (
+        capsys.readouterr().err
+    )
+    assert not list(tmp_path.iterdir())
+    assert docs.main(arguments) == 0
+    assert docs.main(["--check", *arguments]) == 0
+    (tmp_path / "checks.md").write_text("old")
+    assert docs.main(["--check", *arguments]) == 1
+
+
+def test_every_check_is_described_with_all_its_parameters() -> None:
+    text = docs.checks_markdown()
+    for check in CATALOGUE.values():
+        section = text.split(f"## {check.name}\n")[1].split("\n## ")[0]
+        for name, field in check.parameters.model_fields.items():
+            assert f"| `{field.alias or name}` |" in section
+
+
+def test_links_lead_to_headings() -> None:
+    for text in docs.documents().values():
+        outside = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+        headings = {
+            re.sub(r"[^a-z0-9_ -]", "", line.lstrip("# ").lower()).replace(" ", "-")
+            for line in outside.splitlines()
+            if line.startswith("#")
+        }
+        links = set(re.findall(r"\]\(#([^)]*)\)", outside))
+        assert links
+        assert links <= headings
+
+
+def test_a_value_is_described_in_the_words_of_yaml(catalogue: dict[str, Check]) -> None:
+    text = docs.check_markdown(catalogue["timing.period"])
+    assert "| `topic` | topic, such as `/cmd_vel` | required |  |" in text
+    assert "| `period` | time, such as `300 ms` | required |" in text
+    text = docs.assignment_markdown()
+    assert "| `discovery` | time, such as `300 ms` | `10 s` |" in text
+    assert "| `build_type` | `ament_python` or `ament_cmake` | `ament_python` |" in text
+    assert "| `launch` | list of [launch](#launch) | required |" in text
+
+
+def test_the_example_of_an_own_check_works(tmp_path: Path) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", docs.assignment_markdown(), flags=re.DOTALL)
+    (tmp_path / "checks.py").write_text(code)
+    check = load_own_check("checks.py:drives_straight", tmp_path)
+
+    class Straight:
+        def on(self, topic: str) -> tuple[Message, ...]:
+            value = {"angular": {"z": 0.2}}
+            return (Message(topic, "geometry_msgs/msg/Twist", value, 0, 0, 1),)
+
+    loose = check.parameters.model_validate({"topic": "/cmd_vel", "tolerance": "20 deg"})
+    strict = check.parameters.model_validate({"topic": "/cmd_vel"})
+    assert check.judge(Straight(), loose).status == "passed"
+    assert check.judge(Straight(), strict).observed == "turns with 0.2 rad/s"
+
+
+def test_the_example_in_the_documentation_is_the_shipped_assignment() -> None:
+    file = resources.assignments() / "timed_publisher" / "assignment.yaml"
+    assert file.read_text(encoding="utf-8").strip() in docs.assignment_markdown()

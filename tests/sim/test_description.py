@@ -1,0 +1,123 @@
+"""The YAML options."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.source import parse_source
+from grader.errors import AssignmentError
+from sim.description import Layout, NoReturn, SimulatorOptions, read_options
+from sim.motion import Pose
+
+FILE = Path("options.yaml")
+
+
+def read(text: str) -> SimulatorOptions:
+    return parse_source(text, FILE).read(SimulatorOptions)
+
+
+def test_the_defaults_are_those_of_turtlebot3_in_gazebo() -> None:
+    options = SimulatorOptions()
+    assert options.robot.model == "burger"
+    lidar = options.lidar
+    assert (lidar.beams, lidar.rate, lidar.range_min, lidar.range_max) == (360, 5.0, 0.12, 3.5)
+    assert (lidar.layout, lidar.no_return) == (Layout.FROM_ZERO, NoReturn.INF)
+    assert (lidar.frame, lidar.noise) == ("base_scan", 0.0)
+    odometry = options.odometry
+    assert (odometry.rate, odometry.frame, odometry.child_frame) == (30.0, "odom", "base_footprint")
+    topics = options.topics
+    assert topics.command.type == "geometry_msgs/msg/Twist"
+    for topic, name in (
+        (topics.command, "/cmd_vel"),
+        (topics.odometry, "/odom"),
+        (topics.scan, "/scan"),
+    ):
+        assert topic.topic == name
+        assert (topic.reliability, topic.durability, topic.depth) == ("reliable", "volatile", 10)
+    assert not topics.clock.enabled
+
+
+def test_everything_can_be_said_in_yaml() -> None:
+    options = read(
+        """
+robot: {model: waffle, pose: [1, 20 cm, 90 deg], command_timeout: 500 ms}
+lidar:
+  layout: -pi..pi
+  no_return: zero
+  noise: 5 mm
+  pose: [-3.2 cm, 0, 0]
+  stops: 8 s
+odometry: {origin: start, drift: {radius: 1 %, slip: 2 mm}, covariance: {yaw: 0.5}}
+topics:
+  command: {type: geometry_msgs/msg/TwistStamped}
+  scan: {reliability: best_effort, depth: 5}
+  clock: {enabled: true}
+"""
+    )
+    assert options.robot.pose == Pose(1.0, pytest.approx(0.2), pytest.approx(1.5707963267948966))
+    assert options.lidar.layout is Layout.FROM_MINUS_PI
+    assert options.lidar.no_return is NoReturn.ZERO
+    assert options.lidar.pose == Pose(-0.032, 0.0, 0.0)
+    assert options.lidar.noise == pytest.approx(0.005)
+    assert options.odometry.drift.slip == pytest.approx(0.002)
+    assert options.odometry.covariance.yaw == 0.5
+    assert options.topics.scan.reliability == "best_effort"
+    assert options.topics.command.type.endswith("TwistStamped")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "lidar:\n  beans: 3",
+            r"options.yaml:2: lidar.beans: unknown key 'beans'. Did you mean 'be",
+        ),
+        ("lidar: {beams: 0}", r"options.yaml:1: lidar.beams: must be at least 1, not 0"),
+        ("lidar: {rate: 200 Hz}", r"lidar.rate: must be at most 100"),
+        ("lidar: {rate: 5}", r"lidar.rate: 5 has no unit"),
+        ("lidar: {range_min: 4}", r"lidar: range_min must be less than range_max"),
+        ("lidar: {layout: 2pi}", r"lidar.layout: expected '0..2pi' or '-pi..pi', not '2pi'"),
+        ("lidar: {noise: -1 mm}", r"lidar.noise: '-1 mm' is too small: it must be at least 0"),
+        (
+            "robot: {model: bugrer}",
+            r"robot.model: expected 'burger' or 'waffle', not 'bugrer'. Did",
+        ),
+        ("robot: {max_speed: 0 m/s}", r"robot.max_speed: '0 m/s' is too small: it must be more"),
+        ("robot: {pose: [0, 0]}", r"robot.pose: expected \[x, y, yaw\]: 3 entries, not 2"),
+        (
+            "odometry: {drift: {slip: -1 mm}}",
+            r"odometry.drift.slip: '-1 mm' is too small: it must be at least 0",
+        ),
+        ("topics: {scan: {topic: scan}}", r"topics.scan.topic: 'scan' is relative"),
+        ("topics: {scan: {depth: 0}}", r"topics.scan.depth: must be at least 1, not 0"),
+        ("topics: {command: {type: geometry_msgs/msg/Twst}}", r"topics.command.type: expected"),
+    ],
+)
+def test_a_mistake_is_reported_with_file_and_line(text: str, message: str) -> None:
+    with pytest.raises(AssignmentError, match=message):
+        read(text)
+
+
+def test_options_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
+    file = tmp_path / "options.yaml"
+    file.write_text("robot: {model: waffle}")
+    assert read_options(file).robot.model == "waffle"
+
+
+def test_the_options_have_a_schema_for_editors() -> None:
+    schema = SimulatorOptions.model_json_schema()
+    assert schema["$defs"]["LidarOptions"]["properties"]["pose"]["maxItems"] == 3
+
+
+def test_reading_a_world_needs_neither_ros_nor_numpy() -> None:
+    program = (
+        "import sys, sim.world, sim.description, sim.simulation as _\n"
+        "sys.exit('rclpy' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+    program = "import sys, sim.world, sim.description\nsys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -1,0 +1,167 @@
+"""``python -m sim``: the command line, the view, and Ctrl-C."""
+
+from __future__ import annotations
+
+import io
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from rich.console import Console
+
+from grader.errors import UsageError
+from grader.run.domain import lock_domain
+from sim.__main__ import main
+from sim.description import SimulatorOptions
+from sim.live import Screen, parse_pose
+from sim.motion import Pose, Twist
+from sim.pacing import Lateness
+from sim.simulation import make_simulation
+from sim.world import read_world
+
+pytestmark = pytest.mark.ros
+
+WORLDS = Path(__file__).parent / "worlds"
+ROOM = str(WORLDS / "room.yaml")
+LIMIT_S = 30.0
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    with lock_domain() as lock:
+        yield str(lock.domain_id)
+
+
+def start(domain: str, *arguments: str, **pipes: int) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "sim", *arguments, "--domain-id", domain]
+    return subprocess.Popen(command, cwd=Path(__file__).parents[2], **pipes)
+
+
+def test_without_a_terminal_it_writes_a_line_in_a_second(
+    domain: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([ROOM, "--domain-id", domain, "--duration", "2.0"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["1.00", "2.00"]
+    assert lines[0].endswith("ahead 3.00 m")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_ends_it_cleanly(domain: str, number: signal.Signals) -> None:
+    process = start(domain, ROOM, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith(b"    1.00 s")
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=LIMIT_S)
+    assert (process.returncode, errors) == (0, b"")
+
+
+def test_on_a_terminal_it_draws_the_world_and_leaves_the_terminal_as_it_was(domain: str) -> None:
+    controller, terminal = pty.openpty()
+    process = start(domain, ROOM, stdin=terminal, stdout=terminal, stderr=terminal)
+    os.close(terminal)
+    output = b""
+    end_s = time.monotonic() + LIMIT_S
+    try:
+        while b"Ctrl-C ends" not in output:
+            assert time.monotonic() < end_s, f"no map within {LIMIT_S} s: {output!r}"
+            if select.select([controller], [], [], 0.1)[0]:
+                output += os.read(controller, 65536)
+        process.send_signal(signal.SIGINT)
+        while process.poll() is None:
+            assert time.monotonic() < end_s, f"no end within {LIMIT_S} s"
+            if select.select([controller], [], [], 0.1)[0]:
+                output += os.read(controller, 65536)
+        while select.select([controller], [], [], 0.0)[0]:
+            try:
+                output += os.read(controller, 65536)
+            except OSError:  # how Linux says that the other side is closed
+                break
+    finally:
+        process.kill()
+        process.wait(LIMIT_S)
+        os.close(controller)
+    text = output.decode(errors="replace")
+    assert process.returncode == 0
+    assert "room.yaml, burger" in text
+    assert "→" in text
+    assert "Traceback" not in text
+    # The alternate screen is left again, and the cursor is shown.
+    assert text.rindex("\x1b[?1049l") > text.rindex("\x1b[?1049h")
+    assert text.rindex("\x1b[?25h") > text.rindex("\x1b[?25l")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none.yaml"], r"ERROR: none.yaml: No such file"),
+        (
+            [ROOM, "--robot", "bugrer"],
+            r"ERROR: there is no robot 'bugrer'.* Did you mean 'burger'\?",
+        ),
+        (
+            [ROOM, "--pose", "0, 1.2, 0"],
+            r"ERROR: .*room.yaml:8: boxes\[0\]: a robot with radius 0.1",
+        ),
+        ([ROOM, "--pose", "0, 1"], r"ERROR: --pose: expected \[x, y, yaw\]: 3 entries, not 2"),
+        (
+            [ROOM, "--set", "wall=2"],
+            r"ERROR: .* no value 'wall' in this world. Did you mean 'wall_x'",
+        ),
+        ([ROOM, "--set", "wall"], r"ERROR: --set wall: write NAME=VALUE"),
+        ([ROOM, "--options", ROOM], r"ERROR: .*room.yaml:2: bounds: unknown key 'bounds'"),
+    ],
+)
+def test_a_mistake_is_one_message(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert re.match(message, capsys.readouterr().err)
+
+
+def test_a_pose_may_have_units() -> None:
+    assert parse_pose("1, 20 cm, 0") == Pose(1.0, pytest.approx(0.2), 0.0)
+    assert parse_pose("[0, 0, 1 rad]") == Pose(0.0, 0.0, 1.0)
+    with pytest.raises(UsageError, match="--pose: yaw: '90' has no unit"):
+        parse_pose("0, 0, 90")
+
+
+def test_the_screen_shows_everything() -> None:
+    world, options = read_world(WORLDS / "wall.yaml", {"wall_x": 0.3}), SimulatorOptions()
+    simulation = make_simulation(world, options)
+    screen = Screen(world, simulation, options)
+    console = Console(
+        file=io.StringIO(), width=80, height=30, force_terminal=True, color_system=None
+    )
+    console.print(screen.picture(console))  # before the first step
+    assert screen.line() == "starting"
+    for index in range(300):
+        screen.on_step(simulation.advance(Twist(0.2, 0.0) if index == 0 else None), 0)
+    screen.on_late(Lateness(7, 3, 40_000_000))
+    line = screen.line()
+    assert "3.00 s  x +0.200 m" in line
+    assert line.endswith("ahead -inf m  CONTACT with segments[0]  3 steps late")
+    with console.capture() as capture:
+        console.print(screen.picture(console))
+    text = capture.get()
+    for part in (
+        "wall.yaml, burger",
+        "x +0.200 m",
+        "+0.200 m/s",
+        "segments[0]",
+        "at most 40 ms",
+        "→",
+    ):
+        assert part in text

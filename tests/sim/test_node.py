@@ -1,0 +1,390 @@
+"""The simulator on real topics, in a domain of its own."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+import time
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+import rclpy
+from geometry_msgs.msg import Twist as TwistMessage
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
+
+from grader.run.domain import lock_domain
+from sim.description import SimulatorOptions
+from sim.motion import NS, Pose, Twist
+from sim.node import RosSimulator, make_node
+from sim.odometry import OdometrySample
+from sim.pacing import MAX_BATCH, Lateness
+from sim.publishers import TransformPublisher, transform_type
+from sim.simulation import STEP_NS, EventKind, Step, make_simulation
+from sim.world import parse_world
+
+pytestmark = pytest.mark.ros
+
+LIMIT_S = 20.0
+ROOM = parse_world("bounds: [-1, -2, 3, 4]")
+
+
+class Truth:
+    """A sink that keeps everything."""
+
+    def __init__(self) -> None:
+        self.steps: list[Step] = []
+        self.stamps: list[int] = []
+        self.late: list[Lateness] = []
+
+    def on_step(self, step: Step, stamp_ns: int) -> None:
+        self.steps.append(step)
+        self.stamps.append(stamp_ns)
+
+    def on_late(self, lateness: Lateness) -> None:
+        self.late.append(lateness)
+
+
+class Bench:
+    """A simulator on a clock that the test sets, and a student's node beside it."""
+
+    def __init__(self, domain_id: int) -> None:
+        self.now_ns = 0
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain_id)
+        self.node: Any = make_node("simulator", self.context)
+        self.student: Any = rclpy.create_node("student", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.student)
+        self.truth = Truth()
+
+    def simulator(self, **options: object) -> RosSimulator:
+        read = SimulatorOptions.model_validate(options)
+        simulation = make_simulation(ROOM, read)
+        return RosSimulator(self.node, simulation, read, self.truth, lambda: self.now_ns)
+
+    def wait(self, condition: Callable[[], bool], what: str) -> None:
+        """Serve the student's node until something holds."""
+        end_s = time.monotonic() + LIMIT_S
+        while not condition():
+            assert time.monotonic() < end_s, f"no {what} within {LIMIT_S} s"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def listen(self, kind: Any, topic: str, qos: Any = 10) -> list[Any]:
+        received: list[Any] = []
+        self.student.create_subscription(kind, topic, received.append, qos)
+        return received
+
+    def step(self, simulator: RosSimulator, steps: int = 1) -> None:
+        for _ in range(steps):
+            self.now_ns += STEP_NS
+            simulator.catch_up()
+
+    def close(self) -> None:
+        self.executor.shutdown()
+        self.student.destroy_node()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.delenv("ROS_STATIC_PEERS", raising=False)
+    with lock_domain() as lock:
+        subject = Bench(lock.domain_id)
+        yield subject
+        subject.close()
+
+
+def command(v: float, w: float) -> TwistMessage:
+    message = TwistMessage()
+    message.linear.x, message.angular.z = v, w
+    return message
+
+
+def test_a_student_drives_and_sees(bench: Bench) -> None:
+    """In real time: commands in, odometry and scans out, with the truth beside them."""
+    read = SimulatorOptions()
+    simulator = RosSimulator(bench.node, make_simulation(ROOM, read), read, bench.truth)
+    odometry = bench.listen(Odometry, "/odom")
+    scans = bench.listen(LaserScan, "/scan")
+    publisher = bench.student.create_publisher(TwistMessage, "/cmd_vel", 10)
+    bench.wait(
+        lambda: (
+            publisher.get_subscription_count() == 1
+            and simulator.odometry.publisher.get_subscription_count() == 1
+            and simulator.scan.publisher.get_subscription_count() == 1
+        ),
+        "match",
+    )
+    stop = threading.Event()
+    loop = threading.Thread(target=simulator.run, args=(stop,))
+    loop.start()
+    try:
+        publisher.publish(command(0.2, 0.5))
+        bench.wait(lambda: len(odometry) >= 20 and len(scans) >= 3, "odometry and scans")
+    finally:
+        stop.set()
+        loop.join(LIMIT_S)
+    assert not loop.is_alive()
+
+    truth = {stamp: step for step, stamp in zip(bench.truth.steps, bench.truth.stamps, strict=True)}
+    for message in odometry:
+        assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_footprint")
+        step = truth[message.header.stamp.sec * NS + message.header.stamp.nanosec]
+        pose = message.pose.pose
+        assert (pose.position.x, pose.position.y) == (step.pose.x_m, step.pose.y_m)
+        yaw = 2.0 * math.atan2(pose.orientation.z, pose.orientation.w)
+        assert yaw == pytest.approx(step.pose.yaw_rad)
+        assert message.twist.twist.linear.x == step.twist.linear_m_s
+        assert message.twist.twist.angular.z == step.twist.angular_rad_s
+    covariance = odometry[0].pose.covariance
+    assert [covariance[7 * i] for i in range(6)] == [1e-5, 1e-5, 1e12, 1e12, 1e12, 1e-3]
+    scan = scans[0]
+    assert scan.header.frame_id == "base_scan"
+    assert (scan.angle_min, len(scan.ranges)) == (0.0, 360)
+    assert scan.angle_increment == pytest.approx(math.tau / 360)
+    assert scan.angle_max == pytest.approx(359 * math.tau / 360)
+    assert (scan.range_min, scan.range_max) == (pytest.approx(0.12), 3.5)
+    assert (scan.scan_time, scan.time_increment) == (pytest.approx(0.2), 0.0)
+    taken = truth[scan.header.stamp.sec * NS + scan.header.stamp.nanosec].scan
+    assert taken is not None
+    assert scan.ranges.tobytes() == taken.ranges_m.tobytes()
+    moving = bench.truth.steps[-1]
+    assert moving.command == Twist(0.2, 0.5)
+    assert moving.pose != Pose(0.0, 0.0, 0.0)
+    # Simulated time is what it says, to the step.
+    assert [step.index for step in bench.truth.steps] == list(range(1, moving.index + 1))
+    begin_ns = bench.truth.stamps[0] - STEP_NS
+    assert bench.truth.stamps == [begin_ns + step.time_ns for step in bench.truth.steps]
+
+
+def test_every_topic_has_the_qos_of_the_yaml(bench: Bench) -> None:
+    bench.simulator(
+        topics={
+            "scan": {"reliability": "best_effort", "topic": "/lidar"},
+            "odometry": {"durability": "transient_local"},
+            "clock": {"enabled": True},
+            "command": {"reliability": "best_effort"},
+        }
+    )
+    qos = {}
+    for topic in ("/lidar", "/odom", "/clock"):
+        (info,) = bench.node.get_publishers_info_by_topic(topic)
+        qos[topic] = (info.qos_profile.reliability, info.qos_profile.durability)
+    best, reliable = ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE
+    assert qos == {
+        "/lidar": (best, DurabilityPolicy.VOLATILE),
+        "/odom": (reliable, DurabilityPolicy.TRANSIENT_LOCAL),
+        "/clock": (reliable, DurabilityPolicy.VOLATILE),
+    }
+    (info,) = bench.node.get_subscriptions_info_by_topic("/cmd_vel")
+    assert info.qos_profile.reliability == best
+
+
+def test_the_defaults_are_reliable_and_volatile(bench: Bench) -> None:
+    bench.simulator()
+    for topic in ("/scan", "/odom"):
+        (info,) = bench.node.get_publishers_info_by_topic(topic)
+        assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+        assert info.qos_profile.durability == DurabilityPolicy.VOLATILE
+    assert bench.node.get_publishers_info_by_topic("/clock") == []
+
+
+def test_missed_steps_are_caught_up_and_told(bench: Bench) -> None:
+    simulator = bench.simulator()
+    first_ns = simulator.start()
+    assert first_ns == STEP_NS
+    bench.now_ns = STEP_NS
+    assert simulator.catch_up() == 2 * STEP_NS
+    bench.now_ns = 50 * STEP_NS
+    assert simulator.catch_up() == 51 * STEP_NS
+    assert [step.index for step in bench.truth.steps] == list(range(1, 51))
+    assert bench.truth.late == [Lateness(2, 49, 48 * STEP_NS)]
+
+
+def test_a_long_stall_is_caught_up_in_parts(bench: Bench) -> None:
+    simulator = bench.simulator()
+    simulator.start()
+    bench.now_ns = (2 * MAX_BATCH + 3) * STEP_NS
+    for _ in range(3):
+        simulator.catch_up()
+    assert [lateness.steps for lateness in bench.truth.late] == [MAX_BATCH, MAX_BATCH, 3]
+    assert bench.truth.steps[-1].index == 2 * MAX_BATCH + 3
+
+
+def test_nothing_is_done_before_its_time(bench: Bench) -> None:
+    simulator = bench.simulator()
+    simulator.start()
+    bench.now_ns = STEP_NS - 1
+    assert simulator.catch_up() == STEP_NS
+    assert bench.truth.steps == []
+
+
+def test_commands_that_are_not_finite_are_rejected_and_the_simulator_goes_on(bench: Bench) -> None:
+    simulator = bench.simulator()
+    publisher = bench.student.create_publisher(TwistMessage, "/cmd_vel", 10)
+    bench.wait(lambda: publisher.get_subscription_count() == 1, "match")
+    for bad in (math.nan, math.inf, -math.inf):
+        publisher.publish(command(bad, 0.0))
+        before = simulator.commands
+        bench.wait(lambda b=before: bench.step(simulator) or simulator.commands > b, "command")
+        last = bench.truth.steps[-1]
+        assert [event.kind for event in last.events] == [EventKind.COMMAND_REJECTED]
+        assert last.command == Twist(0.0, 0.0)
+    publisher.publish(command(0.1, 0.0))
+    bench.wait(lambda: bench.step(simulator) or bench.truth.steps[-1].command.linear_m_s > 0, "cmd")
+    assert math.isfinite(bench.truth.steps[-1].pose.x_m)
+
+
+def test_a_flood_of_commands_does_not_hold_it_up(bench: Bench) -> None:
+    """20,000 at once; each step takes what the queue keeps and no more."""
+    simulator = bench.simulator(topics={"command": {"reliability": "best_effort"}})
+    publisher = bench.student.create_publisher(TwistMessage, "/cmd_vel", 10)
+    bench.wait(lambda: publisher.get_subscription_count() == 1, "match")
+    bench.step(simulator)
+    message = command(0.0, 0.0)
+    for i in range(20_000):
+        message.linear.x = 1e-6 * i
+        publisher.publish(message)
+        if i % 100 == 0:
+            before = simulator.commands
+            bench.step(simulator)
+            assert simulator.commands - before <= 10
+    message.linear.x = 0.2
+    bench.wait(
+        lambda: (
+            publisher.publish(message)
+            or bench.step(simulator)
+            or bench.truth.steps[-1].command.linear_m_s == 0.2
+        ),
+        "last command",
+    )
+
+
+def test_a_command_of_the_other_type_does_not_match(bench: Bench) -> None:
+    bench.simulator()
+    wrong = bench.student.create_publisher(TwistStamped, "/cmd_vel", 10)
+    right = bench.student.create_publisher(TwistMessage, "/cmd_vel", 10)
+    bench.wait(lambda: right.get_subscription_count() == 1, "match")
+    assert wrong.get_subscription_count() == 0
+
+
+def test_stamped_commands_are_obeyed_where_the_yaml_says_so(bench: Bench) -> None:
+    simulator = bench.simulator(topics={"command": {"type": "geometry_msgs/msg/TwistStamped"}})
+    publisher = bench.student.create_publisher(TwistStamped, "/cmd_vel", 10)
+    bench.wait(lambda: publisher.get_subscription_count() == 1, "match")
+    message = TwistStamped()
+    message.twist = command(0.1, 0.2)
+    publisher.publish(message)
+    bench.wait(lambda: bench.step(simulator) or simulator.commands == 1, "command")
+    assert bench.truth.steps[-1].command == Twist(0.1, 0.2)
+
+
+def test_an_executor_that_spins_its_node_takes_no_commands(bench: Bench) -> None:
+    simulator = bench.simulator()
+    bench.executor.add_node(bench.node)
+    publisher = bench.student.create_publisher(TwistMessage, "/cmd_vel", 10)
+    bench.wait(lambda: publisher.get_subscription_count() == 1, "match")
+    publisher.publish(command(0.1, 0.0))
+    bench.wait(lambda: bench.step(simulator) or simulator.commands == 1, "command")
+    bench.executor.remove_node(bench.node)
+
+
+def test_the_clock_is_that_of_the_stamps(bench: Bench) -> None:
+    simulator = bench.simulator(topics={"clock": {"enabled": True}})
+    clock = bench.listen(Clock, "/clock", QoSProfile(depth=100))
+    bench.wait(lambda: simulator.clock.publisher.get_subscription_count() == 1, "match")
+    simulator.start()
+    bench.step(simulator, 20)
+    bench.wait(lambda: len(clock) == 20, "clock")
+    assert [m.clock.sec * NS + m.clock.nanosec for m in clock] == bench.truth.stamps
+
+
+def test_its_node_offers_nothing_that_could_disturb_it(bench: Bench) -> None:
+    bench.simulator()
+    assert bench.node.get_service_names_and_types_by_node("simulator", "/") == []
+    published = bench.node.get_publisher_names_and_types_by_node("simulator", "/")
+    assert "/rosout" not in dict(published)
+    subscribed = bench.node.get_subscriber_names_and_types_by_node("simulator", "/")
+    assert set(dict(subscribed)) == {"/cmd_vel"}
+
+
+def test_it_leaves_its_node_as_it_was(bench: Bench) -> None:
+    before = bench.node.get_publisher_names_and_types_by_node("simulator", "/")
+    bench.simulator(topics={"clock": {"enabled": True}}).destroy()
+    assert bench.node.get_publisher_names_and_types_by_node("simulator", "/") == before
+    assert bench.node.get_subscriber_names_and_types_by_node("simulator", "/") == []
+
+
+def test_the_loop_ends_with_its_context(bench: Bench) -> None:
+    read = SimulatorOptions()
+    simulator = RosSimulator(bench.node, make_simulation(ROOM, read), read, bench.truth)
+    loop = threading.Thread(target=simulator.run, args=(threading.Event(),))
+    loop.start()
+    bench.wait(lambda: bool(bench.truth.steps), "step")
+    bench.context.try_shutdown()
+    loop.join(LIMIT_S)
+    assert not loop.is_alive()
+
+
+class TransformMessage:
+    """Stands in for tf2_msgs/msg/TFMessage, which the package index does not have."""
+
+    def __init__(self, transforms: list[Any]) -> None:
+        self.transforms = transforms
+
+
+class FakeNode:
+    """Keeps what is published, by topic."""
+
+    def __init__(self) -> None:
+        self.published: dict[str, list[Any]] = {}
+        self.qos: dict[str, QoSProfile] = {}
+
+    def create_publisher(self, kind: Any, topic: str, qos: QoSProfile, **_: Any) -> Any:
+        messages = self.published.setdefault(topic, [])
+        self.qos[topic] = qos
+        return types.SimpleNamespace(publish=messages.append)
+
+
+def test_transforms_say_what_odometry_says_and_where_the_lidar_sits() -> None:
+    options = SimulatorOptions.model_validate({"lidar": {"pose": [-0.032, 0, "180 deg"]}})
+    lidar = make_simulation(ROOM, options).lidar
+    node: Any = FakeNode()
+    tf = TransformPublisher(node, options.topics.tf, options.odometry, lidar, TransformMessage)
+    tf.publish_static(3 * NS + 7)
+    tf.publish(OdometrySample(0, Pose(1.0, 2.0, math.pi / 2), Twist(0.0, 0.0)), 4 * NS)
+    (static,) = node.published["/tf_static"][0].transforms
+    assert (static.header.frame_id, static.child_frame_id) == ("base_footprint", "base_scan")
+    assert (static.header.stamp.sec, static.header.stamp.nanosec) == (3, 7)
+    assert static.transform.translation.x == -0.032
+    assert abs(static.transform.rotation.z) == pytest.approx(1.0)
+    assert node.qos["/tf_static"].durability == DurabilityPolicy.TRANSIENT_LOCAL
+    (moving,) = node.published["/tf"][0].transforms
+    assert (moving.header.frame_id, moving.child_frame_id) == ("odom", "base_footprint")
+    assert (moving.transform.translation.x, moving.transform.translation.y) == (1.0, 2.0)
+    assert moving.transform.rotation.z == pytest.approx(math.sqrt(0.5))
+    assert node.qos["/tf"].durability == DurabilityPolicy.VOLATILE
+
+
+def test_transforms_are_there_where_tf2_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    module: Any = types.ModuleType("tf2_msgs.msg")
+    module.TFMessage = TransformMessage
+    monkeypatch.setitem(sys.modules, "tf2_msgs", types.ModuleType("tf2_msgs"))
+    monkeypatch.setitem(sys.modules, "tf2_msgs.msg", module)
+    assert transform_type() is TransformMessage
+    monkeypatch.setitem(sys.modules, "tf2_msgs.msg", None)
+    assert transform_type() is None

@@ -1,0 +1,46 @@
+"""Which steps are due, on a clock that the test sets."""
+
+from __future__ import annotations
+
+from sim.pacing import LATE_NS, MAX_BATCH, Lateness, Pacer
+from sim.simulation import STEP_NS
+
+
+def do(pacer: Pacer, steps: int) -> None:
+    for _ in range(steps):
+        pacer.done()
+
+
+def test_a_step_is_due_when_its_time_is_over() -> None:
+    pacer = Pacer(1000)
+    assert pacer.deadline_ns == 1000 + STEP_NS
+    assert pacer.due(1000 + STEP_NS - 1) == 0
+    assert pacer.due(1000 + STEP_NS) == 1
+    do(pacer, 1)
+    assert pacer.due(1000 + STEP_NS) == 0
+    assert pacer.deadline_ns == 1000 + 2 * STEP_NS
+
+
+def test_missed_steps_are_all_due() -> None:
+    pacer = Pacer(0)
+    do(pacer, 3)
+    assert pacer.due(10 * STEP_NS) == 7
+
+
+def test_a_long_stall_is_caught_up_in_parts() -> None:
+    pacer = Pacer(0)
+    assert pacer.due(10 * MAX_BATCH * STEP_NS) == MAX_BATCH
+    do(pacer, MAX_BATCH)
+    assert pacer.due(10 * MAX_BATCH * STEP_NS) == MAX_BATCH
+
+
+def test_what_is_late_is_told() -> None:
+    pacer = Pacer(0)
+    assert pacer.lateness(STEP_NS + LATE_NS) is None
+    assert pacer.lateness(STEP_NS + LATE_NS + 1) == Lateness(1, 1, LATE_NS + 1)
+    do(pacer, 1)
+    assert pacer.lateness(5 * STEP_NS) == Lateness(2, 4, 3 * STEP_NS)
+
+
+def test_a_clock_that_has_not_begun_is_harmless() -> None:
+    assert Pacer(1000).due(0) == 0

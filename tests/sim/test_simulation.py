@@ -1,0 +1,223 @@
+"""The stepping core: determinism, sensors on time, commands."""
+
+from __future__ import annotations
+
+import math
+import random
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from grader.errors import AssignmentError
+from sim.description import SimulatorOptions
+from sim.motion import NS, REST, Pose, Twist
+from sim.simulation import STEP_NS, EventKind, Simulation, Step, make_simulation
+from sim.world import World, parse_world, read_world
+
+WORLDS = Path(__file__).parent / "worlds"
+ROOM = read_world(WORLDS / "room.yaml")
+EMPTY = World()
+Commands = Callable[[int], Twist | None]
+
+
+def simulation(world: World = EMPTY, seed: int = 0, **options: object) -> Simulation:
+    return make_simulation(world, SimulatorOptions.model_validate(options), seed)
+
+
+def run(subject: Simulation, steps: int, commands: Commands = lambda _: None) -> list[Step]:
+    return [subject.advance(commands(i)) for i in range(steps)]
+
+
+def recorded(steps: list[Step]) -> bytes:
+    """Every bit of every number that a recording would hold."""
+    parts = []
+    for step in steps:
+        pose, twist, command = step.pose, step.twist, step.command
+        parts.append(
+            struct.pack(
+                "<qq7d",
+                step.index,
+                step.time_ns,
+                pose.x_m,
+                pose.y_m,
+                pose.yaw_rad,
+                twist.linear_m_s,
+                twist.angular_rad_s,
+                command.linear_m_s,
+                command.angular_rad_s,
+            )
+        )
+        parts.append(f"{step.contact} {step.events}".encode())
+        if step.scan is not None:
+            parts.append(step.scan.ranges_m.tobytes())
+        if step.odometry is not None:
+            belief = step.odometry.pose
+            parts.append(struct.pack("<3d", belief.x_m, belief.y_m, belief.yaw_rad))
+    return b"".join(parts)
+
+
+NOISY = {
+    "lidar": {"noise": "1 cm"},
+    "odometry": {"drift": {"radius": "1 %", "separation": "1 %", "slip": "2 mm"}},
+}
+
+
+def wild(seed: int) -> Commands:
+    source = random.Random(seed)
+    return lambda _: (
+        Twist(source.uniform(-0.3, 0.3), source.uniform(-3.0, 3.0))
+        if source.random() < 0.05
+        else None
+    )
+
+
+def test_equal_seeds_and_commands_give_equal_bits() -> None:
+    first = recorded(run(simulation(ROOM, 5, **NOISY), 2000, wild(1)))
+    assert recorded(run(simulation(ROOM, 5, **NOISY), 2000, wild(1))) == first
+
+
+def test_another_seed_changes_the_sensors_but_not_the_truth() -> None:
+    first = run(simulation(ROOM, 5, **NOISY), 500, wild(1))
+    second = run(simulation(ROOM, 6, **NOISY), 500, wild(1))
+    assert [step.pose for step in first] == [step.pose for step in second]
+    assert recorded(first) != recorded(second)
+
+
+def test_the_noise_of_a_scan_does_not_depend_on_odometry() -> None:
+    quiet = {"lidar": NOISY["lidar"], "odometry": {"enabled": False}}
+    first = run(simulation(ROOM, 5, **NOISY), 300, wild(1))
+    second = run(simulation(ROOM, 5, **quiet), 300, wild(1))
+    for one, other in zip(first, second, strict=True):
+        if one.scan is not None and other.scan is not None:
+            assert one.scan.ranges_m.tobytes() == other.scan.ranges_m.tobytes()
+
+
+def test_a_robot_at_rest_stays_at_rest_to_the_last_bit() -> None:
+    subject = simulation(ROOM, robot={"pose": [0.1, 0.2, "0.3 rad"]})
+    for step in run(subject, 1000, lambda i: REST if i % 7 == 0 else None):
+        assert step.pose == Pose(0.1, 0.2, 0.3)
+        assert step.twist == REST
+        if step.odometry is not None:
+            assert step.odometry.pose == Pose(0.1, 0.2, 0.3)
+
+
+def test_ten_seconds_have_so_many_messages() -> None:
+    steps = run(simulation(), 1000)
+    assert sum(step.odometry is not None for step in steps) == 300
+    assert sum(step.scan is not None for step in steps) == 50
+    assert steps[-1].time_ns == 10 * NS
+
+
+def test_each_sample_is_the_truth_of_its_step() -> None:
+    for step in run(simulation(), 500, lambda i: Twist(0.1, 0.5) if i == 0 else None):
+        if step.odometry is not None:
+            assert (step.odometry.time_ns, step.odometry.pose) == (step.time_ns, step.pose)
+            assert step.odometry.twist == step.twist
+        if step.scan is not None:
+            assert step.scan.time_ns == step.time_ns
+
+
+def test_sensors_may_start_late_and_stop_early() -> None:
+    steps = run(
+        simulation(lidar={"starts": "1 s", "stops": "2 s"}, odometry={"enabled": False}), 300
+    )
+    assert [s.time_ns // STEP_NS for s in steps if s.scan is not None] == [100, 120, 140, 160, 180]
+    assert all(step.odometry is None for step in steps)
+
+
+def test_a_constant_command_draws_the_arc_of_the_closed_form() -> None:
+    """From rest, v and w rise linearly and at their own rates; then it is a circle of v / w."""
+    steps = run(simulation(), 1000, lambda i: Twist(0.2, 0.5) if i == 0 else None)
+    settled = [step.pose for step in steps[50:]]
+    first = settled[0]
+    centre = complex(first.x_m, first.y_m) + 0.4j * complex(
+        math.cos(first.yaw_rad), math.sin(first.yaw_rad)
+    )
+    for pose in settled:
+        assert abs(complex(pose.x_m, pose.y_m) - centre) == pytest.approx(0.4, abs=1e-12)
+
+
+def test_the_last_command_holds_for_ever_without_a_timeout() -> None:
+    steps = run(simulation(), 1000, lambda i: Twist(0.1, 0.0) if i == 0 else None)
+    assert steps[-1].twist == Twist(0.1, 0.0)
+
+
+def test_with_a_timeout_the_robot_stops_and_it_is_told_once() -> None:
+    subject = simulation(robot={"command_timeout": "500 ms"})
+    steps = run(subject, 300, lambda i: Twist(0.1, 0.0) if i in (0, 30) else None)
+    told = [
+        step.index
+        for step in steps
+        for event in step.events
+        if event.kind is EventKind.COMMAND_TIMEOUT
+    ]
+    assert told == [81]  # the command came before step 31, which ends at 310 ms
+    assert steps[79].command == Twist(0.1, 0.0)
+    assert steps[-1].command == steps[-1].twist == REST
+    assert subject.advance(Twist(0.1, 0.0)).command == Twist(0.1, 0.0)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [Twist(math.nan, 0.0), Twist(0.0, math.nan), Twist(math.inf, 0.0), Twist(0.1, -math.inf)],
+)
+def test_a_command_that_is_not_finite_stops_the_robot_and_is_told(command: Twist) -> None:
+    subject = simulation()
+    run(subject, 100, lambda i: Twist(0.2, 1.0) if i == 0 else None)
+    step = subject.advance(command)
+    assert [event.kind for event in step.events] == [EventKind.COMMAND_REJECTED]
+    assert step.events[0].text == (f"linear {command.linear_m_s}, angular {command.angular_rad_s}")
+    assert step.command == REST
+    last = run(subject, 100)[-1]
+    assert last.twist == REST
+    assert math.isfinite(last.pose.x_m)
+    assert run(subject, 50, lambda _: Twist(0.1, 0.0))[-1].twist == Twist(0.1, 0.0)
+
+
+def test_a_huge_command_is_only_limited() -> None:
+    steps = run(simulation(), 100, lambda _: Twist(1e300, -1e300))
+    assert steps[-1].twist == Twist(0.22, -2.84)
+    assert steps[-1].command == Twist(1e300, -1e300)
+    assert not any(step.events for step in steps)
+
+
+def test_beginning_and_end_of_a_contact_are_told() -> None:
+    world = parse_world("segments: [[0.3, -1, 0.3, 1]]")
+    subject = simulation(world)
+    steps = run(subject, 300, {0: Twist(0.2, 0), 200: Twist(-0.2, 0)}.get)
+    events = [(event.kind, event.text) for step in steps for event in step.events]
+    assert events == [
+        (EventKind.CONTACT_BEGAN, "segments[0]"),
+        (EventKind.CONTACT_ENDED, "segments[0]"),
+    ]
+    touching = [step for step in steps if step.contact == "segments[0]"]
+    assert len({step.pose for step in touching}) == 1
+    assert touching[0].pose.x_m == pytest.approx(0.2, abs=1e-8)
+
+
+def test_the_options_change_the_robot() -> None:
+    options = {
+        "model": "waffle",
+        "radius": "30 cm",
+        "max_speed": "1 m/s",
+        "max_angular_speed": "90 deg/s",
+        "max_acceleration": "2 m/s^2",
+        "max_angular_acceleration": "4 rad/s^2",
+    }
+    model = simulation(robot=options).robot.model
+    assert (model.name, model.radius_m, model.wheel_separation_m) == ("waffle", 0.3, 0.287)
+    limits = model.limits
+    assert (limits.speed_m_s, limits.angular_speed_rad_s) == (1.0, pytest.approx(math.pi / 2))
+    assert (limits.acceleration_m_s2, limits.angular_acceleration_rad_s2) == (2.0, 4.0)
+
+
+def test_the_start_is_that_of_the_scenario_or_else_of_the_world() -> None:
+    assert simulation(ROOM).pose == Pose(-1.5, 0.0, 0.0)
+    assert simulation(ROOM, robot={"pose": [0, 0, "1 rad"]}).pose == Pose(0.0, 0.0, 1.0)
+
+
+def test_a_robot_inside_a_wall_is_refused() -> None:
+    with pytest.raises(AssignmentError, match=r"room.yaml:8: boxes\[0\]: a robot with radius"):
+        simulation(ROOM, robot={"pose": [0, 1.2, 0]})
