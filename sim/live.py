@@ -16,9 +16,8 @@ import rclpy
 from pydantic import TypeAdapter, ValidationError
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
-from rich.console import Console, Group
+from rich.console import Console
 from rich.live import Live
-from rich.table import Table
 from rich.text import Text
 
 from grader.errors import UsageError
@@ -26,12 +25,12 @@ from grader.nearest import did_you_mean
 from sim.coordinates import PoseInPlane
 from sim.description import SimulatorOptions, read_options
 from sim.lidar import Scan
-from sim.motion import NS, Pose
+from sim.motion import NS, Pose, Twist
 from sim.node import RosSimulator, make_node
 from sim.pacing import Lateness
 from sim.robot import MODELS
 from sim.simulation import Simulation, Step, make_simulation
-from sim.view import Layer, draw, hit_points, range_towards
+from sim.view import Drawing, Layer, hit_points, range_towards
 from sim.world import Values, World, read_world
 
 _STYLES = {
@@ -125,6 +124,7 @@ class Screen:
         """Begin with nothing to show."""
         self.simulator: RosSimulator | None = None
         self._world, self._simulation, self._options = world, simulation, options
+        self._drawing = Drawing(world, simulation.robot.model.radius_m)
         self._step: Step | None = None
         self._scan: tuple[Scan, Pose] | None = None
         self._late_steps = 0
@@ -177,64 +177,70 @@ class Screen:
             text += f"  {self._late_steps} steps late"
         return text
 
-    def picture(self, console: Console) -> Group:
+    def picture(self, console: Console) -> Text:
         """The live view."""
         columns, lines = console.size
         rows = max(4, lines - _SUMMARY_LINES - 1)
-        robot = self._simulation.robot.model
         pose = self._simulation.pose
         scan, at = self._scan or (None, pose)
         hits = hit_points(self._simulation.lidar, scan, at) if scan else []
-        cells = draw(self._world, pose, robot.radius_m, self.time_ns, columns, rows, hits)
-        text = Text(no_wrap=True)
-        for line in cells:
-            for cell in line:
-                text.append(cell.character, _STYLES[cell.layer])
+        text = Text(no_wrap=True, overflow="crop")
+        for line in self._drawing.lines(pose, self.time_ns, columns, rows, hits):
+            for run in line:
+                text.append(run.text, _STYLES[run.layer])
             text.append("\n")
-        return Group(text, self._summary())
+        return text.append_text(self._summary())
 
-    def _summary(self) -> Table:
-        table = Table.grid(padding=(0, 2))
-        step, model = self._step, self._simulation.robot.model
+    def _summary(self) -> Text:
+        step, text = self._step, Text()
         if step is None:
-            return table
-        degrees = math.degrees(step.pose.yaw_rad)
-        table.add_row(
-            f"{self._world.file.name}, {model.name}", f"{step.time_ns / NS:.1f} s", "Ctrl-C ends"
-        )
-        table.add_row(
-            "pose", f"x {step.pose.x_m:+.3f} m", f"y {step.pose.y_m:+.3f} m", f"{degrees:+.1f} deg"
-        )
-        for name, twist in (("velocity", step.twist), ("command", step.command)):
-            table.add_row(name, f"{twist.linear_m_s:+.3f} m/s", f"{twist.angular_rad_s:+.3f} rad/s")
-        table.add_row(
-            "scan",
-            f"ahead {self._range(0.0)}",
-            f"left {self._range(math.pi / 2)}",
-            f"behind {self._range(math.pi)}",
-            f"right {self._range(-math.pi / 2)}",
-        )
-        touching = f"[bold red]with {step.contact}[/]" if step.contact else "none"
-        table.add_row("contact", touching)
-        table.add_row("topics", *self._topics())
+            return text
+        name = f"{self._world.file.name}, {self._simulation.robot.model.name}"
+        pose = step.pose
+        rows = [
+            ("", name, f"{step.time_ns / NS:.1f} s", "Ctrl-C ends"),
+            (
+                "pose",
+                f"x {pose.x_m:+.3f} m",
+                f"y {pose.y_m:+.3f} m",
+                f"yaw {math.degrees(pose.yaw_rad):+.1f} deg",
+            ),
+            ("velocity", *_speeds(step.twist)),
+            ("command", *_speeds(step.command)),
+            (
+                "scan",
+                f"ahead {self._range(0.0)}",
+                f"left {self._range(math.pi / 2)}",
+                f"behind {self._range(math.pi)}",
+                f"right {self._range(-math.pi / 2)}",
+            ),
+            ("contact", f"with {step.contact}" if step.contact else "none"),
+            *self._topics(),
+        ]
         if self._late_steps:
-            worst = f"{self._worst_late_ns / 1e6:.0f} ms"
-            table.add_row("late", f"{self._late_steps} steps", f"at most {worst}")
-        return table
+            worst = f"at most {self._worst_late_ns / 1e6:.0f} ms"
+            rows.append(("late", f"{self._late_steps} steps", worst))
+        for label, *parts in rows:
+            style = "bold red" if label == "contact" and step.contact else ""
+            text.append(f"{label:<10}{'  '.join(parts)}\n", style)
+        return text
 
-    def _topics(self) -> list[str]:
+    def _topics(self) -> list[tuple[str, ...]]:
         simulator, topics = self.simulator, self._options.topics
         if simulator is None:
             return []
         publishers = simulator.command.get_publisher_count()
         odometry = simulator.odometry.publisher.get_subscription_count()
         scan = simulator.scan.publisher.get_subscription_count()
-        rejected = f", {self._rejected} not finite" if self._rejected else ""
+        rejected = (f"{self._rejected} of them not finite",) if self._rejected else ()
+        command = f"{topics.command.topic} ({publishers} publishers)"
         return [
-            f"{topics.command.topic}: {publishers} publishers",
-            f"{simulator.commands} commands{rejected}",
-            f"{topics.odometry.topic}: {odometry} subscriptions",
-            f"{topics.scan.topic}: {scan} subscriptions",
+            ("from", command, f"{simulator.commands} commands", *rejected),
+            (
+                "to",
+                f"{topics.odometry.topic} ({odometry} subscriptions)",
+                f"{topics.scan.topic} ({scan} subscriptions)",
+            ),
         ]
 
     def _range(self, direction_rad: float) -> str:
@@ -255,6 +261,10 @@ class _Show:
         if time_ns >= self._next_ns:
             self._next_ns = (time_ns // self._every_ns + 1) * self._every_ns
             self._show()
+
+
+def _speeds(twist: Twist) -> tuple[str, str]:
+    return f"{twist.linear_m_s:+.3f} m/s", f"{twist.angular_rad_s:+.3f} rad/s"
 
 
 @contextmanager

@@ -7,10 +7,10 @@ dots are about square in a terminal.
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import dataclass
 from enum import Enum
-
-import numpy as np
+from itertools import groupby
 
 from sim.contact import obstacles_at
 from sim.lidar import Lidar, Scan
@@ -36,10 +36,10 @@ class Layer(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
-    """One character of the map."""
+class Run:
+    """Neighbouring characters of one layer."""
 
-    character: str
+    text: str
     layer: Layer
 
 
@@ -62,24 +62,33 @@ class Map:
         self.dots_per_m = min(2 * columns / width_m, 4 * rows / height_m)
         self.columns, self.rows = columns, rows
         self._centre = (0.5 * (x_min + x_max), 0.5 * (y_min + y_max))
-        self._dots = np.zeros((rows, columns), dtype=np.int64)
-        self._layers = np.full((rows, columns), Layer.EMPTY.value)
-        self._letters: dict[tuple[int, int], str] = {}
+        # One number for each character, line by line: plain lists, for dots come one by one.
+        self._dots = [0] * (columns * rows)
+        self._layers = [Layer.EMPTY.value] * (columns * rows)
+        self._letters: dict[int, str] = {}
+
+    def copy(self) -> Map:
+        """A canvas to draw on without changing this one."""
+        other = copy(self)
+        other._dots, other._layers = self._dots[:], self._layers[:]
+        other._letters = dict(self._letters)
+        return other
 
     def point(self, x_m: float, y_m: float, layer: Layer) -> None:
         """Draw a dot; outside the map nothing happens."""
         column, row = self._dot(x_m, y_m)
         if 0 <= column < 2 * self.columns and 0 <= row < 4 * self.rows:
-            self._dots[row // 4, column // 2] |= _DOTS[row % 4][column % 2]
-            place = (row // 4, column // 2)
-            self._layers[place] = max(int(self._layers[place]), layer.value)
+            place = row // 4 * self.columns + column // 2
+            self._dots[place] |= _DOTS[row % 4][column % 2]
+            self._layers[place] = max(self._layers[place], layer.value)
 
     def letter(self, x_m: float, y_m: float, character: str, layer: Layer) -> None:
         """Write a character over whatever is drawn there."""
         column, row = self._dot(x_m, y_m)
         if 0 <= column < 2 * self.columns and 0 <= row < 4 * self.rows:
-            self._letters[(row // 4, column // 2)] = character
-            self._layers[row // 4, column // 2] = layer.value
+            place = row // 4 * self.columns + column // 2
+            self._letters[place] = character
+            self._layers[place] = layer.value
 
     def capsule(self, capsule: Capsule, layer: Layer) -> None:
         """Draw a wall or a circle."""
@@ -96,18 +105,20 @@ class Map:
             else:
                 self.point(x1 + share * (x2 - x1), y1 + share * (y2 - y1), layer)
 
-    def cells(self) -> list[list[Cell]]:
+    def lines(self) -> list[list[Run]]:
         """The map, line by line from the top."""
-        return [
-            [
-                Cell(
-                    self._letters.get((row, column)) or (chr(0x2800 + int(dots)) if dots else " "),
-                    Layer(int(self._layers[row, column])),
-                )
-                for column, dots in enumerate(line)
-            ]
-            for row, line in enumerate(self._dots)
-        ]
+        return [self._line(row * self.columns) for row in range(self.rows)]
+
+    def _line(self, begin: int) -> list[Run]:
+        runs = []
+        places = range(begin, begin + self.columns)
+        for layer, group in groupby(places, key=self._layers.__getitem__):
+            runs.append(Run("".join(self._character(place) for place in group), Layer(layer)))
+        return runs
+
+    def _character(self, place: int) -> str:
+        dots = self._dots[place]
+        return self._letters.get(place) or (chr(0x2800 + dots) if dots else " ")
 
     def _dot(self, x_m: float, y_m: float) -> tuple[int, int]:
         column = self.columns + (x_m - self._centre[0]) * self.dots_per_m
@@ -115,38 +126,70 @@ class Map:
         return math.floor(column), math.floor(row)
 
 
-def draw(
-    world: World,
-    pose: Pose,
-    radius_m: float,
-    time_ns: int,
-    columns: int,
-    rows: int,
-    hits: list[tuple[float, float]] | None = None,
-) -> list[list[Cell]]:
-    """Draw a world with its robot.
+class Drawing:
+    """Draws a world with its robot again and again; what stands still is drawn once."""
 
-    Args:
-        world: What stands and moves in it.
-        pose: Of the robot.
-        radius_m: Of its footprint.
-        time_ns: Simulated time, for what moves.
-        columns: Characters in a line.
-        rows: Lines.
-        hits: What the LiDAR sees, in the world's frame (see :func:`hit_points`).
-    """
-    canvas = Map(world.extent((pose.x_m, pose.y_m)), columns, rows)
-    for shape in world.shapes:
-        for capsule in shape.capsules:
-            canvas.capsule(capsule, Layer.WALL)
-    for capsule in obstacles_at(world.moving, time_ns):
-        canvas.capsule(capsule, Layer.MOVING)
-    for x_m, y_m in hits or []:
-        canvas.point(x_m, y_m, Layer.HIT)
-    canvas.capsule((pose.x_m, pose.y_m, pose.x_m, pose.y_m, radius_m), Layer.FOOTPRINT)
-    arrow = ARROWS[round(pose.yaw_rad / (math.pi / 4)) % 8]
-    canvas.letter(pose.x_m, pose.y_m, arrow, Layer.ROBOT)
-    return canvas.cells()
+    def __init__(self, world: World, radius_m: float) -> None:
+        """Prepare.
+
+        Args:
+            world: What stands and moves in it.
+            radius_m: Of the robot's footprint.
+        """
+        self._world, self._radius_m = world, radius_m
+        self._extent_m = world.extent()
+        self._base: tuple[object, Map] | None = None
+
+    def lines(
+        self,
+        pose: Pose,
+        time_ns: int,
+        columns: int,
+        rows: int,
+        hits: list[tuple[float, float]] | None = None,
+    ) -> list[list[Run]]:
+        """Draw it.
+
+        Args:
+            pose: Of the robot.
+            time_ns: Simulated time, for what moves.
+            columns: Characters in a line.
+            rows: Lines.
+            hits: What the LiDAR sees, in the world's frame (see :func:`hit_points`).
+
+        Returns:
+            The map, line by line from the top.
+        """
+        canvas = self._walls(self._visible(pose), columns, rows).copy()
+        for capsule in obstacles_at(self._world.moving, time_ns):
+            canvas.capsule(capsule, Layer.MOVING)
+        for x_m, y_m in hits or []:
+            canvas.point(x_m, y_m, Layer.HIT)
+        canvas.capsule((pose.x_m, pose.y_m, pose.x_m, pose.y_m, self._radius_m), Layer.FOOTPRINT)
+        arrow = ARROWS[round(pose.yaw_rad / (math.pi / 4)) % 8]
+        canvas.letter(pose.x_m, pose.y_m, arrow, Layer.ROBOT)
+        return canvas.lines()
+
+    def _visible(self, pose: Pose) -> tuple[float, float, float, float]:
+        x_min, y_min, x_max, y_max = self._extent_m
+        x_m, y_m = pose.x_m, pose.y_m
+        # By whole metres, so that the walls are seldom drawn anew when the robot leaves the map.
+        return (
+            x_min if x_m >= x_min else math.floor(x_m),
+            y_min if y_m >= y_min else math.floor(y_m),
+            x_max if x_m <= x_max else math.ceil(x_m),
+            y_max if y_m <= y_max else math.ceil(y_m),
+        )
+
+    def _walls(self, extent_m: tuple[float, float, float, float], columns: int, rows: int) -> Map:
+        key = (extent_m, columns, rows)
+        if self._base is None or self._base[0] != key:
+            canvas = Map(extent_m, columns, rows)
+            for shape in self._world.shapes:
+                for capsule in shape.capsules:
+                    canvas.capsule(capsule, Layer.WALL)
+            self._base = (key, canvas)
+        return self._base[1]
 
 
 def hit_points(lidar: Lidar, scan: Scan, pose: Pose) -> list[tuple[float, float]]:

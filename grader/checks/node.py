@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 from grader.assignment.quantity import Duration, format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import NoParameters, Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead, ended_early
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.node_absence import why_no_node, why_not_node
@@ -18,6 +18,29 @@ from grader.checks.wording import code, codes, counted, listing
 from grader.recording.model import NS, Node, Process, Recording
 
 NodeName = Annotated[str, AfterValidator(node_name)]
+
+
+@check("node.starts", Subject.RECORDING)
+def starts(recording: Recording, parameters: NoParameters) -> Finding:
+    """The program starts and has a node.
+
+    Judged by the ROS graph: any node of the student was seen, whatever its name.
+
+    Explains, deepest first: nothing could be launched; the process ended before it had a node
+    (with its exception and the line in your file, its signal, or that main() returned); it
+    runs but has no node (waits for input, loops or sleeps before rclpy.init).
+    """
+    expected = "the program creates a node"
+    missing = why_no_node(recording)
+    if missing is not None:
+        return missing.finding(expected)
+    first = recording.student_nodes[0]
+    when_s = recording.since_launch_s(first.appeared_ns)
+    return Finding.passed(
+        expected,
+        f"{code(first.name)} appeared {when_s:.2f} s after launch",
+        Evidence(moments=(Moment(f"node {first.name} appeared", when_s),)),
+    )
 
 
 class Exists(Parameters):

@@ -43,12 +43,14 @@ class Sources:
         folders: Package -> its folder.
         texts: Lines of each setup.py and interface file, in which quoted names are looked up.
         malformed: Package -> entry points that setuptools will not accept.
+        manifest_errors: package.xml -> why it cannot be used.
     """
 
     files: Collection[str]
     folders: Mapping[str, str]
     texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
     malformed: Mapping[str, tuple[SourceError, ...]] = field(default_factory=dict)
+    manifest_errors: Mapping[str, SourceError] = field(default_factory=dict)
 
 
 def find_culprit(log: str, failed: Collection[str], sources: Sources) -> SourceError | None:
@@ -122,7 +124,8 @@ class _Place:
             return self._at(match[1], int(match[2]), match[3])
         if match := _MANIFEST.match(line):
             reason = "".join(self.lines[self.number + 1 : self.number + 2]).strip("- ")
-            return self._at(match[1], None, reason or line)
+            blamed = self._at(match[1], None, reason or line)
+            return blamed and self.sources.manifest_errors.get(blamed.file, blamed)
         if _NO_SETUP_PY.match(line):
             return SourceError(self.setup_py, None, "there is no setup.py")
         if match := _DIED.match(line):

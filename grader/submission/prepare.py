@@ -19,7 +19,7 @@ from grader.submission.listing import MANIFEST
 from grader.submission.locate import Located, check_path, opened, submission_id
 from grader.submission.members import ArchiveLimits
 from grader.submission.package import Package, read_package, record_packages
-from grader.submission.paths import shown
+from grader.submission.paths import join, shown
 from grader.submission.record import SubmissionRecord
 
 _MAX_PACKAGES = 200
@@ -107,6 +107,11 @@ def _prepare(
         folders={package.name: package.folder for package in packages},
         texts={path: lines for package in packages for path, lines in package.texts.items()},
         malformed={package.name: package.setup.malformed for package in packages},
+        manifest_errors={
+            join(package.folder, MANIFEST): package.manifest.error
+            for package in packages
+            if package.manifest.error is not None
+        },
     )
     built = build(
         located,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from grader.errors import GraderFault
+from grader.errors import GraderFault, UsageError
 from grader.submission.record import SubmissionRecord
 
 _RECORD = TypeAdapter(SubmissionRecord)
@@ -33,3 +34,18 @@ def from_plain(plain: object) -> SubmissionRecord:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"])) or "the whole"
         raise GraderFault(f"this is no record of a submission: {place}: {first['msg']}") from error
+
+
+def read_record(file: Path) -> SubmissionRecord:
+    """Read a record from a JSON file.
+
+    Args:
+        file: Written from :func:`to_plain`, or by any writer of the same dataclasses.
+
+    Raises:
+        UsageError: It cannot be read, or holds no record.
+    """
+    try:
+        return _RECORD.validate_json(file.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise UsageError(f"{file}: is no record of a submission: {error}") from error

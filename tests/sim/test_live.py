@@ -30,7 +30,11 @@ from sim.pacing import Lateness
 from sim.simulation import make_simulation
 from sim.world import read_world
 
-pytestmark = pytest.mark.ros
+pytestmark = [
+    pytest.mark.ros,
+    # lark, which rclpy's interfaces import, still uses it.
+    pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning"),
+]
 
 WORLDS = Path(__file__).parent / "worlds"
 ROOM = str(WORLDS / "room.yaml")
@@ -55,7 +59,7 @@ def test_without_a_terminal_it_writes_a_line_in_a_second(
     assert main([ROOM, "--domain-id", domain, "--duration", "2.0"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == ["1.00", "2.00"]
-    assert lines[0].endswith("ahead 3.00 m")
+    assert "ahead 3.00 m" in lines[0]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -72,23 +76,20 @@ def test_on_a_terminal_it_draws_the_world_and_leaves_the_terminal_as_it_was(doma
     controller, terminal = pty.openpty()
     process = start(domain, ROOM, stdin=terminal, stdout=terminal, stderr=terminal)
     os.close(terminal)
-    output = b""
+    output, is_open, is_interrupted = b"", True, False
     end_s = time.monotonic() + LIMIT_S
     try:
-        while b"Ctrl-C ends" not in output:
-            assert time.monotonic() < end_s, f"no map within {LIMIT_S} s: {output!r}"
+        while is_open:
+            assert time.monotonic() < end_s, f"not over within {LIMIT_S} s: {output!r}"
             if select.select([controller], [], [], 0.1)[0]:
-                output += os.read(controller, 65536)
-        process.send_signal(signal.SIGINT)
-        while process.poll() is None:
-            assert time.monotonic() < end_s, f"no end within {LIMIT_S} s"
-            if select.select([controller], [], [], 0.1)[0]:
-                output += os.read(controller, 65536)
-        while select.select([controller], [], [], 0.0)[0]:
-            try:
-                output += os.read(controller, 65536)
-            except OSError:  # how Linux says that the other side is closed
-                break
+                try:
+                    output += os.read(controller, 65536)
+                except OSError:  # how Linux says that the other side is closed
+                    is_open = False
+            if b"Ctrl-C ends" in output and not is_interrupted:
+                process.send_signal(signal.SIGINT)
+                is_interrupted = True
+        process.wait(LIMIT_S)
     finally:
         process.kill()
         process.wait(LIMIT_S)

@@ -1,0 +1,230 @@
+"""The catalogue: every check is there, documented, and never breaks on what a student sends."""
+
+import json
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from grader.checks.catalogue import CATALOGUE, gather, get
+from grader.checks.check import Subject
+from grader.checks.finding import Finding, Status
+from grader.recording.model import (
+    Call,
+    Declaration,
+    Ending,
+    Endpoint,
+    Kind,
+    LogLine,
+    Message,
+    Node,
+    Owner,
+    Process,
+    Qos,
+    Recording,
+)
+from tests.checks.builder import LAUNCH_NS, TWIST, judge, recording, submission, twist
+
+PARAMETERS = {
+    "package.found": {"package": "bot_publisher", "build_type": "ament_python"},
+    "package.builds": {"package": "bot_publisher"},
+    "package.dependencies": {"package": "bot_publisher"},
+    "package.executable": {"package": "bot_publisher", "executable": "bot_pub"},
+    "node.exists": {"name": "bot_publisher"},
+    "node.alive": {"name": "bot_publisher"},
+    "node.ends": {"within": "2 s"},
+    "topic.published": {"topic": "/cmd_vel"},
+    "topic.subscribed": {"topic": "/cmd_vel"},
+    "topic.type": {"topic": "/cmd_vel", "type": TWIST},
+    "qos.offered": {"topic": "/cmd_vel", "reliability": "reliable", "deadline": "1 s"},
+    "qos.requested": {"topic": "/cmd_vel", "durability": "volatile"},
+    "qos.depth": {"topic": "/cmd_vel", "depth": 10},
+    "messages.count": {"topic": "/cmd_vel", "at_least": 3, "at_most": 20},
+    "messages.equal": {"topic": "/cmd_vel", "value": {"linear": {"x": 1.0}, "angular.z": 0.5}},
+    "timing.period": {"topic": "/cmd_vel", "period": "300 ms"},
+    "executor.responsive": {"within": "1 s"},
+}
+ABSENT = {"topic.subscribed", "qos.requested", "qos.offered"}
+
+
+def subject_of(name):
+    return submission() if get(name).subject is Subject.SUBMISSION else recording()
+
+
+def test_every_check_is_tried_here():
+    assert set(PARAMETERS) == set(CATALOGUE)
+
+
+@pytest.mark.parametrize("name", sorted(set(PARAMETERS) - ABSENT))
+def test_a_good_submission_passes(name):
+    finding = judge(name, subject_of(name), **PARAMETERS[name])
+    assert finding.status is Status.PASSED, finding
+    assert finding.credit == 1.0
+    assert finding.expected and finding.observed
+
+
+@pytest.mark.parametrize("name", sorted(PARAMETERS))
+def test_the_documentation_is_for_students(name):
+    check = get(name)
+    title, blank, *rest = check.documentation.splitlines()
+    assert title.endswith(".") and len(title) <= 70 and not blank
+    assert "Explains" in " ".join(rest)
+    assert check.title == title[:-1]
+
+
+@pytest.mark.parametrize("name", sorted(PARAMETERS))
+def test_every_parameter_is_described(name):
+    for field in get(name).parameters.model_fields.values():
+        assert field.description and field.description.endswith((".", "`)."))
+
+
+@pytest.mark.parametrize("name", sorted(PARAMETERS))
+def test_parameters_have_a_json_schema(name):
+    schema = get(name).parameters.model_json_schema()
+    assert json.loads(json.dumps(schema))["additionalProperties"] is False
+
+
+@pytest.mark.parametrize("name", sorted(PARAMETERS))
+def test_a_parameter_that_does_not_exist_is_refused(name):
+    with pytest.raises(ValueError, match="Extra inputs are not permitted"):
+        judge(name, subject_of(name), **PARAMETERS[name], tolerence=1)
+
+
+def test_the_nearest_name_is_offered():
+    with pytest.raises(ValueError, match=r"unknown check 'topic\.publised'\. Did you mean 'topic"):
+        get("topic.publised")
+
+
+def test_without_a_near_name_all_are_listed():
+    with pytest.raises(ValueError, match=r"There are: executor\.responsive, messages\.count, "):
+        get("zzz")
+
+
+def test_the_catalogue_cannot_be_changed():
+    with pytest.raises(TypeError):
+        CATALOGUE["x"] = get("node.exists")
+
+
+def test_two_checks_of_one_name_are_refused():
+    from grader.checks import node
+
+    with pytest.raises(ValueError, match="two checks are called"):
+        gather((node, node))
+
+
+NAMES = st.sampled_from(["/bot_publisher", "/Bot", "/a/bot_publisher", "/x"])
+TOPICS = st.sampled_from(["/cmd_vel", "/cmdvel", "/bot_publisher/cmd_vel", "/rosout", "/a/b"])
+TIMES = st.integers(-(10**9), 10**10).map(lambda ns: LAUNCH_NS + ns)
+MAYBE = st.one_of(st.none(), TIMES)
+PROCESSES = st.sampled_from(["bot_publisher/bot_pub", "p/other"])
+JSON = st.recursive(
+    st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=9)),
+    lambda inner: st.one_of(st.lists(inner, max_size=2), st.dictionaries(st.text(), inner)),
+    max_leaves=4,
+)
+DECLARATIONS = st.builds(
+    Declaration,
+    TIMES,
+    PROCESSES,
+    st.sampled_from(["started", "init", "node", "publisher", "timer", "spin", "held", "?"]),
+    st.dictionaries(
+        st.sampled_from(["topic", "depth", "history", "period_s", "node", "matched"]),
+        st.one_of(JSON, TOPICS),
+    ),
+)
+QOS = st.builds(
+    Qos,
+    reliability=st.sampled_from(["reliable", "best_effort", "unknown"]),
+    durability=st.sampled_from(["volatile", "transient_local", "unknown"]),
+    deadline_s=st.one_of(st.none(), st.floats(0, 9)),
+)
+ENDPOINTS = st.builds(
+    Endpoint,
+    st.sampled_from(list(Kind)),
+    TOPICS,
+    st.sampled_from([TWIST, "geometry_msgs/msg/Vector3", "x/msg/Twist"]),
+    NAMES,
+    st.sampled_from(list(Owner)),
+    QOS,
+    st.just("00"),
+    TIMES,
+    MAYBE,
+)
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
+MESSAGES = st.lists(
+    st.builds(
+        Message,
+        st.just("/cmd_vel"),
+        st.just(TWIST),
+        st.builds(lambda x, z: twist((x, 0, 0), (0, 0, z)), NUMBERS, NUMBERS),
+        st.one_of(TIMES, st.integers(0, 2**63 - 1)),
+        TIMES,
+        st.integers(0, 2**64 - 1),
+    ),
+    max_size=14,
+).map(lambda found: {"/cmd_vel": tuple(sorted(found, key=lambda m: m.stamp_ns))} if found else {})
+LOG = st.builds(
+    LogLine,
+    TIMES,
+    PROCESSES,
+    st.sampled_from(["stdout", "stderr", "rosout"]),
+    st.one_of(
+        st.text(max_size=20),
+        st.sampled_from(
+            [
+                "Traceback (most recent call last):",
+                '  File "/x/site-packages/bot_publisher/node.py", line 3, in main',
+                "    self.publisher.publish(x)",
+                "ValueError: x",
+                "KeyboardInterrupt",
+                "Publishing",
+            ]
+        ),
+    ),
+)
+RECORDINGS = st.builds(
+    Recording,
+    scenario=st.just("s"),
+    seed=st.just(1),
+    ending=st.sampled_from(list(Ending)),
+    launched_ns=st.just(LAUNCH_NS),
+    stop_ns=TIMES,
+    end_ns=TIMES,
+    submission=st.just(submission()),
+    matched_ns=MAYBE,
+    messages=MESSAGES,
+    nodes=st.lists(
+        st.builds(Node, NAMES, st.sampled_from(list(Owner)), TIMES, MAYBE), max_size=3
+    ).map(tuple),
+    endpoints=st.lists(ENDPOINTS, max_size=4).map(tuple),
+    processes=st.lists(
+        st.builds(
+            Process,
+            PROCESSES,
+            st.just(1),
+            TIMES,
+            MAYBE,
+            st.one_of(st.none(), st.integers(-70, 300)),
+            st.sampled_from(["itself", "SIGINT", "SIGTERM", "SIGKILL"]),
+            st.one_of(st.none(), st.floats(0, 9)),
+        ),
+        max_size=2,
+    ).map(tuple),
+    log=st.lists(LOG, max_size=12).map(tuple),
+    declarations=st.lists(DECLARATIONS, max_size=6).map(tuple),
+    calls=st.lists(
+        st.builds(Call, NAMES.map(lambda n: f"{n}/list_parameters"), st.just("x"), TIMES, MAYBE),
+        max_size=5,
+    ).map(tuple),
+)
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.too_slow], deadline=None)
+@given(RECORDINGS)
+def test_no_recording_breaks_a_check(run):
+    for name, parameters in PARAMETERS.items():
+        if get(name).subject is Subject.RECORDING:
+            finding = judge(name, run, **parameters)
+            assert isinstance(finding, Finding)
+            assert finding.expected and finding.observed
+            assert (finding.credit == 1.0) == (finding.status is Status.PASSED)
