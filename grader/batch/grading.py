@@ -108,7 +108,7 @@ class Grading:
         for attempt in range(1, MOST_RUNS + 1):
             self._run_all(prepared, folder, again, recordings, faults, alone=attempt > 1)
             runs.update(dict.fromkeys(again, attempt))
-            result = grade(self._loaded, prepared.record, recordings)
+            result = grade(self._loaded, prepared.record, recordings, faults)
             again = sorted(
                 set(result.disturbed_scenarios())
                 | {name for name, recording in recordings.items() if recording.faults}

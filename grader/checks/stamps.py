@@ -28,6 +28,8 @@ def why_not_believed(recording: Recording, messages: Sequence[Message]) -> Cause
     Returns:
         A cause, an error where the host's disturbance may explain the difference, or None.
     """
+    if not any(message.stamp_ns for message in messages):
+        return Cause("the middleware gave no source timestamps", ours=True)
     for message in messages:
         begin_ns = recording.launched_ns - _CLOCK_SLACK_NS
         if not begin_ns <= message.stamp_ns <= message.received_ns + _CLOCK_SLACK_NS:

@@ -32,7 +32,7 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
     """
     if recording.student_endpoints(kind, topic):
         return None
-    if kind is Kind.PUBLISHER and recording.on(topic):
+    if kind is Kind.PUBLISHER and _only_students_publish(recording, topic):
         return None
     cause = why_no_node(recording)
     if cause is not None:
@@ -61,6 +61,15 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
             evidence,
         )
     return _elsewhere(recording, kind, topic, own, evidence)
+
+
+def _only_students_publish(recording: Recording, topic: str) -> bool:
+    """Whether messages came that nobody but the student can have published."""
+    others = (
+        item.owner is not Owner.STUDENT and item.kind is Kind.PUBLISHER and item.topic == topic
+        for item in recording.endpoints
+    )
+    return bool(recording.on(topic)) and not any(others)
 
 
 def _near_miss(kind: Kind, topic: str, own: list[Endpoint], evidence: Evidence) -> Cause | None:

@@ -56,11 +56,3 @@ def value_text(value: Any) -> str:
 def percent(ratio: float) -> str:
     """Write a ratio as ``5 %``."""
     return f"{ratio * 100.0:.4g} %"
-
-
-def sentence(text: str) -> str:
-    """Begin with a capital letter (unless with code) and end with a full stop."""
-    text = text.strip()
-    if not text:
-        return ""
-    return text[0].upper() + text[1:] + ("" if text[-1] in ".!?:" else ".")

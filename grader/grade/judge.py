@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from grader.assignment.model import CheckSpec
@@ -32,6 +33,7 @@ def grade(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording],
+    faults: Mapping[str, str] = MappingProxyType({}),
 ) -> Grade:
     """Judge a submission.
 
@@ -42,6 +44,7 @@ def grade(
         loaded: The assignment with its checks.
         submission: What was handed in.
         recordings: By scenario id; empty where nothing could be launched.
+        faults: Why a scenario has no recording, through no fault of the student's, by its id.
 
     Returns:
         The grade, with one result per check in the author's order.
@@ -56,7 +59,7 @@ def grade(
         findings = (
             (_skipped([results[root] for root in roots]),)
             if roots
-            else tuple(_findings(bound[name], loaded, submission, recordings))
+            else tuple(_findings(bound[name], loaded, submission, recordings, faults))
         )
         results[name] = _result(bound[name], loaded, findings, roots)
     ordered = tuple(results[name] for name in bound)
@@ -111,6 +114,7 @@ def _findings(
     loaded: LoadedAssignment,
     submission: SubmissionRecord,
     recordings: Mapping[str, Recording],
+    faults: Mapping[str, str],
 ) -> Iterator[ScenarioFinding]:
     if bound.check.subject is Subject.SUBMISSION:
         yield _judge(bound, submission, None)
@@ -122,9 +126,8 @@ def _findings(
     for scenario in scenarios:
         recording = recordings.get(scenario)
         if recording is None:
-            finding = why_not_run(submission, loaded.assignment.packages) or _fault(
-                f"there is no recording of the scenario {scenario!r}"
-            )
+            lost = faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
+            finding = why_not_run(submission, loaded.assignment.packages) or _fault(lost)
             yield ScenarioFinding(scenario, finding)
         elif fault := _recording_fault(recording, scenario, submission):
             yield ScenarioFinding(scenario, _fault(fault))

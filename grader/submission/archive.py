@@ -97,8 +97,9 @@ def _translated(name: str) -> Iterator[None]:
     except MemoryError as error:
         raise SubmissionError(f"{name}: needs too much memory to be unpacked") from error
     except OSError as error:
-        # zipfile and tarfile seek to wherever a broken archive tells them to.
-        if error.errno == errno.EINVAL:
+        # bz2 raises it without a number, and zipfile and tarfile seek to wherever a broken
+        # archive tells them to.
+        if error.errno in (None, errno.EINVAL):
             raise SubmissionError(f"{name}: is broken and cannot be unpacked") from error
         raise GraderFault(f"{name}: could not be unpacked here: {error}") from error
 

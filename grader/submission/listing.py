@@ -21,7 +21,7 @@ from grader.submission.members import (
     is_left_out,
     resolve_link,
 )
-from grader.submission.paths import join, shown
+from grader.submission.paths import join, parents, shown
 
 MANIFEST = "package.xml"
 IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
@@ -151,10 +151,7 @@ def _links_inside(links: dict[str, str], files: list[SubmissionFile]) -> list[Su
     if not links:
         return []
     present = {file.path for file in files}
-    for path in list(present):
-        while "/" in path:
-            path = path.rpartition("/")[0]
-            present.add(path)
+    present.update(folder for path in list(present) for folder in parents(path))
     kept = []
     for path, target in links.items():
         try:
@@ -200,15 +197,8 @@ def find_packages(paths: Iterable[str]) -> list[str]:
             ignored.add(folder or ".")
     found: list[str] = []
     for folder in sorted(folders, key=lambda folder: (folder != ".", folder.count("/"))):
-        above = _with_parents(folder)
+        above = {folder, *parents(folder), "."}
         hidden = any(part.startswith(".") and part != "." for part in folder.split("/"))
         if not hidden and ignored.isdisjoint(above) and set(found).isdisjoint(above):
             found.append(folder)
     return sorted(found, key=os.fsencode)
-
-
-def _with_parents(folder: str) -> list[str]:
-    chain = [folder]
-    while "/" in chain[-1]:
-        chain.append(chain[-1].rpartition("/")[0])
-    return [*chain, "."]

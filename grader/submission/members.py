@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from grader.errors import SubmissionError
-from grader.submission.paths import shown
+from grader.submission.paths import parents, shown
 
 MIB = 2**20
 
@@ -210,9 +210,7 @@ def _check_place(path: str, kind: Kind, kinds: dict[str, Kind]) -> None:
     known = kinds.get(path)
     if known is not None and not (known is kind is Kind.FOLDER):
         raise Refused("the archive holds this path twice")
-    folder = path
-    while "/" in folder:
-        folder = folder.rpartition("/")[0]
+    for folder in parents(path):
         if kinds.setdefault(folder, Kind.FOLDER) is not Kind.FOLDER:
             raise Refused(f"{shown(folder)} is not a folder in this archive")
 
@@ -222,10 +220,7 @@ def _with_safe_links(entries: list[Entry], archive: str) -> list[Entry]:
     if not links:
         return entries
     present = {entry.path for entry in entries if entry.member.kind is not Kind.LINK}
-    for path in list(present) + list(links):
-        while "/" in path:
-            path = path.rpartition("/")[0]
-            present.add(path)
+    present.update(folder for path in (*present, *links) for folder in parents(path))
     kept = []
     for entry in entries:
         if entry.member.kind is Kind.LINK:

@@ -22,6 +22,12 @@ def join(folder: str, name: str) -> str:
     return name if folder == "." else f"{folder}/{name}"
 
 
+def parents(path: str) -> list[str]:
+    """The folders above a relative path, the nearest first, without the submission itself."""
+    parts = path.split("/")
+    return ["/".join(parts[:count]) for count in range(len(parts) - 1, 0, -1)]
+
+
 def is_within(path: str, folder: str) -> bool:
     """Whether a relative path lies in a folder, or is it; ``.`` holds everything."""
-    return folder == "." or path == folder or path.startswith(f"{folder}/")
+    return folder in (".", path) or path.startswith(f"{folder}/")

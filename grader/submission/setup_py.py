@@ -215,8 +215,10 @@ def _braces(template: str, values: list[str], named: Mapping[str, str]) -> list[
             if spec or conversion:
                 raise Unknown
             if name == "":
-                name, place = str(place), place + 1
-            pieces.append(values[int(name)] if name.isdecimal() else named[name])
+                pieces.append(values[place])
+                place += 1
+            else:
+                pieces.append(values[int(name)] if name.isdecimal() else named[name])
     except (ValueError, LookupError) as error:
         raise Unknown from error
     return pieces

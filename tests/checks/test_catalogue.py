@@ -30,6 +30,7 @@ PARAMETERS = {
     "package.builds": {"package": "bot_publisher"},
     "package.dependencies": {"package": "bot_publisher"},
     "package.executable": {"package": "bot_publisher", "executable": "bot_pub"},
+    "node.starts": {},
     "node.exists": {"name": "bot_publisher"},
     "node.alive": {"name": "bot_publisher"},
     "node.ends": {"within": "2 s"},

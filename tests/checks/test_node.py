@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.recording.model import Ending, Wait
+from grader.recording.model import Ending, Owner, Wait
 from grader.submission.record import BuildRecord, SourceError
 from tests.checks.builder import (
     BOT,
@@ -183,6 +183,23 @@ class TestExists:
             log=output(traceback("KeyError: 'x'")),
         )
         assert "KeyError: 'x'" in failing("node.exists", run, name=NODE)
+
+
+class TestStarts:
+    def test_any_node_will_do(self):
+        run = recording(nodes=(node("/another"),))
+        finding = judge("node.starts", run)
+        assert finding.status is Status.PASSED
+        assert "`/another` appeared 0.30 s after launch" in finding.observed
+
+    def test_a_node_of_the_probe_will_not(self):
+        run = nodeless(nodes=(node("/probe", owner=Owner.PROBE),), processes=(died(-11),))
+        assert "SIGSEGV" in failing("node.starts", run)
+
+    def test_the_reason_is_the_one_that_node_exists_gives(self):
+        log = output(traceback("ImportError: cannot import name 'Twists'"))
+        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=log)
+        assert failing("node.starts", run) == failing("node.exists", run, name=NODE)
 
 
 class TestAlive:

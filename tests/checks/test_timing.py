@@ -1,5 +1,7 @@
 """timing.period: robust against the machine, strict with the student."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -334,6 +336,14 @@ class TestForgery:
             period="300 ms",
         )
         assert "before the launch" in found
+
+    def test_no_stamps_at_all_are_no_forgery(self):
+        stream = tuple(
+            replace(message(t, sequence=n), stamp_ns=0) for n, t in enumerate(every(0.3))
+        )
+        finding = period(recording(messages={"/cmd_vel": stream}))
+        assert finding.status is Status.ERROR
+        assert "no source timestamps" in finding.observed
 
     def test_a_busy_machine_may_explain_it(self):
         noise = tuple(Disturbance(at(0.7 + 0.5 * n), 0, int(0.2 * NS)) for n in range(13))

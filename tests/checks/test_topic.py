@@ -3,7 +3,7 @@
 import pytest
 
 from grader.checks.finding import Status
-from grader.recording.model import Ending, Kind
+from grader.recording.model import Ending, Kind, Owner
 from tests.checks.builder import (
     NODE,
     TWIST,
@@ -44,6 +44,11 @@ class TestPublished:
     def test_a_message_proves_a_publisher_that_the_graph_never_showed(self):
         run = recording(endpoints=(reader(),))
         assert judge("topic.published", run, topic="/cmd_vel").status is Status.PASSED
+
+    def test_a_message_of_the_simulator_proves_nothing(self):
+        simulator = endpoint(node="/simulator", owner=Owner.PROBE)
+        run = recording(endpoints=(simulator, reader()), declarations=())
+        assert "publishes nothing" in failing("topic.published", run, topic="/cmd_vel")
 
     def test_relative_names_are_refused_in_the_assignment(self):
         with pytest.raises(ValueError, match="'cmd_vel' is relative"):

@@ -1,0 +1,215 @@
+"""What is run again, what is given up, and whose fault it is: no ROS needed for that.
+
+The runner is replaced at its seam by one that leaves recordings made by hand.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from grader import ros
+from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.batch.grading import Graded, Grading
+from grader.batch.regrading import compare, find, regrade
+from grader.checks.finding import Status
+from grader.errors import GraderFault, UsageError
+from grader.recording.mcap_writer import write_recording
+from grader.recording.model import Disturbance, Ending, Endpoint, Kind, Node, Owner, Qos, Recording
+from grader.run.runner import Runner
+from grader.submission.prepare import Prepared
+from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
+
+YAML = """\
+rosgrade: 1
+id: lesson
+title: Test
+packages: [{name: bot, executables: [bot]}]
+scenarios:
+  - id: run
+    launch: [{executable: bot}]
+    record: [{topic: /cmd_vel, type: geometry_msgs/msg/Twist}]
+    timeout: 5 s
+checks:
+  - {id: alive, uses: node.alive, points: 1}
+  - {id: ends, uses: node.ends, with: {within: 2 s}, points: 1, requires: [alive]}
+"""
+SUBMISSION = SubmissionRecord(
+    id="ada",
+    sha256="ab" * 32,
+    packages=(PackageRecord(name="bot", path=".", executables=("bot",)),),
+    build=BuildRecord(succeeded=True, duration_s=1.0),
+)
+SECOND = 1_000_000_000
+
+
+def recording(stop_s: float = 0.1, taken_s: float = 0.0, faults: tuple[str, ...] = ()) -> Recording:
+    """A run whose node took so long to end, while the host took so much."""
+    from grader.recording.model import Process
+
+    end = 10 * SECOND
+    return Recording(
+        scenario="run",
+        seed=1,
+        ending=Ending.FAULT if faults else Ending.UNTIL,
+        launched_ns=SECOND,
+        matched_ns=2 * SECOND,
+        stop_ns=5 * SECOND,
+        end_ns=end,
+        submission=SUBMISSION,
+        nodes=(Node("/bot", Owner.STUDENT, 2 * SECOND),),
+        endpoints=(
+            Endpoint(
+                Kind.PUBLISHER,
+                "/cmd_vel",
+                "geometry_msgs/msg/Twist",
+                "/bot",
+                Owner.STUDENT,
+                Qos("reliable", "volatile"),
+                "01",
+                2 * SECOND,
+            ),
+        ),
+        processes=(Process("bot/bot", 7, SECOND, end, -2, "SIGINT", stop_s),),
+        disturbance=(Disturbance(6 * SECOND, 0, int(taken_s * SECOND)),),
+        faults=faults,
+    )
+
+
+class ScriptedRunner(Runner):
+    """Leaves one prepared recording after the other, or raises."""
+
+    def __init__(self, *outcomes: Recording | GraderFault) -> None:
+        super().__init__(ros.RosInstallation("wheels", Path("python"), ()))
+        self._outcomes: Iterator[Recording | GraderFault] = iter(outcomes)
+        self.alone: list[bool] = []
+
+    def run(self, *arguments: object, alone: bool = False, **more: object) -> None:
+        outcome = next(self._outcomes)
+        self.alone.append(alone)
+        if isinstance(outcome, GraderFault):
+            raise outcome
+        file = arguments[4]
+        assert isinstance(file, Path)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_recording(file, outcome, (), {})
+
+
+@pytest.fixture
+def lesson(tmp_path: Path) -> LoadedAssignment:
+    folder = tmp_path / "lesson"
+    folder.mkdir()
+    (folder / "assignment.yaml").write_text(YAML, encoding="utf-8")
+    return load_assignment(folder)
+
+
+Grade = Callable[..., tuple[Graded, ScriptedRunner]]
+
+
+@pytest.fixture
+def grade(lesson: LoadedAssignment, tmp_path: Path) -> Grade:
+    def run(*outcomes: Recording | GraderFault) -> tuple[Graded, ScriptedRunner]:
+        runner = ScriptedRunner(*outcomes)
+        grading = Grading(lesson, runner, tmp_path / "cache")
+        prepared = Prepared(record=SUBMISSION, install=tmp_path)
+        return grading.grade_prepared(prepared, tmp_path / "recordings"), runner
+
+    return run
+
+
+def test_a_calm_run_is_judged_once(grade: Grade) -> None:
+    graded, runner = grade(recording())
+    assert graded.grade.full_points
+    assert runner.alone == [False]
+
+
+def test_a_fault_of_the_student_is_not_run_again(grade: Grade) -> None:
+    graded, runner = grade(recording(stop_s=2.5))
+    assert graded.grade.result("ends").status is Status.FAILED
+    assert runner.alone == [False]
+
+
+def test_a_disturbed_run_is_repeated_alone(grade: Grade) -> None:
+    disturbed = recording(stop_s=2.5, taken_s=3.0)
+    graded, runner = grade(disturbed, recording())
+    assert graded.grade.full_points
+    assert runner.alone == [False, True]
+    assert graded.runs == {"run": 2}
+
+
+def test_after_three_disturbed_runs_it_is_not_graded_and_costs_nothing(grade: Grade) -> None:
+    disturbed = recording(stop_s=2.5, taken_s=3.0)
+    graded, runner = grade(disturbed, disturbed, disturbed)
+    assert not graded.grade.graded
+    assert graded.grade.result("ends").status is Status.ERROR
+    assert graded.grade.result("alive").status is Status.PASSED
+    assert runner.alone == [False, True, True]
+
+
+def test_a_fault_of_ours_is_tried_again_and_then_an_error_by_name(grade: Grade) -> None:
+    foreign = recording(faults=("not alone on ROS domain 7: /neighbour",))
+    graded, _ = grade(foreign, recording())
+    assert graded.grade.full_points
+    graded, _ = grade(foreign, foreign, foreign)
+    assert not graded.grade.graded
+    assert "/neighbour" in graded.grade.result("alive").decisive.finding.observed
+
+
+def test_a_cell_that_fails_is_an_error_and_not_the_student_s(grade: Grade) -> None:
+    fault = GraderFault("the cell of scenario 'run' ended with status -9")
+    graded, _ = grade(fault, recording())
+    assert graded.grade.full_points
+    graded, _ = grade(fault, fault, fault)
+    assert not graded.grade.graded
+    assert graded.grade.result("alive").status is Status.ERROR
+    assert "status -9" in graded.grade.result("alive").decisive.finding.observed
+
+
+def test_what_does_not_build_is_not_run(lesson: LoadedAssignment, tmp_path: Path) -> None:
+    build = BuildRecord(succeeded=False, duration_s=1.0, log="error")
+    record = dataclasses.replace(SUBMISSION, build=build)
+    runner = ScriptedRunner()
+    grading = Grading(lesson, runner, tmp_path)
+    graded = grading.grade_prepared(Prepared(record=record, install=None), tmp_path / "r")
+    assert runner.alone == []
+    assert graded.grade.graded
+    assert graded.grade.score == 0
+
+
+def test_recordings_are_judged_again_without_running_anything(
+    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    first, _ = grade(recording(stop_s=2.5))
+    found = find(tmp_path / "recordings")
+    assert regrade(lesson, found).grade == first.grade
+    (lesson.folder / "assignment.yaml").write_text(
+        YAML.replace("within: 2 s", "within: 3 s"), encoding="utf-8"
+    )
+    assert regrade(load_assignment(lesson.folder), found).grade.full_points
+
+
+def test_a_regrade_says_who_gains_what_and_why(
+    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    from grader.batch.files import write_graded
+    from grader.report.facts import Clock
+
+    first, _ = grade(recording(stop_s=2.5))
+    write_graded(first, tmp_path, Clock())
+    (lesson.folder / "assignment.yaml").write_text(
+        YAML.replace("within: 2 s", "within: 3 s"), encoding="utf-8"
+    )
+    found = find(tmp_path)
+    assert found.assignment == "lesson"
+    assert found.result is not None
+    lines = compare(found.result, regrade(load_assignment(lesson.folder), found).grade)
+    assert lines[0].startswith("ends: failed -> passed, 0 -> 1 points: ")
+    assert lines[1] == "score: 1 -> 2 of 2"
+
+
+def test_a_folder_without_recordings_is_a_wrong_use(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="there are no recordings in it"):
+        find(tmp_path)

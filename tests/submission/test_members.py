@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.errors import SubmissionError
+from grader.submission.members import (
+    ArchiveLimits,
+    Entry,
+    Kind,
+    LeadsOut,
+    Member,
+    admit,
+    resolve_link,
+)
+
+LIMITS = ArchiveLimits(
+    total_bytes=1000, members=10, ratio=10, ratio_from_bytes=200, depth=5, path_bytes=100
+)
+NAMES = st.lists(
+    st.sampled_from(["a", "b", "..", ".", "", "etc", "C:", "\\", "~", "\0", "é", "\udcff", "x" * 99]),
+    max_size=7,
+).map("/".join)
+
+
+def files(*names: str, size: int = 1) -> list[Member]:
+    return [Member(place, name, Kind.FILE, size) for place, name in enumerate(names)]
+
+
+def admitted(members: list[Member], archive_bytes: int = 1000) -> list[Entry]:
+    return admit(members, archive="bot.zip", archive_bytes=archive_bytes, limits=LIMITS)
+
+
+def refusal(members: list[Member], archive_bytes: int = 1000) -> str:
+    with pytest.raises(SubmissionError) as caught:
+        admitted(members, archive_bytes)
+    return str(caught.value)
+
+
+def test_names_are_made_plain() -> None:
+    assert [entry.path for entry in admitted(files("./a//b", "c"))] == ["a/b", "c"]
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("/etc/passwd", "absolute"),
+        ("C:/boot.ini", "absolute"),
+        ("\\\\host\\share", "absolute"),
+        ("../x", "'..'"),
+        ("a/../../x", "'..'"),
+        ("a\0b", "NUL"),
+        ("a/b/c/d/e/f", "5 folders deep"),
+        ("x" * 256, "too long"),
+        ("/".join("x" * 30 for _ in range(4)), "too long"),
+        ("\ud800", "not valid Unicode"),
+    ],
+)
+def test_a_name_that_leads_out_or_astray_is_refused(name: str, reason: str) -> None:
+    message = refusal(files("good.py", name))
+    assert message.startswith("bot.zip: ")
+    assert reason in message
+
+
+def test_a_refusal_names_the_member_and_is_printable() -> None:
+    assert refusal(files("../\x1b[2J")) == "bot.zip: ../\\x1b[2J: paths with '..' are refused"
+
+
+def test_the_sum_of_declared_sizes_is_bounded() -> None:
+    assert "more than 0 MiB" in refusal(files("a", "b", size=600))
+
+
+def test_the_ratio_is_bounded_from_a_size_on() -> None:
+    admitted(files("a", size=190), archive_bytes=1)
+    assert "10 times its size" in refusal(files("a", size=300), archive_bytes=20)
+
+
+def test_the_number_of_members_is_bounded() -> None:
+    admitted(files(*"abcdefghij"))
+    assert "more than 10 members" in refusal(files(*"abcdefghijk"))
+
+
+def test_what_tools_left_is_not_unpacked_and_may_be_ten_times_as_much() -> None:
+    left = files(*(f".git/objects/{number}" for number in range(90)))
+    assert [entry.path for entry in admitted([*left, *files("a")])] == ["a"]
+    assert "members" in refusal([*left, *files(*(f"__MACOSX/{n}" for n in range(20)))])
+
+
+@pytest.mark.parametrize("name", ["__MACOSX/a/._x.py", "a/.DS_Store", "a/._setup.py", ".venv/x"])
+def test_leftovers_of_macos_and_of_tools_are_left_out(name: str) -> None:
+    assert admitted(files(name)) == []
+
+
+@pytest.mark.parametrize("names", [("a", "a"), ("a", "./a"), ("a/b", "a/b")])
+def test_a_path_that_is_there_twice_is_refused(names: tuple[str, str]) -> None:
+    assert "twice" in refusal(files(*names))
+
+
+def test_a_folder_may_be_listed_twice() -> None:
+    assert len(admitted([Member(0, "a/", Kind.FOLDER), Member(1, "a/", Kind.FOLDER)])) == 2
+
+
+def test_a_file_cannot_be_a_folder_as_well() -> None:
+    assert "a is not a folder" in refusal(files("a", "a/b"))
+    assert "twice" in refusal(files("a/b", "a"))
+
+
+def test_nothing_is_written_through_a_link() -> None:
+    link = Member(0, "a", Kind.LINK, target=".")
+    assert "a is not a folder" in refusal([link, *files("a/b")])
+
+
+def test_devices_and_pipes_are_refused() -> None:
+    assert "special file" in refusal([Member(0, "pipe", Kind.SPECIAL)])
+
+
+def test_a_negative_size_is_refused() -> None:
+    assert "negative" in refusal(files("a", size=-1))
+
+
+@pytest.mark.parametrize("target", ["/etc", "..", "../x", "b/../../x"])
+def test_a_link_that_leads_out_is_refused(target: str) -> None:
+    assert "leads out" in refusal([Member(0, "a", Kind.LINK, target=target), *files("b/c")])
+
+
+def test_a_chain_of_links_that_leads_out_is_refused() -> None:
+    chain = [
+        Member(0, "d/one", Kind.LINK, target=".."),
+        Member(1, "two", Kind.LINK, target="d/one/.."),
+    ]
+    assert "leads out" in refusal([*chain, *files("d/x")])
+
+
+def test_a_link_to_something_inside_is_kept_and_one_to_nothing_is_not() -> None:
+    links = [
+        Member(0, "d/good", Kind.LINK, target="../x"),
+        Member(1, "dangling", Kind.LINK, target="y"),
+        Member(2, "loop", Kind.LINK, target="loop"),
+    ]
+    assert [entry.path for entry in admitted([*links, *files("x")])] == ["d/good", "x"]
+
+
+@given(st.lists(NAMES, max_size=8))
+def test_whatever_the_names_nothing_leaves_the_folder(names: list[str]) -> None:
+    try:
+        entries = admitted(files(*names))
+    except SubmissionError:
+        return
+    paths = [os.path.normpath(f"/root/{entry.path}") for entry in entries]
+    assert all(path.startswith("/root/") for path in paths)
+    assert len(set(paths)) == len(paths)
+
+
+PARTS = st.sampled_from(["a", "b", "c", "..", "."])
+LINKS = st.dictionaries(
+    st.sampled_from(["a", "b", "d/a", "d/b", "d/e/a"]),
+    st.lists(PARTS, min_size=1, max_size=4).map("/".join),
+    max_size=5,
+)
+
+
+@given(LINKS)
+def test_links_are_followed_as_the_file_system_does(links: dict[str, str]) -> None:
+    with tempfile.TemporaryDirectory() as scratch:
+        # Far enough down that no link of these leads out of the scratch folder.
+        root = Path(scratch, *"12345678901234567890", "root").resolve()
+        (root / "d/e").mkdir(parents=True)
+        for path, target in links.items():
+            (root / path).symlink_to(target)
+        for path in links:
+            real = os.path.realpath(root / path)
+            inside = f"{real}/".startswith(f"{root}/")
+            try:
+                found = resolve_link(path, links)
+            except LeadsOut:
+                continue
+            assert inside
+            if found is not None and (root / path).exists():
+                assert str(root / found) == real
