@@ -11,7 +11,7 @@ from grader.assignment.load import load_assignment
 from grader.assignment.mutation import apply, load_mutants
 
 ASSIGNMENT = "timed_publisher"
-BROKEN = "sleeps_in_a_loop"
+BROKEN = "sleeps_in_main"
 REPORTS = Path("rosgrade-report")
 
 

@@ -26,8 +26,8 @@ from grader.run.admission import Admission, cpu_count
 from grader.run.runner import Runner
 
 SUBMISSIONS = {
-    "simple_publisher": (REFERENCE, "publishes_twice", "wrong_topic"),
-    "timed_publisher": (REFERENCE, "period_30_ms", "sleeps_in_a_loop", "best_effort"),
+    "simple_publisher": (REFERENCE, "publishes_twice", "topic_misspelt"),
+    "timed_publisher": (REFERENCE, "period_30_ms", "sleeps_in_main", "best_effort"),
 }
 """Assignment -> what is graded: both references and five mutants."""
 

@@ -9,7 +9,7 @@ import time
 
 from sim.description import SimulatorOptions
 from sim.motion import NS, Pose, Twist
-from sim.shapes import wall
+from sim.shapes import Shape, wall
 from sim.simulation import STEP_NS, Simulation, make_simulation
 from sim.world import World
 
@@ -20,7 +20,7 @@ _HALF_M = 4.0
 def random_world(segments: int, seed: int = 0) -> World:
     """Walls of 0.2 to 1 m, scattered over 8 m x 8 m, with room for a robot at the origin."""
     source = random.Random(seed)
-    shapes = []
+    shapes: list[Shape] = []
     while len(shapes) < segments:
         x_m, y_m = source.uniform(-_HALF_M, _HALF_M), source.uniform(-_HALF_M, _HALF_M)
         angle, length_m = source.uniform(0.0, math.tau), source.uniform(0.2, 1.0)

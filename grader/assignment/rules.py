@@ -180,6 +180,9 @@ def _topic(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
     interface = getattr(bound.parameters, "type", None)
     if topic is None or (family not in _MESSAGE_FAMILIES and interface is None):
         return
+    if getattr(bound.parameters, "kind", None) == "subscription":
+        # What a student subscribes to is there to be sent by us, not to be recorded.
+        return
     for scenario in draft.scenarios_of(bound.spec) or ():
         recorded = {one.topic: one.type for one in scenario.record}
         if topic not in recorded:

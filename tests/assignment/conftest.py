@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
@@ -30,6 +31,7 @@ class _Topic(Parameters):
 class _Type(Parameters):
     topic: TopicName
     type: InterfaceName
+    kind: Literal["publisher", "subscription"] = "publisher"
 
 
 class _Period(Parameters):

@@ -176,6 +176,16 @@ def test_a_topic_that_nobody_needs_recorded_may_be_judged_by_the_graph(
     )
 
 
+def test_what_a_student_subscribes_to_need_not_be_recorded(mistakes: Mistakes) -> None:
+    check = "{topic: /odom, type: nav_msgs/msg/Odometry, kind: KIND}"
+    text = f"{HEAD}  - {{id: a, points: 1, uses: topic.type, with: {check}}}\n"
+    assert not mistakes(text.replace("KIND", "subscription"))
+    assert mistakes(text.replace("KIND", "publisher")) == [
+        "13: checks[0].with.topic: the scenario 'run' does not record '/odom'. It records: "
+        "/cmd_vel."
+    ]
+
+
 def test_worthless_checks_are_a_mistake_only_if_all_are(mistakes: Mistakes) -> None:
     free = "  - {id: a, points: 0, uses: node.alive}\n"
     assert mistakes(HEAD + free) == ["12: checks: the points of all checks add up to 0"]

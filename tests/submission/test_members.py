@@ -23,7 +23,7 @@ LIMITS = ArchiveLimits(
     total_bytes=1000, members=10, ratio=10, ratio_from_bytes=200, depth=5, path_bytes=100
 )
 NAMES = st.lists(
-    st.sampled_from(["a", "b", "..", ".", "", "etc", "C:", "\\", "~", "\0", "é", "\udcff", "x" * 99]),
+    st.sampled_from(["a", "b", "..", ".", "", "C:", "\\", "~", "\0", "é", "\udcff", "x" * 99]),
     max_size=7,
 ).map("/".join)
 
@@ -179,6 +179,7 @@ def test_links_are_followed_as_the_file_system_does(links: dict[str, str]) -> No
                 found = resolve_link(path, links)
             except LeadsOut:
                 continue
-            assert inside
+            # None is a loop, or the root itself; neither is unpacked.
+            assert found is None or inside
             if found is not None and (root / path).exists():
                 assert str(root / found) == real

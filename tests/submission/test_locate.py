@@ -1,0 +1,145 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from grader.errors import SubmissionError, UsageError
+from grader.submission.locate import opened, submission_id
+
+from .samples import PACKAGE, Tree, tar_bytes, tar_member, zip_bytes
+
+
+def sha256(path: Path) -> str:
+    with opened(path) as located:
+        return located.sha256
+
+
+def as_zip(prefix: str = "") -> bytes:
+    return zip_bytes(*((f"{prefix}{name}", text.encode()) for name, text in PACKAGE.items()))
+
+
+@pytest.mark.parametrize(
+    "folder", [".", "bot_publisher", "src/bot_publisher", "alice-main/ws/src/bot_publisher"]
+)
+def test_a_package_is_found_under_any_number_of_folders(tree: Tree, folder: str) -> None:
+    with opened(tree.package(folder=folder)) as located:
+        assert located.packages == (folder,)
+        assert located.id == "alice"
+
+
+@pytest.mark.parametrize("name", ["bob.zip", "bob.ZIP", "bob.tar.gz", "bob.tgz"])
+def test_an_archive_is_opened_and_named_without_its_suffix(tmp_path: Path, name: str) -> None:
+    members = (tar_member(f"ws/{path}", text.encode()) for path, text in PACKAGE.items())
+    content = as_zip("ws/") if name.lower().endswith("zip") else tar_bytes(*members)
+    (tmp_path / name).write_bytes(content)
+    with opened(tmp_path / name) as located:
+        assert located.id == "bob"
+        assert located.packages == ("ws",)
+        assert (located.root / "ws/setup.py").read_text() == PACKAGE["setup.py"]
+
+
+def test_a_folder_and_an_archive_of_it_have_the_same_hash(tree: Tree, tmp_path: Path) -> None:
+    (tmp_path / "bob.zip").write_bytes(as_zip())
+    assert sha256(tree.package(folder=".")) == sha256(tmp_path / "bob.zip")
+
+
+def test_a_workspace_with_build_and_install_is_the_same_submission(tree: Tree) -> None:
+    before = sha256(tree.package())
+    tree.package(folder="build/bot_publisher")
+    tree.package(folder="install/bot_publisher/share/bot_publisher")
+    with opened(tree.write({"log/latest/events.log": "x"})) as located:
+        assert located.packages == ("src/bot_publisher",)
+        assert located.sha256 == before
+        assert located.skipped == ("build", "install", "log")
+
+
+def test_the_hash_depends_on_paths_contents_and_executable_bits(tree: Tree) -> None:
+    hashes = {sha256(tree.write({"a.py": "1"}))}
+    hashes.add(sha256(tree.write({"a.py": "2"})))
+    (tree.root / "a.py").chmod(0o755)
+    hashes.add(sha256(tree.root))
+    (tree.root / "a.py").rename(tree.root / "b.py")
+    hashes.add(sha256(tree.root))
+    (tree.root / "c.py").symlink_to("b.py")
+    hashes.add(sha256(tree.root))
+    assert len(hashes) == 5
+
+
+def test_what_is_in_a_file_is_not_taken_for_the_next_file(tree: Tree, tmp_path: Path) -> None:
+    other = Tree(tmp_path / "other")
+    first = sha256(tree.write({"a": "fb\0", "b": ""}))
+    assert first != sha256(other.write({"a": "", "b": "fb\0"}))
+
+
+def test_the_copy_is_private(tree: Tree) -> None:
+    with opened(tree.package()) as located:
+        (located.root / "src/bot_publisher/setup.py").write_text("changed")
+        tree.write({"src/bot_publisher/new.py": ""})
+        assert not (located.root / "src/bot_publisher/new.py").exists()
+    assert not located.root.exists()
+    assert (tree.root / "src/bot_publisher/setup.py").read_text() == PACKAGE["setup.py"]
+
+
+def test_odd_names_are_copied(tree: Tree) -> None:
+    names = ["new\nline.py", "🤖.py", os.fsdecode(b"caf\xe9.py")]
+    with opened(tree.write(dict.fromkeys(names, "x"))) as located:
+        assert {path.name for path in located.root.iterdir()} == set(names)
+
+
+def test_links_are_copied_as_links(tree: Tree) -> None:
+    root = tree.write({"a/x.py": "x"})
+    (root / "b.py").symlink_to(root / "a/x.py")
+    with opened(root) as located:
+        assert (located.root / "b.py").resolve() == (located.root / "a/x.py").resolve()
+
+
+def test_a_file_that_cannot_be_read_is_named(tree: Tree, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Tests may run as root, who may read everything, so the file is taken away instead.
+    root = tree.write({"a.py": "x"})
+
+    def vanish(*_: object) -> object:
+        (root / "a.py").unlink()
+        return listing
+
+    from grader.submission import locate
+
+    listing = locate.list_files(root)
+    monkeypatch.setattr(locate, "list_files", vanish)
+    with pytest.raises(SubmissionError, match=r"a\.py: cannot be read"), opened(root):
+        pass
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "https://github.com/ada/bot.git",
+        "git@github.com:ada/bot.git",
+        "ssh://git@example.org/bot",
+        Path("https://github.com/ada/bot"),
+    ],
+)
+def test_a_url_is_not_taken_for_a_path(path: str | Path) -> None:
+    with pytest.raises(UsageError, match="is a URL; clone it"), opened(path):
+        pass
+
+
+def test_a_path_that_does_not_exist_is_a_wrong_use(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="nobody: does not exist"), opened(tmp_path / "nobody"):
+        pass
+
+
+def test_a_device_is_no_submission() -> None:
+    with pytest.raises(UsageError, match="neither a folder nor a file"), opened("/dev/null"):
+        pass
+
+
+def test_a_submission_is_named_after_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.b").mkdir()
+    monkeypatch.chdir(tmp_path / "a.b")
+    assert submission_id(Path()) == "a.b"
+    assert submission_id(Path("..")) == tmp_path.name
+    assert submission_id(Path("/")) == "submission"
