@@ -24,7 +24,7 @@ from grader import ros
 from grader.assignment.load import load_assignment
 from grader.assignment.mutation import reference_of
 from grader.batch.files import write_graded
-from grader.batch.grading import Grading
+from grader.batch.grading import RECORDINGS_FOLDER, Grading
 from grader.grade import grade
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import NS
@@ -127,7 +127,8 @@ def _whole(samples: Samples, folder: Path, build: str) -> None:
     wall_s = time.monotonic() - began_s
     if process.returncode:
         raise SystemExit(f"rosgrade check ended with {process.returncode}")
-    recording = read_recording(report / "recordings" / "publishing.mcap")
+    (file,) = (report / RECORDINGS_FOLDER).glob("*.mcap")
+    recording = read_recording(file)
     needed_s = (recording.stop_ns - (recording.matched_ns or recording.launched_ns)) / NS
     samples.add(f"rosgrade check, {build} build: wall", wall_s)
     samples.add(f"rosgrade check, {build} build: overhead", wall_s - needed_s)

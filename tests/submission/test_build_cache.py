@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import os
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from grader.errors import GraderFault
+from grader.submission.build_cache import INSTALL, BuildCache, CachedBuild, CacheLimits, tree_hash
+from grader.submission.record import BuildRecord
+
+BUILD = BuildRecord(succeeded=True, duration_s=1.5, log="fine\n")
+DAY_S = 24 * 3600.0
+
+
+def stored(cache: BuildCache, key: str = "k", content: str = "x = 1\n") -> CachedBuild:
+    with cache.unfinished() as folder:
+        (folder / INSTALL / "lib").mkdir(parents=True)
+        (folder / INSTALL / "lib/node.py").write_text(content)
+        return cache.store(key, folder, BUILD)
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> BuildCache:
+    return BuildCache(tmp_path)
+
+
+def names(tmp_path: Path) -> set[str]:
+    return {path.name for path in (tmp_path / "builds").iterdir()}
+
+
+def test_what_was_stored_is_found_and_said_to_be_cached(cache: BuildCache) -> None:
+    first = stored(cache)
+    found = cache.find("k")
+    assert found is not None
+    assert (first.build.cached, found.build.cached) == (False, True)
+    assert found.build.duration_s == 1.5
+    assert found.install == first.install
+    assert found.install is not None
+    assert (found.install / "lib/node.py").read_text() == "x = 1\n"
+
+
+def test_what_was_not_stored_is_not_found(cache: BuildCache) -> None:
+    assert cache.find("k") is None
+
+
+def test_a_failed_build_is_kept_too(cache: BuildCache) -> None:
+    failed = BuildRecord(succeeded=False, duration_s=1.0)
+    with cache.unfinished() as folder:
+        assert cache.store("k", folder, failed) == CachedBuild(failed, None)
+    found = cache.find("k")
+    assert found is not None
+    assert (found.build.succeeded, found.install) == (False, None)
+
+
+def test_an_unfinished_build_leaves_nothing(cache: BuildCache, tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), cache.unfinished() as folder:
+        (folder / INSTALL).mkdir()
+        raise KeyboardInterrupt
+    assert names(tmp_path) == set()
+
+
+@pytest.mark.parametrize("damage", ["changed", "added", "removed", "executable", "no record"])
+def test_a_damaged_build_is_not_found_and_replaced(
+    cache: BuildCache, tmp_path: Path, damage: str
+) -> None:
+    install = stored(cache).install
+    assert install is not None
+    if damage == "changed":
+        (install / "lib/node.py").write_text("x = 2\n")
+    elif damage == "added":
+        (install / "lib/new.py").touch()
+    elif damage == "removed":
+        (install / "lib/node.py").unlink()
+    elif damage == "executable":
+        (install / "lib/node.py").chmod(0o755)
+    else:
+        (install.parent / "build.json").write_text("{")
+    assert cache.find("k") is None
+    stored(cache)
+    assert cache.find("k") is not None
+    assert names(tmp_path) == {"k"}
+    assert {path.name for path in install.parent.iterdir()} == {"build.json", INSTALL}
+
+
+def test_what_python_caches_while_it_runs_is_no_damage(cache: BuildCache) -> None:
+    install = stored(cache).install
+    assert install is not None
+    (install / "lib/__pycache__").mkdir()
+    (install / "lib/__pycache__/node.cpython-311.pyc").touch()
+    assert cache.find("k") is not None
+
+
+def test_who_comes_second_gets_the_first_build(cache: BuildCache) -> None:
+    first = stored(cache, content="x = 1\n")
+    second = stored(cache, content="x = 2\n")
+    assert second.install == first.install
+    assert second.build.cached
+    assert second.install is not None
+    assert (second.install / "lib/node.py").read_text() == "x = 1\n"
+
+
+def test_two_who_need_the_same_build_take_turns(cache: BuildCache) -> None:
+    order: list[str] = []
+
+    def other() -> None:
+        with cache.locked("k", wait_s=20.0) as held:
+            order.append(f"second {held}")
+
+    with cache.locked("k", wait_s=20.0) as held:
+        thread = threading.Thread(target=other)
+        thread.start()
+        time.sleep(0.2)
+        order.append(f"first {held}")
+    thread.join()
+    assert order == ["first True", "second True"]
+
+
+def test_nobody_waits_for_ever(cache: BuildCache) -> None:
+    with cache.locked("k", wait_s=0.0), cache.locked("k", wait_s=0.1) as held:
+        assert held is False
+    with cache.locked("k", wait_s=0.0), cache.locked("other", wait_s=0.0) as held:
+        assert held is True
+
+
+def age(tmp_path: Path, key: str, seconds: float) -> None:
+    then = time.time() - seconds
+    os.utime(tmp_path / "builds" / key, (then, then))
+
+
+def test_builds_that_were_not_used_for_long_go(cache: BuildCache, tmp_path: Path) -> None:
+    for key, days in (("old", 31), ("used", 29)):
+        stored(cache, key)
+        age(tmp_path, key, days * DAY_S)
+    stored(cache, "new")
+    assert names(tmp_path) == {"used", "new"}
+
+
+def test_the_least_recently_used_go_when_there_is_too_much(tmp_path: Path) -> None:
+    cache = BuildCache(tmp_path, CacheLimits(total_bytes=25))
+    for key, days in (("first", 3), ("second", 2), ("third", 1)):
+        stored(cache, key, content="x" * 10)
+        age(tmp_path, key, days * DAY_S)
+    cache.find("first")
+    age(tmp_path, "first", 0.5 * DAY_S)
+    cache.prune()
+    assert names(tmp_path) == {"first", "third"}
+
+
+def test_a_build_that_may_be_running_never_goes(tmp_path: Path) -> None:
+    cache = BuildCache(tmp_path, CacheLimits(total_bytes=0))
+    for key in ("a", "b"):
+        stored(cache, key)
+    assert names(tmp_path) == {"a", "b"}
+
+
+def test_what_a_killed_build_left_goes_after_a_day(cache: BuildCache, tmp_path: Path) -> None:
+    stored(cache)
+    (tmp_path / "builds/.unfinished-old").mkdir()
+    (tmp_path / "builds/.unfinished-now").mkdir()
+    age(tmp_path, ".unfinished-old", 2 * DAY_S)
+    cache.prune()
+    assert names(tmp_path) == {"k", ".unfinished-now"}
+
+
+def test_a_cache_that_cannot_be_used_is_no_fault_of_the_student(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    cache = BuildCache(tmp_path / "file")
+    with pytest.raises(GraderFault, match="cache folder"), cache.locked("k", wait_s=0.0):
+        pass
+    with pytest.raises(GraderFault, match="cache folder"), cache.unfinished():
+        pass
+
+
+def test_a_tree_is_hashed_without_following_links(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a/up").symlink_to("..")
+    (tmp_path / "etc").symlink_to("/etc")
+    before = tree_hash(tmp_path)
+    (tmp_path / "etc").unlink()
+    (tmp_path / "etc").symlink_to("/usr")
+    assert tree_hash(tmp_path) != before

@@ -1,0 +1,43 @@
+from grader.submission.buildlog import MAX_BYTES, clean, ending, missing_cmake_packages
+
+
+def test_colours_and_control_characters_are_gone() -> None:
+    log = "\x1b[31merror\x1b[0m \x1b]0;title\x07here\x08\x00\tand\r\nthere\n"
+    assert clean(log, {}) == "error here\tand\nthere\n"
+
+
+def test_scratch_paths_are_the_students_again() -> None:
+    paths = {"/tmp/r/submission": "", "/tmp/r/scratch/build": "build", "/tmp/r/scratch": "scratch"}
+    log = (
+        'File "/tmp/r/submission/src/bot/setup.py"\nin /tmp/r/submission\n/tmp/r/scratch/build/b\n'
+    )
+    assert clean(log, paths) == 'File "src/bot/setup.py"\nin .\nbuild/b\n'
+
+
+def test_paths_that_setup_py_names_relatively_are_short() -> None:
+    assert clean("creating ../../../scratch/build/bot/x\n", {}) == "creating build/bot/x\n"
+
+
+def test_a_warning_about_our_own_installation_is_left_out() -> None:
+    warning = (
+        "WARNING:colcon.colcon_ros.prefix_path.ament:The path '/x' in the environment variable "
+        "AMENT_PREFIX_PATH doesn't contain any 'local_setup.*' files.\n"
+    )
+    assert clean(f"a\n{warning}b\n", {}) == "a\nb\n"
+
+
+def test_of_a_long_log_the_end_is_kept_in_whole_lines() -> None:
+    log = "".join(f"line {number} größer\n" for number in range(10_000))
+    kept = ending(log)
+    assert len(kept.encode()) <= MAX_BYTES
+    assert kept.startswith("line ")
+    assert log.endswith(kept)
+    assert ending("short\n") == "short\n"
+
+
+def test_packages_that_cmake_did_not_find_are_listed() -> None:
+    log = """
+  Could not find a package configuration file provided by
+  "example_interfaces" with any of the following names:
+"""
+    assert missing_cmake_packages(log) == {"example_interfaces"}

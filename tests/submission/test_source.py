@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+import ast
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.submission.record import SourceError
+from grader.submission.source import MAX_BYTES, is_python_script, parse
+
+
+def error(data: bytes) -> SourceError:
+    found = parse(data, "src/bot/node.py")
+    assert isinstance(found, SourceError)
+    assert found.file == "src/bot/node.py"
+    assert "\n" not in found.message
+    return found
+
+
+def test_a_syntax_error_is_told_as_python_tells_it() -> None:
+    found = error(b"import rclpy\ndef main(:\n    pass\n")
+    assert (found.line, found.message) == (2, "SyntaxError: invalid syntax")
+
+
+def test_wrong_indentation_is_told_as_such() -> None:
+    assert error(b"def main():\npass\n").message.startswith(
+        "IndentationError: expected an indented"
+    )
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\xef\xbb\xbfx = 1\n",
+        b"# -*- coding: latin-1 -*-\nx = '\xe9'\n",
+        "größe = 1\n".encode(),
+        b"",
+        b"x = '\\d'\n",
+        b"x = 1\r\ny = 2\r\n",
+    ],
+)
+def test_every_encoding_that_python_reads_is_read(data: bytes) -> None:
+    assert isinstance(parse(data, "node.py"), ast.Module)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"a\0b", "null bytes"),
+        (b"x = '\xe9'\n", "utf-8"),
+        (b"# coding: klingon\n", "klingon"),
+        (b"x = '\xe9'\n\xff", "utf-8"),
+    ],
+)
+def test_bytes_that_are_no_source_are_an_error(data: bytes, message: str) -> None:
+    assert message in error(data).message
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"-" * 50_000 + b"1",
+        b"1" + b"+1" * 200_000,
+        b"a" + b".b" * 200_000,
+        b"f" + b"()" * 200_000,
+        b"not " * 50_000 + b"1",
+        b"(" * 5_000 + b")" * 5_000,
+    ],
+)
+def test_source_that_overflows_the_parser_is_an_error(data: bytes) -> None:
+    error(data)
+
+
+def test_giant_source_is_not_even_read() -> None:
+    assert "larger than 2 MiB" in error(b"#" * (MAX_BYTES + 1)).message
+
+
+@given(st.binary(max_size=300))
+def test_no_bytes_raise(data: bytes) -> None:
+    assert isinstance(parse(data, "node.py"), (ast.Module, SourceError))
+
+
+def test_a_script_is_known_by_its_first_line() -> None:
+    assert is_python_script(b"#!/usr/bin/env python3\nimport rclpy\n")
+    assert not is_python_script(b"#!/bin/sh\npython3 -m bot\n")
+    assert not is_python_script(b"import rclpy\n")
