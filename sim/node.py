@@ -1,9 +1,13 @@
 """The simulator on ROS topics: a thin layer that only converts messages and keeps time.
 
-It needs no executor: commands are taken from their subscription at each step, which costs
-3 us instead of the 200 us of an executor that wakes up, and which a flood of commands cannot
-slow down, since the middleware keeps only the newest. So it can live in a node that somebody
-else spins, or in one that nobody does.
+It needs no executor, so that it can live in a node that somebody else spins, or in one that
+nobody does: it takes commands from their subscription by itself. And it wakes up only when
+there is something to publish. Steps between two messages are invisible, so they are done
+together with the next visible one; commands are put into the step at which they arrived, by
+the time at which the middleware received them. The result is that of doing every step at its
+time, for a third of the CPU time (a process that wakes up finds its caches cold, and that
+costs more than the physics). So a moment in which the host is busy delays messages, which is
+reported, but does not change where the robot is.
 """
 
 from __future__ import annotations
@@ -11,6 +15,7 @@ from __future__ import annotations
 import importlib
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -38,7 +43,8 @@ from sim.simulation import Simulation, Step
 class Sink(Protocol):
     """Who wants to know the truth, such as a recording.
 
-    Both are called from the loop between two steps and must be quick.
+    Both are called from the loop and must be quick. Steps come in their order, but several at
+    a time (see the module).
     """
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
@@ -116,6 +122,7 @@ class RosSimulator:
         )
         self._most_commands = topics.command.depth
         self._pacer: Pacer | None = None
+        self._pending: deque[tuple[int, Twist]] = deque()
         self._stamp_ns = 0
         self.commands = 0
         self.unreadable = 0
@@ -134,11 +141,11 @@ class RosSimulator:
         return self._pacer.deadline_ns
 
     def catch_up(self) -> int:
-        """Do every step that is due.
+        """Do every step that is over.
 
         Returns:
-            Reading of the steady clock at which the next step is to be done; in the past if
-            there was more to catch up than is done at once.
+            Reading of the steady clock at which to call again; in the past if there was more
+            to catch up than is done at once. Calling earlier does no harm.
         """
         if self._pacer is None:
             return self.start()
@@ -149,11 +156,14 @@ class RosSimulator:
         lateness = pacer.lateness(now_ns)
         if lateness is not None and self._sink is not None:
             self._sink.on_late(lateness)
+        self._take_commands(now_ns - pacer.begin_ns)
         for _ in range(due):
-            step = self._simulation.advance(self._newest_command())
+            step = self._simulation.advance(self._command_by(self._simulation.time_ns))
             pacer.done()
             self._tell(step)
-        return pacer.deadline_ns
+        # Whoever wants a clock wants to see every step.
+        visible_ns = 0 if self.clock is not None else self._simulation.next_output_ns
+        return pacer.plan(visible_ns)
 
     def run(self, stop: threading.Event) -> None:
         """Keep time until ``stop`` is set or the node's context is shut down."""
@@ -178,8 +188,8 @@ class RosSimulator:
             self._node.destroy_publisher(self.transforms.static_publisher)
         self._node.destroy_subscription(self.command)
 
-    def _newest_command(self) -> Twist | None:
-        newest = None
+    def _take_commands(self, now_ns: int) -> None:
+        """Take what the queue holds, with the simulated time at which it arrived."""
         # Bounded, for a student may publish faster than we take.
         for _ in range(self._most_commands):
             try:
@@ -191,13 +201,20 @@ class RosSimulator:
                 self.unreadable += 1
                 continue
             if taken is None:
-                break
-            newest = taken[0]
+                return
             self.commands += 1
-        if newest is None:
-            return None
-        twist = newest.twist if self._is_stamped else newest
-        return Twist(twist.linear.x, twist.angular.z)
+            message, info = taken
+            # Arrived by now, whatever somebody did to the system's clock meanwhile.
+            arrived_ns = min(info["received_timestamp"] - self._stamp_ns, now_ns)
+            twist = message.twist if self._is_stamped else message
+            self._pending.append((arrived_ns, Twist(twist.linear.x, twist.angular.z)))
+
+    def _command_by(self, time_ns: int) -> Twist | None:
+        """The newest command that had arrived when a step begins."""
+        newest = None
+        while self._pending and self._pending[0][0] <= time_ns:
+            newest = self._pending.popleft()[1]
+        return newest
 
     def _tell(self, step: Step) -> None:
         stamp_ns = self._stamp_ns + step.time_ns

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from sim.simulation import STEP_NS
 
 LATE_NS = 5_000_000
-"""A step that is done more than half a step after its time is reported as late."""
+"""Being more than half a step behind is reported."""
 
 MAX_BATCH = 100
 """So many steps are caught up at once at most, so that whoever owns the loop can end it."""
+
+MAX_AHEAD = 5
+"""So many steps are done together at most where nobody could see a difference."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,8 +22,8 @@ class Lateness:
 
     Attributes:
         index: First of them (see :attr:`sim.simulation.Step.index`).
-        steps: How many were done at once.
-        late_ns: How late the first one was.
+        steps: How many are done together.
+        late_ns: How much later than planned.
     """
 
     index: int
@@ -31,8 +34,8 @@ class Lateness:
 class Pacer:
     """Compares done steps with a clock.
 
-    Step ``k`` (from 1) ends ``k`` steps after the beginning and is done at that time. No step
-    is ever left out: simulated time is what it says, to the step.
+    Step ``k`` (from 1) ends ``k`` steps after the beginning and is never done earlier. No step
+    is left out: simulated time is what it says, to the step.
     """
 
     def __init__(self, begin_ns: int) -> None:
@@ -41,17 +44,18 @@ class Pacer:
         Args:
             begin_ns: Reading of a steady clock at simulated time 0.
         """
-        self._begin_ns = begin_ns
+        self.begin_ns = begin_ns
         self._done = 0
+        self._planned = 1
 
     @property
     def deadline_ns(self) -> int:
-        """When the next step is to be done, on the steady clock."""
-        return self._begin_ns + (self._done + 1) * STEP_NS
+        """When the planned step is to be done, on the steady clock."""
+        return self.begin_ns + self._planned * STEP_NS
 
     def due(self, now_ns: int) -> int:
-        """How many steps are to be done now, at most :data:`MAX_BATCH`."""
-        return max(0, min((now_ns - self._begin_ns) // STEP_NS - self._done, MAX_BATCH))
+        """How many steps are over and not yet done, at most :data:`MAX_BATCH`."""
+        return max(0, min((now_ns - self.begin_ns) // STEP_NS - self._done, MAX_BATCH))
 
     def lateness(self, now_ns: int, late_ns: int = LATE_NS) -> Lateness | None:
         """What is to be reported before the steps that are due are done, if anything."""
@@ -63,3 +67,18 @@ class Pacer:
     def done(self) -> None:
         """Count a step."""
         self._done += 1
+
+    def plan(self, output_ns: int | None) -> int:
+        """Choose when to look again.
+
+        Args:
+            output_ns: Simulated time of the next step that somebody will see, or None.
+
+        Returns:
+            The new :attr:`deadline_ns`: that of this step, but at most :data:`MAX_AHEAD`
+            steps from here.
+        """
+        most = self._done + MAX_AHEAD
+        wanted = most if output_ns is None else min(output_ns // STEP_NS, most)
+        self._planned = max(self._done + 1, wanted)
+        return self.deadline_ns

@@ -27,6 +27,11 @@ class Schedule:
         self._starts_ns, self._stops_ns = starts_ns, stops_ns
         self._next = 1
 
+    def next_ns(self, step_ns: int) -> int:
+        """The first multiple of ``step_ns`` at which it will be due."""
+        steps = -(-self._next * self._numerator // (self._denominator * step_ns))
+        return steps * step_ns
+
     def is_due(self, time_ns: int) -> bool:
         """Whether it is due at a time; must be asked with times that increase.
 

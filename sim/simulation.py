@@ -140,6 +140,12 @@ class Simulation:
         """True pose now."""
         return self._state.pose
 
+    @property
+    def next_output_ns(self) -> int | None:
+        """Simulated time of the next step that brings data of a sensor, or None without one."""
+        times = [schedule.next_ns(STEP_NS) for schedule in (self._scans, self._samples) if schedule]
+        return min(times, default=None)
+
     def advance(self, command: Twist | None = None) -> Step:
         """Simulate one step of 10 ms.
 

@@ -26,6 +26,8 @@ class Model(BaseModel):
         extra="forbid",
         populate_by_name=True,
         protected_namespaces=(),
+        # Of the many models only a few are used in one command; the rest is never built.
+        defer_build=True,
         allow_inf_nan=False,
     )
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from grader.assignment.load import LoadedAssignment
 from grader.errors import GraderFault
 from grader.grade import Grade, grade
+from grader.recording.fact import to_json
 from grader.recording.mcap_reader import read_recording
-from grader.recording.mcap_writer import to_json
 from grader.recording.model import Recording
 from grader.report.files import write_whole
 from grader.run.runner import Runner, scenario_seed

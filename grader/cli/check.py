@@ -46,22 +46,25 @@ def check(
     Ends with 0 for full points, 1 if points were lost, 3 if it could not be graded.
     """
     from grader import ros
-    from grader.assignment.load import load_assignment
-    from grader.assignment.selection import select
-    from grader.batch.files import write_graded
-    from grader.batch.grading import RECORDINGS_FOLDER, Grading
     from grader.report.facts import Clock
-    from grader.report.terminal import print_grade
     from grader.run.runner import Runner
-    from grader.submission.locate import check_path
 
-    loaded = select(load_assignment(assignment), tuple(only or ()), tuple(scenario or ()))
-    check_path(submission)
     clock = Clock()
     progress = Progress(quiet)
     runner = Runner(ros.find(), progress=_narrator(progress))
-    grading = Grading(loaded, runner, cache_folder(), seed=seed)
+    runner.get_ready()
     try:
+        # Imported while the cell gets ready.
+        from grader.assignment.load import load_assignment
+        from grader.assignment.selection import select
+        from grader.batch.files import write_graded
+        from grader.batch.grading import RECORDINGS_FOLDER, Grading
+        from grader.report.terminal import print_grade
+        from grader.submission.locate import check_path
+
+        loaded = select(load_assignment(assignment), tuple(only or ()), tuple(scenario or ()))
+        check_path(submission)
+        grading = Grading(loaded, runner, cache_folder(), seed=seed)
         with progress.shown():
             progress.say(f"reading {submission}")
             graded = grading.grade(submission, report / RECORDINGS_FOLDER, progress.say)

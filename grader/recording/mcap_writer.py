@@ -7,17 +7,16 @@ the attachment ``submission.json``, the frame of the run is the metadata ``rosgr
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
+from grader.recording.fact import to_json
 from grader.recording.model import Recording
 
 FORMAT = "1"
@@ -151,16 +150,3 @@ def _frame(recording: Recording) -> dict[str, str]:
         "environment": dict(recording.environment),
     }
     return {key: json.dumps(value, sort_keys=True) for key, value in frame.items()}
-
-
-def to_json(fact: Any) -> bytes:
-    """A dataclass of the model as compact JSON."""
-    return json.dumps(
-        dataclasses.asdict(fact), default=_plain, separators=(",", ":"), sort_keys=True
-    ).encode()
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Enum):
-        return value.value
-    raise TypeError(f"{type(value).__name__} is not a plain value")

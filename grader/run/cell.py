@@ -1,9 +1,11 @@
 """A cell: one run of one scenario, in a process of its own.
 
-``python -m grader.run.cell FOLDER`` reads a :class:`~grader.run.order.CellOrder` from
-``order.json`` in a folder of its own, writes ``recording.mcap`` beside it, and tells its
-progress as JSON lines on standard output. When its standard input ends, whoever ordered the
-run is gone, and the cell kills what it started and ends.
+``python -m grader.run.cell FOLDER [DOMAIN...]`` joins the graph on a domain of its own (not
+one of those given), and waits for a line on standard input. Then it reads a
+:class:`~grader.run.order.CellOrder` from ``order.json`` in the folder, runs it, writes
+``recording.mcap`` beside it, and tells its progress as JSON lines on standard output. When its
+standard input ends, whoever ordered the run is gone, and the cell kills what it started and
+ends.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from grader.recording.model import NS, Ending, Owner, Recording, Wait
 from grader.run.descendants import become_subreaper, kill_descendants
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.domain import lock_domain
-from grader.run.order import ORDER_FILE, RECORDING_FILE, CellOrder
+from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 from grader.run.output import OutputReader
 from grader.run.student import StudentProcesses
 from grader.submission.record import SubmissionRecord
@@ -130,7 +132,11 @@ class Cell:
         )
 
     def _observe(self) -> Ending:
-        ending = self._launch() or self._await_node() or self._await_match()
+        ending = self._launch()
+        # Needed at the end; imported while the student's process starts.
+        import grader.recording.mcap_writer  # noqa: F401
+
+        ending = ending or self._await_node() or self._await_match()
         if ending is None:
             tell("matched")
             ending = self._await_until()
@@ -371,16 +377,24 @@ def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
     return {name: concatenated_definition(name, find) for name in types}
 
 
-def main(folder: Path) -> int:
-    """Run the order in a folder."""
-    order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
+def main(folder: Path, avoid_domains: tuple[int, ...]) -> int:
+    """Get ready, wait for the word, run the order in the folder.
+
+    Args:
+        folder: The cell's own.
+        avoid_domains: Domains not to use.
+    """
     # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
     gc.disable()
     become_subreaper()
-    with lock_domain(order.avoid_domains) as domain:
+    with lock_domain(avoid_domains) as domain:
         from grader.run.probe import Probe
 
-        probe = Probe(domain.domain_id, order.topics, order.limits)
+        probe = Probe(domain.domain_id)
+        if os.read(0, len(GO)) != GO:
+            return 1
+        order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
+        probe.listen(order.topics, order.limits)
         try:
             recording = Cell(order, domain.domain_id, probe).run()
         except Abandoned:
@@ -400,4 +414,7 @@ def main(folder: Path) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    status = main(Path(sys.argv[1]), tuple(map(int, sys.argv[2:])))
+    sys.stdout.flush()
+    # The recording is written and the graph left; to unload all libraries takes 0.1 s more.
+    os._exit(status)

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 
 ORDER_FILE = "order.json"
 RECORDING_FILE = "recording.mcap"
+GO = b"go\n"
+"""What a cell that is ready waits for on its standard input."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,6 @@ class CellOrder:
         scratch: Folder of the student: working directory, home and temporary files.
         submission: The submission's facts, as JSON, to go into the recording unread.
         facts: Environment facts to go into the recording.
-        avoid_domains: Domains that must not be used.
     """
 
     scenario: str
@@ -112,7 +113,6 @@ class CellOrder:
     scratch: str
     submission: str
     facts: dict[str, str] = field(default_factory=dict)
-    avoid_domains: tuple[int, ...] = ()
 
     def to_json(self) -> str:
         """As one line."""
@@ -129,5 +129,4 @@ class CellOrder:
         data["until"] = Until(**data["until"])
         data["limits"] = Limits(**data["limits"])
         data["prefixes"] = tuple(data["prefixes"])
-        data["avoid_domains"] = tuple(data["avoid_domains"])
         return cls(**data)

@@ -48,18 +48,12 @@ class _Pending:
 class Probe:
     """Subscribes to the scenario's topics and calls parameter services."""
 
-    def __init__(self, domain_id: int, topics: tuple[Topic, ...], limits: Limits) -> None:
-        """Join the graph.
+    def __init__(self, domain_id: int) -> None:
+        """Join the graph; nothing is recorded yet.
 
         Args:
             domain_id: ROS domain.
-            topics: What to record.
-            limits: How much is kept.
-
-        Raises:
-            ImportError: An interface of a topic does not exist.
         """
-        self._limits = limits
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id)
         self.node = Node(
@@ -71,16 +65,31 @@ class Probe:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._topics = {topic.name: topic for topic in topics}
+        self._topics: dict[str, Topic] = {}
+        self._limits: Limits | None = None
         self._fallbacks: set[str] = set()
         self._seen: set[tuple[str, int, int]] = set()
         self._clients: dict[str, Any] = {}
         self._calls: dict[str, list[_Pending]] = {}
         self.messages: list[RawMessage] = []
-        self.counts = dict.fromkeys(self._topics, 0)
+        self.counts: dict[str, int] = {}
         self.last_message_ns: int | None = None
         self.recording = True
+
+    def listen(self, topics: tuple[Topic, ...], limits: Limits) -> None:
+        """Record topics from now on.
+
+        Args:
+            topics: What to record.
+            limits: How much is kept.
+
+        Raises:
+            ImportError: An interface of a topic does not exist.
+        """
+        self._limits = limits
         for topic in topics:
+            self._topics[topic.name] = topic
+            self.counts[topic.name] = 0
             self._subscribe(topic, topic.reliability, topic.durability)
 
     def spin_once(self, limit_s: float) -> None:
@@ -167,7 +176,7 @@ class Probe:
         )
 
     def _receive(self, topic: Topic, data: bytes, info: Any) -> None:
-        if not self.recording:
+        if not self.recording or self._limits is None:
             return
         stamp_ns, sequence = info["source_timestamp"], info["publication_sequence_number"]
         key = (topic.name, stamp_ns, sequence)

@@ -4,39 +4,27 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
-import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from grader.assignment.model import Assignment, Launch, Scenario
 from grader.errors import GraderFault
-from grader.recording.mcap_writer import to_json
+from grader.recording.fact import to_json
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
-from grader.run.descendants import kill_tree
-from grader.run.environment import RMW, cell_environment, student_environment
-from grader.run.order import (
-    ORDER_FILE,
-    RECORDING_FILE,
-    CellOrder,
-    Command,
-    Limits,
-    Topic,
-    Until,
-)
+from grader.run.cell_process import CellProcess
+from grader.run.environment import RMW, student_environment
+from grader.run.order import CellOrder, Command, Limits, Topic, Until
 from grader.submission.record import SubmissionRecord
 
+if TYPE_CHECKING:
+    from grader.assignment.model import Assignment, Launch, Scenario
+
 _STARTED_EVENTS = ("matched", "stopping", "recorded")
-_ENDING_LIMIT_S = 10.0
-# Beyond every bounded wait of a cell, even stretched by a busy host: something of ours hangs.
-_HANGING_CELL_S = 600.0
 
 Progress = Callable[[str, Mapping[str, Any]], None]
 """Called with the scenario's id and what happened."""
@@ -88,9 +76,16 @@ class Runner:
     ros: RosInstallation
     admission: Admission = field(default_factory=Admission)
     progress: Progress = lambda _scenario, _event: None
-    _cells: set[subprocess.Popen[str]] = field(default_factory=set)
+    _ready: list[CellProcess] = field(default_factory=list)
+    _cells: set[CellProcess] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _aborted: bool = False
+
+    def get_ready(self) -> None:
+        """Start a cell for the next run, while what is to be run is still being prepared."""
+        with self._lock:
+            if not self._aborted:
+                self._ready.append(CellProcess(self.ros))
 
     def run(
         self,
@@ -117,23 +112,41 @@ class Runner:
         Raises:
             GraderFault: The cell failed, through no fault of the student's.
         """
-        with tempfile.TemporaryDirectory(prefix="rosgrade-cell-") as name:
-            folder = Path(name)
-            order = self._order(assignment, scenario, submission, install, folder, seed)
-            (folder / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
-            with self.admission.cell(alone=alone) as ticket:
-                self._run_cell(scenario.id, folder, ticket.started)
-            recording.parent.mkdir(parents=True, exist_ok=True)
-            shutil.move(folder / RECORDING_FILE, recording)
+        with self.admission.cell(alone=alone) as ticket:
+            cell = self._take_cell()
+            try:
+                order = self._order(assignment, scenario, submission, install, cell.folder, seed)
+                for event in cell.run(order):
+                    if event["event"] in _STARTED_EVENTS:
+                        ticket.started()
+                    self.progress(scenario.id, event)
+                recording.parent.mkdir(parents=True, exist_ok=True)
+                shutil.move(cell.recording, recording)
+            finally:
+                self._give_back(cell)
 
     def abort(self) -> None:
-        """End every running cell; each kills what it started."""
+        """End every cell; each kills what it started. Nothing can be run any more."""
         with self._lock:
             self._aborted = True
-            cells = list(self._cells)
-        for cell in cells:
-            if cell.stdin:
-                cell.stdin.close()
+            ready, self._ready = self._ready, []
+            for cell in (*ready, *self._cells):
+                cell.abandon()
+        for cell in ready:
+            cell.close()
+
+    def _take_cell(self) -> CellProcess:
+        with self._lock:
+            if self._aborted:
+                raise GraderFault("interrupted")
+            cell = self._ready.pop() if self._ready else CellProcess(self.ros)
+            self._cells.add(cell)
+        return cell
+
+    def _give_back(self, cell: CellProcess) -> None:
+        cell.close()
+        with self._lock:
+            self._cells.discard(cell)
 
     def _order(
         self,
@@ -149,7 +162,6 @@ class Runner:
         default_package = assignment.packages[0].name
         every = [stimulus.every for stimulus in scenario.stimuli]
         until = scenario.until
-        avoid = os.environ.get("ROS_DOMAIN_ID", "")
         return CellOrder(
             scenario=scenario.id,
             seed=seed,
@@ -188,7 +200,6 @@ class Runner:
                 "python": ".".join(map(str, sys.version_info[:3])),
                 "sandbox": "none",
             },
-            avoid_domains=(int(avoid),) if avoid.isdigit() else (),
         )
 
     def _program(self, folder: Path, executable: str) -> tuple[str, ...]:
@@ -205,63 +216,3 @@ class Runner:
             first = b""
         is_python = first.startswith(b"#!") and b"python" in first
         return (str(self.ros.python), str(file)) if is_python else (str(file),)
-
-    def _run_cell(self, scenario: str, folder: Path, started: Callable[[], None]) -> None:
-        errors = (folder / "stderr.txt").open("w+", encoding="utf-8", errors="replace")
-        with errors:
-            cell = self._start_cell(folder, errors)
-            watchdog = threading.Timer(_HANGING_CELL_S, kill_tree, (cell.pid,))
-            watchdog.start()
-            try:
-                self._follow(scenario, cell, started)
-            finally:
-                watchdog.cancel()
-                self._end_cell(cell)
-            if cell.returncode == 0 and (folder / RECORDING_FILE).exists():
-                return
-            if self._aborted:
-                raise GraderFault("interrupted")
-            errors.seek(0)
-            raise GraderFault(
-                f"the cell of scenario {scenario!r} ended with status {cell.returncode}:\n"
-                + errors.read()[-4000:].strip()
-            )
-
-    def _start_cell(self, folder: Path, errors: Any) -> subprocess.Popen[str]:
-        with self._lock:
-            if self._aborted:
-                raise GraderFault("interrupted")
-            cell = subprocess.Popen(
-                [str(self.ros.python), "-m", "grader.run.cell", str(folder)],
-                env=cell_environment(self.ros),
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                text=True,
-                start_new_session=True,
-            )
-            self._cells.add(cell)
-        return cell
-
-    def _follow(
-        self, scenario: str, cell: subprocess.Popen[str], started: Callable[[], None]
-    ) -> None:
-        assert cell.stdout is not None
-        for line in cell.stdout:
-            event = json.loads(line)
-            if event["event"] in _STARTED_EVENTS:
-                started()
-            self.progress(scenario, event)
-
-    def _end_cell(self, cell: subprocess.Popen[str]) -> None:
-        """Wait for a cell that has said its last word; make an end of one that hangs."""
-        assert cell.stdin is not None and cell.stdout is not None
-        cell.stdin.close()
-        try:
-            cell.wait(_ENDING_LIMIT_S)
-        except subprocess.TimeoutExpired:
-            kill_tree(cell.pid)
-            cell.wait()
-        cell.stdout.close()
-        with self._lock:
-            self._cells.discard(cell)

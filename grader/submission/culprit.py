@@ -29,6 +29,7 @@ _INSTALLED = re.compile(r"(?:install|build/[^/]+/build)/lib/(?:python3[^/]*/site
 _IDENTIFYING = re.compile(r"ERROR:.*Exception in package identification extension '\w+' in '(.+?)'")
 _NO_CMAKELISTS = "does not appear to contain CMakeLists.txt"
 _ABSOLUTE_DATA = "os.path.isabs(dest)"
+_READ_OUTPUT = "ast.literal_eval(output)"
 _DIED = re.compile(r".*setup\.py.* died with <Signals\.(\w+): \d+>")
 _INTERFACES = (".msg", ".srv", ".action")
 _MAX_MESSAGE = 500
@@ -181,6 +182,8 @@ class _Place:
             return self._setup("setup() is never called, or refuses its arguments")
         if any(_ABSOLUTE_DATA in line for line in block):
             return self._setup("data_files names an absolute folder; write 'share/<package>'")
+        if any(_READ_OUTPUT in line for line in block):
+            return self._setup("setup.py prints something, which colcon takes for its answer")
         return None
 
     def _while_identifying(self) -> SourceError | None:

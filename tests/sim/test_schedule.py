@@ -39,6 +39,13 @@ def test_each_time_is_the_first_step_at_or_after_a_multiple_of_the_period(rate: 
         assert time - 10 < count * period <= time
 
 
+def test_it_tells_when_it_will_be_due_next() -> None:
+    schedule = Schedule(30.0)
+    for step in range(1, 301):
+        expected = schedule.next_ns(STEP_NS)
+        assert schedule.is_due(step * STEP_NS) is (step * STEP_NS == expected)
+
+
 def test_it_is_silent_outside_its_window() -> None:
     window = Schedule(10.0, starts_ns=300_000_000, stops_ns=600_000_000)
     assert times_ms(window, 2.0) == [300, 400, 500]

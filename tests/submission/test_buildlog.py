@@ -8,10 +8,8 @@ def test_colours_and_control_characters_are_gone() -> None:
 
 def test_scratch_paths_are_the_students_again() -> None:
     paths = {"/tmp/r/submission": "", "/tmp/r/scratch/build": "build", "/tmp/r/scratch": "scratch"}
-    log = (
-        'File "/tmp/r/submission/src/bot/setup.py"\nin /tmp/r/submission\n/tmp/r/scratch/build/b\n'
-    )
-    assert clean(log, paths) == 'File "src/bot/setup.py"\nin .\nbuild/b\n'
+    log = 'File "/tmp/r/submission/src/setup.py"\nin /tmp/r/submission\n/tmp/r/scratch/build/b\n'
+    assert clean(log, paths) == 'File "src/setup.py"\nin .\nbuild/b\n'
 
 
 def test_paths_that_setup_py_names_relatively_are_short() -> None:

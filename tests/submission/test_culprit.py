@@ -131,6 +131,19 @@ def test_data_files_in_absolute_places_are_told() -> None:
     assert "data_files names an absolute folder" in culprit(log)
 
 
+def test_a_setup_py_that_prints_is_told() -> None:
+    log = """\
+        Starting >>> bot
+        Traceback (most recent call last):
+          File "/venv/colcon_python_setup_py/python_setup_py.py", line 301, in _get_setup
+            return ast.literal_eval(output)
+          File "<unknown>", line 1
+            Hello
+        SyntaxError: invalid syntax
+    """
+    assert culprit(log).startswith("src/bot/setup.py: setup.py prints something")
+
+
 def test_while_colcon_looks_for_packages_the_folder_comes_after_the_traceback() -> None:
     log = (
         f'{RUN_SETUP}  File "<string>", line 1, in <module>\nZeroDivisionError: division by zero\n'

@@ -23,7 +23,7 @@ def test_what_ros2_pkg_create_writes_is_read() -> None:
     assert found.package_dir == "."
     (entry,) = found.entry_points
     assert (entry.name, entry.target) == ("bot_pub", "bot_publisher.node:main")
-    assert (entry.file, entry.line) == ("src/bot/setup.py", 22)
+    assert (entry.file, entry.line) == ("src/bot/setup.py", 21)
 
 
 @pytest.mark.parametrize(
@@ -81,9 +81,7 @@ def test_setup_cfg_is_read_and_setup_py_wins() -> None:
 
 
 def test_a_setup_cfg_with_colons_is_read() -> None:
-    config = (
-        "[develop]\nscript_dir: $base\n[options.entry_points]\nconsole_scripts =\n  p = b.n:m\n"
-    )
+    config = "[develop]\nscript_dir: $base\n[options.entry_points]\nconsole_scripts =\n p = b.n:m\n"
     assert targets("setup()", config) == [("p", "b.n:m")]
 
 

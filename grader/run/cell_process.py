@@ -1,0 +1,116 @@
+"""The process of a cell, as whoever orders a run sees it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from grader.errors import GraderFault
+from grader.ros import RosInstallation
+from grader.run.descendants import kill_tree
+from grader.run.environment import cell_environment
+from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
+
+_ENDING_LIMIT_S = 10.0
+# Beyond every bounded wait of a cell, even stretched by a busy host: something of ours hangs.
+_HANGING_S = 600.0
+_SHOWN_ERROR = 4000
+
+
+class CellProcess:
+    """A cell that is getting ready, and then runs one order.
+
+    Attributes:
+        folder: Its own; gone after :meth:`close`.
+    """
+
+    def __init__(self, ros: RosInstallation) -> None:
+        """Start it; it joins the graph while the order is still being made."""
+        self._temporary = tempfile.TemporaryDirectory(prefix="rosgrade-cell-")
+        self.folder = Path(self._temporary.name)
+        self._errors = self.folder / "stderr.txt"
+        own_domain = os.environ.get("ROS_DOMAIN_ID", "")
+        with self._errors.open("wb") as errors:
+            self._popen = subprocess.Popen(
+                [
+                    str(ros.python),
+                    "-m",
+                    "grader.run.cell",
+                    str(self.folder),
+                    *([own_domain] if own_domain.isdigit() else []),
+                ],
+                env=cell_environment(ros),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+                start_new_session=True,
+            )
+
+    def run(self, order: CellOrder) -> Iterator[Mapping[str, Any]]:
+        """Run an order.
+
+        Yields:
+            Events of its progress.
+
+        Raises:
+            GraderFault: The cell failed, through no fault of the student's.
+        """
+        (self.folder / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
+        assert self._popen.stdin is not None and self._popen.stdout is not None
+        watchdog = threading.Timer(_HANGING_S, kill_tree, (self._popen.pid,))
+        watchdog.daemon = True
+        watchdog.start()
+        try:
+            self._say_go()
+            for line in self._popen.stdout:
+                yield json.loads(line)
+        finally:
+            watchdog.cancel()
+            self._end()
+        if self._popen.returncode or not self.recording.exists():
+            told = self._errors.read_text(encoding="utf-8", errors="replace")
+            raise GraderFault(
+                f"the cell of scenario {order.scenario!r} ended with status "
+                f"{self._popen.returncode}:\n{told[-_SHOWN_ERROR:].strip()}"
+            )
+
+    @property
+    def recording(self) -> Path:
+        """The file that it leaves."""
+        return self.folder / RECORDING_FILE
+
+    def abandon(self) -> None:
+        """Let it kill what it started and end; returns at once."""
+        if self._popen.stdin is not None:
+            self._popen.stdin.close()
+
+    def close(self) -> None:
+        """End it and remove its folder."""
+        self._end()
+        self._temporary.cleanup()
+
+    def _say_go(self) -> None:
+        assert self._popen.stdin is not None
+        try:
+            self._popen.stdin.write(GO.decode())
+            self._popen.stdin.flush()
+        except (BrokenPipeError, ValueError):
+            # It has died or was abandoned; its status and last words tell more than this.
+            return
+
+    def _end(self) -> None:
+        self.abandon()
+        try:
+            self._popen.wait(_ENDING_LIMIT_S)
+        except subprocess.TimeoutExpired:
+            kill_tree(self._popen.pid)
+            self._popen.wait()
+        assert self._popen.stdout is not None
+        self._popen.stdout.close()

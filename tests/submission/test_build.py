@@ -1,0 +1,348 @@
+"""Real builds with colcon, good ones and those that students manage to break."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from grader.errors import GraderFault
+from grader.ros import RosInstallation
+from grader.submission.build import BuildLimits, build_key, tidy
+from grader.submission.prepare import Prepared, PrepareLimits, prepare
+from grader.submission.record import BuildRecord, PackageRecord
+
+from .samples import MANIFEST, NODE, SETUP_PY, Tree, zip_bytes
+
+pytestmark = pytest.mark.ros
+
+FOLDER = "src/bot_publisher"
+
+
+def prepared(
+    tree: Tree, ros: RosInstallation, python_s: float = 60.0, environ: dict[str, str] | None = None
+) -> Prepared:
+    limits = PrepareLimits(build=BuildLimits(python_s=python_s))
+    cache = tree.root.parent / "cache"
+    return prepare(tree.root, ros, cache=cache, limits=limits, environ=environ or {})
+
+
+def build_of(found: Prepared) -> BuildRecord:
+    assert found.record.problem is None
+    assert found.record.build is not None
+    return found.record.build
+
+
+def package_of(found: Prepared, name: str = "bot_publisher") -> PackageRecord:
+    package = found.record.package(name)
+    assert package is not None
+    return package
+
+
+def run(found: Prepared, ros: RosInstallation, executable: str) -> str:
+    """Run an executable of the install space as a cell does."""
+    assert found.install is not None
+    return subprocess.run(
+        [str(ros.python), str(found.install / "lib" / executable)],
+        env=ros.environment({"HOME": str(found.install)}, (found.install,)),
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    ).stdout
+
+
+def test_a_good_package_is_built_and_runs(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package()
+    found = prepared(tree, real_ros)
+    build = build_of(found)
+    assert (build.succeeded, build.cached, build.timed_out) == (True, False, False)
+    assert (build.failed_packages, build.culprit) == ((), None)
+    assert str(tree.root.parent) not in build.log
+    package = package_of(found)
+    assert package.executables == ("bot_pub",)
+    assert package.misplaced_executables == package.missing_targets == ()
+    assert package.entry_points == (("bot_pub", "bot_publisher.node:main"),)
+    assert dict(package.files) == {
+        "bot_publisher/__init__.py": f"{FOLDER}/bot_publisher/__init__.py",
+        "bot_publisher/node.py": f"{FOLDER}/bot_publisher/node.py",
+    }
+    assert "geometry_msgs.msg.Twist" in run(found, real_ros, "bot_publisher/bot_pub")
+
+
+def test_what_is_installed_is_compiled(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package()
+    install = prepared(tree, real_ros).install
+    assert install is not None
+    assert list(install.rglob("bot_publisher/__pycache__/node.*.pyc"))
+
+
+def test_the_original_is_not_touched(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package({"setup.py": f"open('made_by_setup', 'w').close()\n{SETUP_PY}"})
+    before = sorted(tree.root.rglob("*"))
+    assert build_of(prepared(tree, real_ros)).succeeded
+    assert sorted(tree.root.rglob("*")) == before
+
+
+def test_the_second_time_it_comes_from_the_cache(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package()
+    first = prepared(tree, real_ros)
+    started = time.monotonic()
+    second = prepared(tree, real_ros)
+    assert time.monotonic() - started < 1.0
+    assert build_of(second).cached
+    assert build_of(second).duration_s == build_of(first).duration_s
+    assert second.install == first.install
+    assert second.record.packages == first.record.packages
+    tree.write({f"{FOLDER}/bot_publisher/node.py": f"{NODE}\n"})
+    assert not build_of(prepared(tree, real_ros)).cached
+
+
+def test_two_at_once_build_it_once(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package()
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(lambda _: prepared(tree, real_ros), range(2))
+    assert sorted((build_of(first).cached, build_of(second).cached)) == [False, True]
+    assert first.install == second.install
+    assert first.install is not None
+
+
+def test_a_zip_of_a_whole_workspace_is_built_once(
+    tree: Tree, tmp_path: Path, real_ros: RosInstallation
+) -> None:
+    root = tree.package()
+    subprocess.run(
+        [str(real_ros.python), str(real_ros.python.parent / "colcon"), "build"],
+        cwd=root,
+        env={**real_ros.environment({}), "COLCON_HOME": str(tmp_path), "HOME": str(tmp_path)},
+        capture_output=True,
+        check=True,
+        timeout=100,
+    )
+    assert {path.name for path in root.iterdir()} == {"build", "install", "log", "src"}
+    files = [path for path in root.rglob("*") if path.is_file()]
+    content = ((f"ws/{path.relative_to(root)}", path.read_bytes()) for path in files)
+    archive = tmp_path / "alice.zip"
+    archive.write_bytes(zip_bytes(*content))
+    found = prepare(archive, real_ros, cache=tmp_path / "cache")
+    assert [package.path for package in found.record.packages] == [f"ws/{FOLDER}"]
+    assert build_of(found).succeeded
+
+
+def test_setup_py_that_raises_is_blamed(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package({"setup.py": f"import os\nraise ValueError('boom')\n{SETUP_PY}"})
+    found = prepared(tree, real_ros)
+    build = build_of(found)
+    assert (build.succeeded, build.failed_packages) == (False, ("bot_publisher",))
+    assert str(build.culprit) == f"{FOLDER}/setup.py:2: ValueError: boom"
+    assert "ValueError: boom" in build.log
+    assert package_of(found).executables == ()
+    assert build_of(prepared(tree, real_ros)).cached
+
+
+def test_without_setup_cfg_the_executable_is_misplaced(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tree.package({"setup.cfg": None})
+    found = prepared(tree, real_ros)
+    assert build_of(found).succeeded
+    assert package_of(found).executables == ()
+    assert package_of(found).misplaced_executables == ("bot_pub",)
+
+
+def test_a_syntax_error_in_a_node_does_not_stop_the_build(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tree.package({"bot_publisher/node.py": "def main(:\n    pass\n"})
+    found = prepared(tree, real_ros)
+    assert build_of(found).succeeded
+    assert [str(error) for error in package_of(found).syntax_errors] == [
+        f"{FOLDER}/bot_publisher/node.py:1: SyntaxError: invalid syntax"
+    ]
+    assert package_of(found).executables == ("bot_pub",)
+
+
+def test_a_bad_e_mail_is_told_and_does_not_hide_other_packages(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tree.package({"package.xml": MANIFEST.replace("ada@example.org", "a@b.c")})
+    other = {
+        "package.xml": MANIFEST.replace("bot_publisher", "other"),
+        "setup.py": SETUP_PY.replace("'bot_publisher'", "'other'").replace("bot_pub ", "other "),
+        "setup.cfg": "[install]\ninstall_scripts=$base/lib/other\n",
+        "resource/other": "",
+        "other/__init__.py": "",
+    }
+    tree.package(dict(other), folder="src/other")
+    found = prepared(tree, real_ros)
+    error = package_of(found).manifest_error
+    assert error is not None
+    assert str(error) == f'{FOLDER}/package.xml:6: Invalid email "a@b.c" for person "Ada"'
+    assert package_of(found, "other").manifest_error is None
+    assert package_of(found, "other").executables == ("other",)
+
+
+DAEMON = """
+import os, sys, time
+if 'install' in sys.argv and os.fork() == 0:
+    os.setsid()
+    time.sleep(300)
+    os._exit(0)
+"""
+
+
+def test_a_daemon_of_setup_py_that_holds_the_output_costs_the_wall_limit_at_most(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    # colcon itself waits until its pipe is closed, for as long as the daemon lives.
+    tree.package({"setup.py": f"{DAEMON}\n{SETUP_PY}"})
+    started = time.monotonic()
+    found = prepared(tree, real_ros, python_s=8.0)
+    assert time.monotonic() - started < 25
+    build = build_of(found)
+    assert (build.succeeded, build.timed_out, found.install) == (False, True, None)
+    assert str(build.culprit) == f"{FOLDER}/setup.py: the build was ended after 8 s"
+    assert not build_of(prepared(tree, real_ros, python_s=0.1)).cached
+
+
+def test_a_daemon_that_lets_go_of_the_output_is_killed(
+    tree: Tree, real_ros: RosInstallation, tmp_path: Path
+) -> None:
+    pid_file = tmp_path / "pid"
+    detached = DAEMON.replace(
+        "    time.sleep",
+        "    [os.dup2(os.open(os.devnull, os.O_RDWR), n) for n in (0, 1, 2)]\n"
+        f"    open({str(pid_file)!r}, 'w').write(str(os.getpid()))\n    time.sleep",
+    )
+    tree.package({"setup.py": f"{detached}\n{SETUP_PY}"})
+    assert build_of(prepared(tree, real_ros)).succeeded
+    assert not Path("/proc", pid_file.read_text()).exists()
+
+
+def test_setup_py_does_not_see_the_callers_home_and_variables(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    told = "import os, sys\nprint('HAS', sorted(os.environ.items()), file=sys.stderr)\n"
+    tree.package({"setup.py": f"{told}{SETUP_PY}"})
+    build = build_of(prepared(tree, real_ros, environ={"SECRET": "token", "HOME": "/home/grader"}))
+    assert build.succeeded
+    assert "HAS" in build.log
+    assert "token" not in build.log
+    assert "/home/grader" not in build.log
+
+
+def test_a_colcon_that_is_killed_is_no_fault_of_the_student(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tree.package({"setup.py": f"import os\nos.kill(os.getppid(), 9)\n{SETUP_PY}"})
+    with pytest.raises(GraderFault, match="killed by signal 9"):
+        prepared(tree, real_ros)
+
+
+INTERFACES = {
+    "src/bot_msgs/package.xml": MANIFEST.replace("bot_publisher", "bot_msgs")
+    .replace("ament_python", "ament_cmake")
+    .replace(
+        "<depend>rclpy</depend>",
+        "<buildtool_depend>ament_cmake</buildtool_depend>"
+        "<depend>rosidl_default_generators</depend>"
+        "<member_of_group>rosidl_interface_packages</member_of_group>",
+    ),
+    "src/bot_msgs/CMakeLists.txt": """\
+cmake_minimum_required(VERSION 3.8)
+project(bot_msgs)
+find_package(ament_cmake REQUIRED)
+find_package(geometry_msgs REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(${PROJECT_NAME} "msg/Bot.msg" DEPENDENCIES geometry_msgs)
+if(BUILD_TESTING)
+  find_package(ament_lint_auto REQUIRED)
+endif()
+ament_package()
+""",
+    "src/bot_msgs/msg/Bot.msg": "uint8 BURGER=1\nuint8 model\ngeometry_msgs/Pose2D pose\n",
+}
+
+
+@pytest.mark.slow
+def test_messages_are_generated_and_used_by_another_package(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tree.write(dict(INTERFACES))
+    node = "from bot_msgs.msg import Bot\n\n\ndef main():\n    print(Bot(model=Bot.BURGER))\n"
+    tree.package(
+        {"bot_publisher/node.py": node, "package.xml": MANIFEST.replace("rclpy", "bot_msgs")}
+    )
+    found = prepared(tree, real_ros)
+    assert build_of(found).log.rstrip().endswith("]")
+    assert build_of(found).succeeded
+    assert "model=1" in run(found, real_ros, "bot_publisher/bot_pub")
+    assert package_of(found).ros_imports[0].module == "bot_msgs"
+
+
+@pytest.mark.slow
+def test_a_wrong_message_definition_is_blamed(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.write({**INTERFACES, "src/bot_msgs/msg/Bot.msg": "uint8 model\nunit8 x\n"})
+    culprit = build_of(prepared(tree, real_ros)).culprit
+    assert culprit is not None
+    assert (culprit.file, culprit.line) == ("src/bot_msgs/msg/Bot.msg", 2)
+    assert "'unit8'" in culprit.message
+
+
+def test_a_package_of_jazzy_that_is_not_installed_is_no_fault_of_the_student(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    lacking = "nav2_msgs"
+    if lacking in real_ros.packages:
+        return
+    cmake = "cmake_minimum_required(VERSION 3.8)\nproject(bot_msgs LANGUAGES NONE)\n"
+    tree.write(
+        {**INTERFACES, "src/bot_msgs/CMakeLists.txt": f"{cmake}find_package({lacking} REQUIRED)\n"}
+    )
+    with pytest.raises(GraderFault, match=f"lacks .*: {lacking}"):
+        prepared(tree, real_ros)
+
+
+def test_without_colcon_it_is_said_how_to_get_it(tree: Tree, named_ros: RosInstallation) -> None:
+    tree.package()
+    with pytest.raises(GraderFault, match="colcon is not installed"):
+        prepare(tree.root, named_ros, cache=tree.root.parent / "cache", environ={"PATH": ""})
+
+
+def test_a_build_depends_on_the_submission_and_the_installation(
+    named_ros: RosInstallation,
+) -> None:
+    first = build_key("0", named_ros)
+    assert build_key("0", named_ros) == first
+    assert build_key("1", named_ros) != first
+    index = named_ros.prefixes[0] / "share/ament_index/resource_index/packages"
+    (index / "std_msgs").unlink()
+    again = RosInstallation(named_ros.source, named_ros.python, named_ros.prefixes)
+    assert build_key("0", again) != first
+
+
+def test_an_install_space_is_tidied_before_anybody_looks_into_it(tmp_path: Path) -> None:
+    install = tmp_path / "install"
+    (install / "lib").mkdir(parents=True)
+    (install / "lib/libx.so.1").touch()
+    (install / "lib/libx.so").symlink_to("libx.so.1")
+    (install / "lib/etc").symlink_to("/etc")
+    (install / "lib/up").symlink_to("../../..")
+    os.mkfifo(install / "lib/pipe")
+    assert tidy(install, BuildLimits()) is None
+    assert {path.name for path in (install / "lib").iterdir()} == {"libx.so.1", "libx.so"}
+    assert tidy(install, BuildLimits(install_files=1)) is not None
+    assert not install.exists()
+
+
+def test_a_link_in_place_of_the_install_space_is_taken_away(tmp_path: Path) -> None:
+    (tmp_path / "precious").mkdir()
+    (tmp_path / "precious/link").symlink_to("/etc")
+    (tmp_path / "install").symlink_to("precious")
+    assert tidy(tmp_path / "install", BuildLimits()) is not None
+    assert (tmp_path / "precious/link").is_symlink()
+    assert not (tmp_path / "install").exists()

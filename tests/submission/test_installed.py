@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.submission.installed import InstallSpace, hash_of, inspect, match_files, normalised
+
+from .samples import Tree
+
+SITE = "lib/python3.12/site-packages"
+
+
+def install(tree: Tree) -> Path:
+    root = tree.write(
+        {
+            "lib/bot_publisher/bot_pub": "#!/usr/bin/python3\n",
+            "lib/bot_publisher/data.txt": "",
+            "lib/libbot.so": "",
+            "bin/stray": "",
+            f"{SITE}/bot_publisher/node.py": "x = 1\n",
+            f"{SITE}/bot_publisher/__init__.py": "",
+            f"{SITE}/bot_publisher/__pycache__/node.cpython-312.pyc": "",
+            f"{SITE}/bot_publisher-0.0.0-py3.12.egg-info/entry_points.txt": (
+                "[console_scripts]\nbot_pub = bot_publisher.node:main\n"
+            ),
+        }
+    )
+    (root / "lib/bot_publisher/bot_pub").chmod(0o755)
+    return root
+
+
+def test_what_ros2_run_and_python_find_is_told(tree: Tree) -> None:
+    sources = {"src/bot/bot_publisher/node.py": hash_of(b"x = 1\n")}
+    found = inspect(install(tree), ["bot_publisher", "other"], sources)
+    assert found.executables == {"bot_publisher": ("bot_pub",), "other": ()}
+    assert found.in_bin == ("stray",)
+    (entry,) = found.entry_points["bot_publisher"]
+    assert (entry.name, entry.target) == ("bot_pub", "bot_publisher.node:main")
+    assert set(found.python) == {
+        "bot_publisher/__init__.py",
+        "bot_publisher/node.py",
+        "lib/bot_publisher/bot_pub",
+        "lib/bot_publisher/data.txt",
+    }
+    assert found.origins == {"bot_publisher/node.py": "src/bot/bot_publisher/node.py"}
+
+
+def test_links_pipes_and_giant_metadata_are_not_read(tree: Tree) -> None:
+    root = install(tree)
+    metadata = root / SITE / "bot_publisher-0.0.0-py3.12.egg-info/entry_points.txt"
+    metadata.write_text("#" * 300_000)
+    (root / "lib/bot_publisher/link").symlink_to("/bin/sh")
+    os.mkfifo(root / SITE / "pipe.py")
+    found = inspect(root, ["bot_publisher"], {})
+    assert found.executables["bot_publisher"] == ("bot_pub",)
+    assert found.entry_points == {"bot_publisher": ()}
+    assert "pipe.py" not in found.python
+
+
+def test_an_empty_install_space_has_nothing(tmp_path: Path) -> None:
+    assert inspect(tmp_path, ["bot"], {}) == InstallSpace({"bot": ()}, (), {}, {}, {})
+
+
+def test_of_equal_files_the_one_with_the_most_similar_path_is_the_origin() -> None:
+    installed = {"bot/__init__.py": "empty", "bot/nodes/__init__.py": "empty", "made.py": "?"}
+    sources = dict.fromkeys(
+        ("src/bot/bot/__init__.py", "src/bot/bot/nodes/__init__.py", "src/bot/test/__init__.py"),
+        "empty",
+    )
+    assert match_files(installed, sources) == {
+        "bot/__init__.py": "src/bot/bot/__init__.py",
+        "bot/nodes/__init__.py": "src/bot/bot/nodes/__init__.py",
+    }
+
+
+@given(st.text(st.sampled_from("aB-_.1"), min_size=1, max_size=10))
+def test_names_of_distributions_are_compared_as_pip_does(name: str) -> None:
+    assert normalised(normalised(name)) == normalised(name)
+    assert normalised(name.replace("-", "_").upper()) == normalised(name)

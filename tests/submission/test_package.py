@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+import pytest
+
+from grader.ros import RosInstallation
+from grader.submission.installed import InstallSpace
+from grader.submission.locate import opened
+from grader.submission.package import read_package, record_packages
+from grader.submission.record import Import, PackageRecord
+
+from .samples import MANIFEST, NODE, SETUP_PY, Tree
+
+FOLDER = "src/bot_publisher"
+
+
+def records(
+    tree: Tree, ros: RosInstallation, installed: InstallSpace | None = None
+) -> dict[str, PackageRecord]:
+    with opened(tree.root) as located:
+        packages = [read_package(located, folder, ros) for folder in located.packages]
+    return {record.name: record for record in record_packages(packages, ros, installed)}
+
+
+def test_a_good_package_is_recorded(tree: Tree, named_ros: RosInstallation) -> None:
+    tree.package()
+    record = records(tree, named_ros)["bot_publisher"]
+    assert (record.path, record.build_type) == (FOLDER, "ament_python")
+    assert record.manifest_error is None
+    assert [(item.name, item.line, item.known) for item in record.dependencies] == [
+        ("rclpy", 8, True),
+        ("geometry_msgs", 9, True),
+    ]
+    node = f"{FOLDER}/bot_publisher/node.py"
+    assert record.imports == (Import("rclpy", node, 1), Import("geometry_msgs", node, 2))
+    assert record.ros_imports == record.imports
+    assert record.entry_points == (("bot_pub", "bot_publisher.node:main"),)
+    assert record.missing_targets == record.syntax_errors == record.executables == ()
+
+
+def test_tests_launch_files_and_setup_py_need_no_dependency(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    tree.package({"test/test_it.py": "import launch_testing\n", "launch/a.py": "import launch\n"})
+    modules = {item.module for item in records(tree, named_ros)["bot_publisher"].imports}
+    assert modules == {"rclpy", "geometry_msgs"}
+
+
+def test_scripts_without_a_suffix_are_read(tree: Tree, named_ros: RosInstallation) -> None:
+    tree.package({"scripts/run": "#!/usr/bin/env python3\nimport std_msgs.msg\n", "scripts/x": "("})
+    record = records(tree, named_ros)["bot_publisher"]
+    assert Import("std_msgs", f"{FOLDER}/scripts/run", 2) in record.ros_imports
+    assert record.syntax_errors == ()
+
+
+def test_ros_packages_that_are_not_installed_are_known_by_name(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    source = "import tf2_ros, cv_bridge, nav2_msgs.msg, numpy, os, bot_publisher, bot_msgs.msg\n"
+    tree.package({"bot_publisher/node.py": source})
+    tree.write({"src/bot_msgs/package.xml": MANIFEST.replace("bot_publisher", "bot_msgs")})
+    record = records(tree, named_ros)["bot_publisher"]
+    assert [item.module for item in record.ros_imports] == [
+        "bot_msgs",
+        "cv_bridge",
+        "nav2_msgs",
+        "tf2_ros",
+    ]
+    assert {item.module for item in record.imports} >= {"numpy", "os", "bot_publisher"}
+
+
+def test_a_module_of_another_package_of_the_submission_is_that_package(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    tree.package({"bot_publisher/node.py": "import helpers\n"})
+    tree.write(
+        {
+            "src/bot_help/package.xml": MANIFEST.replace("bot_publisher", "bot_help"),
+            "src/bot_help/helpers/__init__.py": "",
+        }
+    )
+    assert records(tree, named_ros)["bot_publisher"].ros_imports[0].module == "bot_help"
+
+
+@pytest.mark.parametrize("declared", ["tf2_ros", "tf2_ros_py"])
+def test_of_packages_that_provide_a_module_the_declared_one_counts(
+    tree: Tree, named_ros: RosInstallation, declared: str
+) -> None:
+    manifest = MANIFEST.replace("geometry_msgs", declared)
+    tree.package({"bot_publisher/node.py": "import tf2_ros\n", "package.xml": manifest})
+    assert records(tree, named_ros)["bot_publisher"].ros_imports[0].module == declared
+
+
+def test_misspelt_dependencies_are_told_from_unknown_ones(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    names = ("geometry_msg", "acme_driver", "python3-numpy", "bot_publisher_msgs")
+    depends = "".join(f"<exec_depend>{name}</exec_depend>" for name in names)
+    tree.package({"package.xml": MANIFEST.replace("<export>", f"{depends}<export>")})
+    tree.write({"m/package.xml": MANIFEST.replace("bot_publisher", "bot_publisher_msgs")})
+    record = records(tree, named_ros)["bot_publisher"]
+    known = {item.name: item.known for item in record.dependencies}
+    assert [known[name] for name in names] == [False, None, True, True]
+
+
+def test_a_broken_manifest_does_not_hide_the_rest(tree: Tree, named_ros: RosInstallation) -> None:
+    tree.package({"package.xml": "<package><name>bot"})
+    tree.package({"package.xml": MANIFEST.replace("bot_publisher", "good")}, folder="src/good")
+    found = records(tree, named_ros)
+    assert set(found) == {"bot_publisher", "good"}
+    broken = found["bot_publisher"]
+    assert broken.manifest_error is not None
+    assert broken.manifest_error.file == f"{FOLDER}/package.xml"
+    assert broken.build_type == "ament_python"
+    assert broken.entry_points == (("bot_pub", "bot_publisher.node:main"),)
+    assert found["good"].manifest_error is None
+
+
+def test_a_package_that_is_named_nowhere_has_its_folders_name(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    tree.write({"my_bot/package.xml": "", "my_bot/CMakeLists.txt": ""})
+    assert records(tree, named_ros)["my_bot"].build_type == "ament_cmake"
+
+
+def test_syntax_errors_are_told_for_every_file(tree: Tree, named_ros: RosInstallation) -> None:
+    tree.package({"bot_publisher/node.py": "def main(:\n", "setup.py": "setup(\n"})
+    errors = records(tree, named_ros)["bot_publisher"].syntax_errors
+    assert [error.file for error in errors] == [
+        f"{FOLDER}/bot_publisher/node.py",
+        f"{FOLDER}/setup.py",
+    ]
+
+
+def test_a_target_that_is_not_there_is_told(tree: Tree, named_ros: RosInstallation) -> None:
+    tree.package({"setup.py": SETUP_PY.replace("node:main", "node:mian")})
+    ((name, error),) = records(tree, named_ros)["bot_publisher"].missing_targets
+    assert name == "bot_pub"
+    assert str(error) == (
+        f"{FOLDER}/setup.py:21: bot_publisher/node.py has no function 'mian'. Did you mean 'main'?"
+    )
+
+
+def test_modules_below_src_are_found(tree: Tree, named_ros: RosInstallation) -> None:
+    setup_py = SETUP_PY.replace("install_requires", "package_dir={'': 'src'}, install_requires")
+    tree.package({"bot_publisher/node.py": None, "setup.py": setup_py})
+    tree.write({f"{FOLDER}/src/bot_publisher/node.py": NODE})
+    assert records(tree, named_ros)["bot_publisher"].missing_targets == ()
+
+
+def test_odd_names_are_written_so_that_json_can_hold_them(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    tree.package({"bot_publisher/new\nline\udce9.py": "import rclpy\n"})
+    files = [item.file for item in records(tree, named_ros)["bot_publisher"].imports]
+    assert f"{FOLDER}/bot_publisher/new\\nline\\udce9.py" in files
+
+
+def test_what_was_built_wins_over_what_was_declared(
+    tree: Tree, named_ros: RosInstallation, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    from grader.submission.installed import inspect
+
+    tree.package()
+    install = Tree(tmp_path_factory.mktemp("install"))
+    install.write(
+        {
+            "lib/python3.12/site-packages/bot_publisher-0.0.0-py3.12.egg-info/entry_points.txt": (
+                "[console_scripts]\nbot_pub = bot_publisher.other:main\nnew = bot_publisher:run\n"
+            ),
+            "lib/python3.12/site-packages/bot_publisher/__init__.py": "",
+            "bin/bot_pub": "",
+        }
+    )
+    installed = inspect(install.root, ["bot_publisher"], {})
+    record = records(tree, named_ros, installed)["bot_publisher"]
+    assert record.entry_points == (
+        ("bot_pub", "bot_publisher.other:main"),
+        ("new", "bot_publisher:run"),
+    )
+    assert record.misplaced_executables == ("bot_pub",)
+    assert [name for name, _ in record.missing_targets] == ["bot_pub", "new"]

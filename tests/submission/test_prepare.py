@@ -1,0 +1,92 @@
+"""What students can do wrong before anything is built never raises; see test_build for the rest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.errors import UsageError
+from grader.ros import RosInstallation
+from grader.submission.members import ArchiveLimits
+from grader.submission.prepare import Prepared, PrepareLimits, prepare
+
+from .samples import MANIFEST, NODE, Tree, tar_bytes, tar_member, zip_bytes
+
+
+def prepared(path: Path, ros: RosInstallation) -> Prepared:
+    limits = PrepareLimits(archive=ArchiveLimits(members=50))
+    return prepare(path, ros, cache=path.parent / "cache", limits=limits)
+
+
+def problem(path: Path, ros: RosInstallation) -> str:
+    found = prepared(path, ros)
+    assert found.install is None
+    assert found.record.build is None
+    assert found.record.problem is not None
+    return found.record.problem
+
+
+def test_an_empty_folder(tree: Tree, named_ros: RosInstallation) -> None:
+    assert problem(tree.root, named_ros) == "the submission is empty"
+
+
+def test_an_empty_zip(tmp_path: Path, named_ros: RosInstallation) -> None:
+    (tmp_path / "a.zip").write_bytes(zip_bytes())
+    assert problem(tmp_path / "a.zip", named_ros) == "the submission is empty"
+
+
+@pytest.mark.parametrize(
+    ("files", "hint"),
+    [
+        ({"bot.txt": ""}, "there is no package.xml anywhere"),
+        ({"node.py": NODE}, "hand in the whole package, not only its Python files"),
+        ({"bot/Package.xml": MANIFEST}, "bot/Package.xml must be called package.xml"),
+        ({"bot/package.xml.txt": ""}, "bot/package.xml.txt must be called package.xml"),
+        ({"bot.zip": ""}, "hand in what is in bot.zip"),
+        ({"install/bot/package.xml": "", "x": ""}, "nobody looks into install/: hand in src/"),
+        ({"COLCON_IGNORE": "", "bot/package.xml": ""}, "below a COLCON_IGNORE"),
+        ({".src/bot/package.xml": ""}, "in a hidden folder"),
+    ],
+)
+def test_a_submission_without_a_package_is_told_what_to_do(
+    tree: Tree, named_ros: RosInstallation, files: dict[str, str | bytes], hint: str
+) -> None:
+    assert hint in problem(tree.write(files), named_ros)
+
+
+def test_two_packages_of_one_name_are_both_named(tree: Tree, named_ros: RosInstallation) -> None:
+    tree.package(folder="src/bot")
+    found = problem(tree.package(folder="old/bot"), named_ros)
+    assert (
+        found == "two packages are called bot_publisher: old/bot and src/bot; hand in one of them"
+    )
+
+
+def test_a_refused_archive_is_a_problem_of_the_submission(
+    tmp_path: Path, named_ros: RosInstallation
+) -> None:
+    (tmp_path / "eve.tar.gz").write_bytes(tar_bytes(tar_member("../../evil", b"x")))
+    found = prepared(tmp_path / "eve.tar.gz", named_ros).record
+    assert (found.id, found.packages) == ("eve", ())
+    assert found.problem == "eve.tar.gz: ../../evil: paths with '..' are refused"
+
+
+def test_too_large_a_submission_is_a_problem(tree: Tree, named_ros: RosInstallation) -> None:
+    root = tree.write({f"{number}": "" for number in range(60)})
+    assert problem(root, named_ros) == "the submission holds more than 50 files"
+
+
+def test_the_packages_of_a_submission_with_a_problem_are_recorded_all_the_same(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    tree.package(folder="a")
+    found = prepared(tree.package(folder="b"), named_ros).record
+    assert [package.path for package in found.packages] == ["a", "b"]
+
+
+def test_a_path_that_does_not_exist_is_a_wrong_use(
+    tmp_path: Path, named_ros: RosInstallation
+) -> None:
+    with pytest.raises(UsageError, match="does not exist"):
+        prepared(tmp_path / "nobody", named_ros)
