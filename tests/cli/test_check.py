@@ -1,0 +1,178 @@
+"""`rosgrade check` on submissions of all kinds, with the real colcon and real nodes."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.cli.conftest import ROOT, Rosgrade
+
+REFERENCE = ROOT / "reference" / "timed_publisher"
+NODE = "bot_publisher/bot_publisher/bot_publisher.py"
+
+pytestmark = pytest.mark.ros
+
+
+def copy(folder: Path, old: str = "", new: str = "", file: str = NODE) -> Path:
+    """The reference with one text changed."""
+    submission = folder / "submission"
+    shutil.copytree(REFERENCE, submission)
+    path = submission / file
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return submission
+
+
+def result(folder: Path) -> Any:
+    """What was written into the default report folder."""
+    return json.loads((folder / "rosgrade-report" / "result.json").read_text(encoding="utf-8"))
+
+
+def statuses(folder: Path) -> dict[str, str]:
+    """Status of each check."""
+    return {check["id"]: check["status"] for check in result(folder)["checks"]}
+
+
+def test_the_reference_gets_full_points_and_a_report(rosgrade: Rosgrade, tmp_path: Path) -> None:
+    ended = rosgrade("check", "timed_publisher", REFERENCE, "--json", tmp_path / "copy.json")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "Score: 10 of 10 points" in ended.stdout
+    written = result(tmp_path)
+    assert (written["score"], written["max_score"], written["graded"]) == (10, 10, True)
+    assert json.loads((tmp_path / "copy.json").read_text()) == written
+    assert "10" in (tmp_path / "rosgrade-report" / "report.html").read_text(encoding="utf-8")
+
+    again = rosgrade("regrade", tmp_path / "rosgrade-report")
+    assert again.returncode == 0
+    assert "no check changed" in again.stdout
+
+
+def test_a_zip_of_a_workspace_is_graded_alike(rosgrade: Rosgrade, tmp_path: Path) -> None:
+    archive = tmp_path / "ada.zip"
+    with zipfile.ZipFile(archive, "w") as file:
+        for path in REFERENCE.rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts:
+                file.write(path, f"ada/ros2_ws/src/{path.relative_to(REFERENCE)}")
+    ended = rosgrade("check", "timed_publisher", archive, "--only", "package", "--quiet")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert ended.stderr == ""
+
+
+def test_only_one_check_and_what_it_requires_is_judged(rosgrade: Rosgrade, tmp_path: Path) -> None:
+    rosgrade("check", "timed_publisher", REFERENCE, "--only", "dependencies")
+    assert list(statuses(tmp_path)) == ["package", "dependencies"]
+    assert not list((tmp_path / "rosgrade-report" / "recordings").glob("*.mcap"))
+
+
+@pytest.mark.parametrize(
+    ("files", "said"),
+    [
+        ({}, "empty"),
+        ({"notes.txt": "hello"}, "no package.xml"),
+        ({"a/package.xml": "<package", "notes.txt": ""}, "a/package.xml"),
+    ],
+)
+def test_what_is_no_package_is_graded_with_nothing_and_says_why(
+    rosgrade: Rosgrade, tmp_path: Path, files: dict[str, str], said: str
+) -> None:
+    submission = tmp_path / "submission"
+    submission.mkdir()
+    for name, content in files.items():
+        (submission / name).parent.mkdir(exist_ok=True)
+        (submission / name).write_text(content, encoding="utf-8")
+    ended = rosgrade("check", "timed_publisher", submission)
+    assert ended.returncode == 1, ended.stderr
+    assert said in ended.stdout
+    assert "Traceback" not in ended.stdout + ended.stderr
+    assert statuses(tmp_path)["package"] == "failed"
+    assert result(tmp_path)["score"] == 0
+
+
+def test_two_packages_of_one_name_are_both_named(rosgrade: Rosgrade, tmp_path: Path) -> None:
+    submission = tmp_path / "submission"
+    for place in ("first", "second"):
+        shutil.copytree(REFERENCE / "bot_publisher", submission / place)
+    ended = rosgrade("check", "timed_publisher", submission)
+    assert ended.returncode == 1
+    assert "first" in ended.stdout and "second" in ended.stdout
+
+
+@pytest.mark.parametrize("member", ["../outside.txt", "/etc/outside.txt"])
+def test_a_hostile_archive_is_refused_by_name(
+    rosgrade: Rosgrade, tmp_path: Path, member: str
+) -> None:
+    archive = tmp_path / "evil.zip"
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr(member, "x")
+    ended = rosgrade("check", "timed_publisher", archive)
+    assert ended.returncode == 1
+    assert "evil.zip" in ended.stdout and "outside.txt" in ended.stdout
+    assert not (tmp_path / "outside.txt").exists()
+
+
+def test_a_setup_py_that_raises_is_shown_with_its_line(rosgrade: Rosgrade, tmp_path: Path) -> None:
+    file = "bot_publisher/setup.py"
+    submission = copy(tmp_path, "setup(\n", "raise ValueError('no setup today')\nsetup(\n", file)
+    ended = rosgrade("check", "timed_publisher", submission)
+    assert ended.returncode == 1
+    assert statuses(tmp_path)["builds"] == "failed"
+    assert "no setup today" in ended.stdout
+    assert "setup.py:" in ended.stdout
+
+
+def test_a_crash_is_shown_with_the_student_s_file_and_line(
+    rosgrade: Rosgrade, tmp_path: Path
+) -> None:
+    submission = copy(tmp_path, "super().__init__(", "print(undefined)\n        super().__init__(")
+    ended = rosgrade("check", "timed_publisher", submission, columns=200)
+    assert ended.returncode == 1
+    assert statuses(tmp_path)["starts"] == "failed"
+    assert "NameError" in ended.stdout
+    line = (submission / NODE).read_text().splitlines().index("        print(undefined)") + 1
+    assert f"{NODE}:{line}" in ended.stdout
+
+
+def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
+    submission = copy(tmp_path, "PERIOD_S = 0.3", "PERIOD_S = 2.5")
+    check = subprocess.Popen(
+        [sys.executable, "-m", "grader", "check", "timed_publisher", str(submission)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)},
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert check.stderr is not None
+    for line in check.stderr:
+        if "starting bot_publisher/bot_pub" in line:
+            break
+    check.send_signal(signal.SIGINT)
+    _, told = check.communicate(timeout=60)
+    assert check.returncode == 130
+    assert "Traceback" not in told
+    assert not (tmp_path / "rosgrade-report" / "result.json").exists()
+    assert not list(tmp_path.glob("rosgrade-cell-*"))
+    assert not _running(str(tmp_path))
+
+
+def _running(fragment: str) -> list[bytes]:
+    """Command lines with a text in them, our own left aside."""
+    found = []
+    for file in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            line = file.read_bytes()
+        except OSError:
+            continue
+        if fragment.encode() in line and int(file.parent.name) != os.getpid():
+            found.append(line)
+    return found
