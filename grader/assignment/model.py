@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from grader.assignment.name import (
     ID,
@@ -23,8 +23,9 @@ from grader.assignment.name import (
     package_name,
     topic_name,
 )
-from grader.assignment.quantity import Duration, DurationOrZero
+from grader.assignment.quantity import Duration, DurationOrZero, PositiveLength, parse_any
 from grader.assignment.source import Model
+from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
 
 
 def _form(pattern: str, words: str) -> WithJsonSchema:
@@ -47,6 +48,30 @@ InterfaceName = Annotated[
 
 Reliability = Literal["reliable", "best_effort"]
 Durability = Literal["volatile", "transient_local"]
+
+
+class RandomRange(Model):
+    """Bounds of a random value; both with the same unit, or both without."""
+
+    model_config = ConfigDict(frozen=True)
+
+    low: float
+    high: float
+    unit: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, value: Any) -> Any:
+        if isinstance(value, RandomRange):
+            return value
+        if not isinstance(value, list | tuple) or len(value) != 2:
+            raise ValueError("a random value is written as [lowest, highest]")
+        (low, unit), (high, other) = parse_any(value[0]), parse_any(value[1])
+        if unit != other:
+            raise ValueError(f"the bounds {value[0]!r} and {value[1]!r} have different units")
+        if low > high:
+            raise ValueError(f"the lowest value {value[0]!r} is above the highest, {value[1]!r}")
+        return {"low": low, "high": high, "unit": unit}
 
 
 class Visibility(str, Enum):
@@ -134,6 +159,13 @@ class Until(Model):
         "process declared has had the time to fire.",
     )
     elapsed: Duration | None = Field(None, description="So long since the first match.")
+    at_rest: Duration | None = Field(
+        None, description="The simulated robot has moved and has then been at rest for so long."
+    )
+    travelled: PositiveLength | None = Field(
+        None, description="The simulated robot has gone so far, along its path."
+    )
+    any: tuple[Until, ...] = Field((), description="One of these holds.")
 
 
 class Scenario(Model):
@@ -144,6 +176,24 @@ class Scenario(Model):
     launch: tuple[Launch, ...] = Field(min_length=1, description="Processes of the student.")
     record: tuple[RecordedTopic, ...] = Field((), description="Topics to record.")
     stimuli: tuple[ListParameters, ...] = Field((), description="What the probe does meanwhile.")
+    world: str | None = Field(
+        None,
+        description="World file, relative to the assignment's folder. With a world there is a "
+        "simulated robot in the scenario; its topics are recorded besides those of `record`. "
+        "Simulated time begins with the first match. One second after a contact the run ends.",
+    )
+    robot: RobotOptions = Field(default_factory=RobotOptions, description="The simulated robot.")
+    lidar: LidarOptions = Field(default_factory=LidarOptions, description="Its LiDAR.")
+    odometry: OdometryOptions = Field(
+        default_factory=OdometryOptions, description="Its wheel odometry."
+    )
+    topics: Topics = Field(default_factory=Topics, description="Its topics with their QoS.")
+    random: dict[Id, RandomRange] = Field(
+        default_factory=dict,
+        description="Random values: name -> [lowest, highest], evenly distributed, from the "
+        "scenario's seed. `$name` stands for the value in the world file and in the parameters "
+        "of `launch`; checks name it without the dollar sign.",
+    )
     until: Until = Field(default_factory=Until, description="When to end early.")
     timeout: Duration = Field(description="End of the observation, counted from the first match.")
     discovery: Duration = Field(

@@ -110,6 +110,27 @@ def parse_quantity(text: str | int | float, dimension: Dimension) -> float:
     return value
 
 
+def parse_any(text: str | int | float) -> tuple[float, str]:
+    """Read a number with any unit, or without one.
+
+    Returns:
+        The value in SI units and the SI unit, such as ``(1.57, "rad")``; an empty unit for a
+        bare number.
+
+    Raises:
+        ValueError: It is not a number, or has an unknown unit.
+    """
+    match = None if isinstance(text, bool) else _QUANTITY.fullmatch(str(text))
+    if not match:
+        raise ValueError(f"{text!r} is not a number, with or without a unit")
+    if not match[2]:
+        return float(match[1]), ""
+    for dimension, units in UNITS.items():
+        if match[2] in units:
+            return parse_quantity(text, dimension), next(iter(units))
+    raise ValueError(f"unknown unit {match[2]!r} in {text!r}")
+
+
 def _factor(unit: str, dimension: Dimension) -> float:
     """Factor of a unit to SI.
 

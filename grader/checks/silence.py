@@ -14,6 +14,7 @@ from grader.recording.model import NS, Endpoint, Kind, LogLine, Owner, Recording
 from grader.submission.record import SourceError
 
 _LOG_LINES = 5
+_LONGEST_QUOTE = 80
 _SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
 # Share of the observation that the host may take before silence says nothing any more.
 _STARVED = 0.5
@@ -198,22 +199,30 @@ def _never_spins(recording: Recording, topic: str) -> Cause | None:
 
 
 def _prints(recording: Recording, topic: str) -> Cause | None:
-    about = [line for line in recording.log if _tells_of_publishing(recording, line)]
+    types = {item.type for item in recording.student_endpoints(Kind.PUBLISHER, topic)}
+    # `print(msg)` writes the class with its fields.
+    words = ["publish", *(f"{name.rpartition('/')[2].lower()}(" for name in types)]
+    about = [line for line in recording.log if _tells_of_publishing(recording, line, words)]
     if not about:
         return None
     return Cause(
-        f"no message on {code(topic)}, although the process prints {code(about[0].text.strip())}: "
+        f"no message on {code(topic)}, although the process prints {code(_short(about[0].text))}: "
         "printing and logging send nothing",
         "Call self.publisher.publish(msg) with the message in the callback.",
         Evidence(log=tuple(line.text for line in about[:_LOG_LINES])),
     )
 
 
-def _tells_of_publishing(recording: Recording, line: LogLine) -> bool:
+def _short(line: str) -> str:
+    text = line.strip()
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
+
+
+def _tells_of_publishing(recording: Recording, line: LogLine, words: list[str]) -> bool:
     text = line.text.lower()
     # Indented lines are code in a traceback, which names publish() too.
     return (
-        "publish" in text
+        any(word in text for word in words)
         and line.stream != "rosout"
         and line.time_ns <= recording.stop_ns
         and not text[:1].isspace()
@@ -237,8 +246,11 @@ def _idle(recording: Recording, topic: str) -> Cause:
             "publish from a callback that runs.",
             evidence,
         )
+    runs = [format_duration(timer.period_s) for timer in testimony.timers(recording)]
+    spins = testimony.said(recording, "spin")
+    though = f", although the process declared a timer of {listing(runs)}" if runs and spins else ""
     return Cause(
-        f"the publisher on {code(topic)} is there but silent",
+        f"the publisher on {code(topic)} is there but silent{though}",
         "Is publish(msg) reached in the callback? An `except: pass` hides the error that would "
         "tell why not.",
         evidence,

@@ -11,6 +11,8 @@ from grader.nearest import nearest
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 
 _LOG_LINES = 15
+# Of a culprit's message, which may join several lines of the log.
+_COMPARED = 60
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 # What colcon says of its own doings around the tool's output.
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
@@ -103,24 +105,26 @@ def _failed(build: BuildRecord, name: str) -> Cause:
 
 
 def _evidence(build: BuildRecord, name: str) -> Evidence:
-    return Evidence(
-        places=(build.culprit,) if build.culprit else (), log=_relevant(_clean(build), name)
-    )
+    return Evidence(places=(build.culprit,) if build.culprit else (), log=_relevant(build, name))
 
 
 def _clean(build: BuildRecord) -> str:
     return _ANSI.sub("", build.log)
 
 
-def _relevant(log: str, name: str) -> tuple[str, ...]:
-    """The end of what the build of the package wrote, without colcon's own lines."""
-    lines = log.splitlines()
+def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
+    """What the build of the package wrote, up to what the culprit is blamed for, or its end."""
+    lines = _clean(build).splitlines()
     begin = _last(lines, f"Starting >>> {name}")
     if begin is not None:
         lines = lines[begin:]
-        end = _last(lines, f"Failed   <<< {name}", f"Aborted  <<< {name}")
-        lines = lines[:end]
+        lines = lines[: _last(lines, f"Failed   <<< {name}", f"Aborted  <<< {name}")]
     kept = [line for line in lines if line.strip() and not _CHATTER.match(line)]
+    if build.culprit is not None:
+        message = build.culprit.message[:_COMPARED]
+        blamed = next((i for i, line in enumerate(kept) if message and message in line), None)
+        # What follows is the complaint of the tools that called the student's file.
+        kept = kept[: blamed + 1] if blamed is not None else kept
     return tuple(kept[-_LOG_LINES:])
 
 

@@ -21,11 +21,13 @@ from grader.recording.model import (
     Declaration,
     Disturbance,
     Endpoint,
+    Incident,
     LogLine,
     Message,
     Node,
     Process,
     Recording,
+    Truth,
     Wait,
 )
 from grader.submission.record import SubmissionRecord
@@ -39,6 +41,8 @@ _FACTS: dict[str, type] = {
     "calls": Call,
     "waits": Wait,
     "disturbance": Disturbance,
+    "truth": Truth,
+    "incidents": Incident,
 }
 assert _FACTS.keys() == CHANNELS.keys()
 

@@ -7,6 +7,7 @@ the attachment ``submission.json``, the frame of the run is the metadata ``rosgr
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 from collections.abc import Iterable, Mapping
@@ -31,6 +32,8 @@ CHANNELS: dict[str, str] = {
     "calls": "requested_ns",
     "waits": "began_ns",
     "disturbance": "time_ns",
+    "truth": "time_ns",
+    "incidents": "time_ns",
 }
 """Field of the recording -> attribute that dates it, for the facts kept as JSON."""
 
@@ -147,6 +150,8 @@ def _frame(recording: Recording) -> dict[str, str]:
         "stop_ns": recording.stop_ns,
         "end_ns": recording.end_ns,
         "faults": list(recording.faults),
+        "values": dict(recording.values),
+        "scene": dataclasses.asdict(recording.scene) if recording.scene else None,
         "environment": dict(recording.environment),
     }
     return {key: json.dumps(value, sort_keys=True) for key, value in frame.items()}

@@ -262,6 +262,72 @@ class Disturbance:
 
 
 @dataclass(frozen=True)
+class Truth:
+    """The simulated robot after one step of 10 ms, straight from the simulator's memory.
+
+    Attributes:
+        time_ns: End of the step, the same clock as the stamps of its messages.
+        x_m: Position in the world's frame (REP-103: x forward, y left).
+        y_m: Position in the world's frame.
+        yaw_rad: Heading, counter-clockwise from the x axis, in (-pi, pi].
+        linear_m_s: True speed ahead.
+        angular_rad_s: True turn, counter-clockwise.
+        command_m_s: Commanded speed in force, before any limit.
+        command_rad_s: Commanded turn in force, before any limit.
+        contact: What the robot touches, such as ``boxes[2]``, or None.
+    """
+
+    time_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    linear_m_s: float
+    angular_rad_s: float
+    command_m_s: float
+    command_rad_s: float
+    contact: str | None = None
+
+
+@dataclass(frozen=True)
+class Incident:
+    """Something that the simulator noted.
+
+    Attributes:
+        time_ns: When.
+        kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout`` or
+            ``late`` (steps that the host did not let us do in time and that were caught up).
+        text: For people.
+    """
+
+    time_ns: int
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is needed to draw a run and to judge it: the world and the robot.
+
+    Attributes:
+        radius_m: Of the robot's circular footprint.
+        max_linear_m_s: Limit of the robot.
+        max_angular_rad_s: Limit of the robot.
+        outlines: Name of each thing that stands still -> its capsules: x1, y1, x2, y2, radius.
+        moving: Name of each thing that moves -> its places, every 0.1 s from the start of the
+            simulation: x, y, yaw, or None while it is not there; with its radius (a box is
+            drawn as the circle around it).
+        began_ns: When simulated time began.
+    """
+
+    radius_m: float
+    max_linear_m_s: float
+    max_angular_rad_s: float
+    outlines: Mapping[str, tuple[tuple[float, float, float, float, float], ...]]
+    moving: Mapping[str, tuple[float, tuple[tuple[float, float, float] | None, ...]]]
+    began_ns: int
+
+
+@dataclass(frozen=True)
 class Recording:
     """Everything observed in one run of one scenario.
 
@@ -276,6 +342,10 @@ class Recording:
         submission: What was known before the run.
         messages: By topic, in the order of their source timestamps.
         faults: What of ours or of the machine went wrong, one sentence each.
+        truth: The simulated robot, step by step; empty in a scenario without a world.
+        incidents: What the simulator noted.
+        scene: World and robot, or None in a scenario without a world.
+        values: Random values of the scenario by name, in SI units.
         environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...
     """
 
@@ -297,6 +367,10 @@ class Recording:
     waits: tuple[Wait, ...] = ()
     disturbance: tuple[Disturbance, ...] = ()
     faults: tuple[str, ...] = ()
+    truth: tuple[Truth, ...] = ()
+    incidents: tuple[Incident, ...] = ()
+    scene: Scene | None = None
+    values: Mapping[str, float] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
 
     def on(self, topic: str) -> tuple[Message, ...]:

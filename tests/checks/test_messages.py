@@ -193,6 +193,12 @@ class TestSilence:
         assert "Publishing 1.0 0.5" in found
         assert "printing and logging send nothing" in found
 
+    def test_printing_the_message_itself(self):
+        line = "geometry_msgs.msg.Twist(linear=geometry_msgs.msg.Vector3(x=1.0, y=0.0, z=0.0))"
+        found = self.found(log=output(line, stream="stdout", time_s=1.2))
+        assert "the process prints `geometry_msgs.msg.Twist(linear=" in found
+        assert "printing and logging send nothing" in found
+
     def test_a_traceback_that_names_publish_is_no_print(self):
         log = output(traceback("KeyError: 'x'", source="self.publisher.publish(msg)"), time_s=1.2)
         assert "prints" not in self.found(log=log)
@@ -202,7 +208,7 @@ class TestSilence:
 
     def test_silent_for_no_reason_that_can_be_seen(self):
         found = self.found(log=output("something went wrong"))
-        assert "there but silent" in found
+        assert "there but silent, although the process declared a timer of 300 ms" in found
         assert "except: pass" in found
 
     def test_a_publisher_that_our_tracer_could_not_match_is_our_fault(self):

@@ -101,6 +101,13 @@ class TestBuilds:
             "NameError: name 'x' is not defined",
         )
 
+    def test_the_log_ends_where_the_culprit_is_blamed(self):
+        noise = "subprocess.CalledProcessError: Command '...' returned non-zero exit status 1."
+        log = LOG.replace("defined\nFailed", f"defined\n{noise}\nFailed")
+        finding = self.found(build=failed_build(NAME, log=log, culprit=CULPRIT))
+        assert finding.evidence.log[-1] == CULPRIT.message
+        assert self.found(build=failed_build(NAME, log=log)).evidence.log[-1] == noise
+
     def test_a_log_without_a_block_of_its_own(self):
         log = "Starting >>> bot_publisher\nCMake Error: no CMakeLists.txt\nFailed   <<< x\n"
         finding = self.found(build=failed_build(NAME, log=log))
