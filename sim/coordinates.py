@@ -98,8 +98,13 @@ class Entries:
     def __get_pydantic_core_schema__(
         self, source: type[Any], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Validate entry by entry."""
-        return core_schema.no_info_plain_validator_function(self._read)
+        """Validate entry by entry; written as it is read."""
+        return core_schema.no_info_plain_validator_function(
+            self._read,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                self._write, when_used="json-unless-none"
+            ),
+        )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -126,6 +131,11 @@ class Entries:
             raise _wrong(f"expected {self._form}: {needed} entries, not {len(value)}")
         numbers = [self._entry(name, item) for name, item in zip(self.names, value, strict=False)]
         return self.make(*numbers, *[0.0] * (len(self.names) - len(numbers)))
+
+    def _write(self, value: Any) -> list[float | str]:
+        if isinstance(value, Pose):
+            return [value.x_m, value.y_m, f"{value.yaw_rad!r} rad"]
+        return list(value)
 
     def _entry(self, name: str, item: Any) -> float:
         try:

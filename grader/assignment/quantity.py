@@ -110,6 +110,13 @@ def parse_quantity(text: str | int | float, dimension: Dimension) -> float:
     return value
 
 
+def write_quantity(value: float, dimension: Dimension) -> str:
+    """Write a value in SI units so that :func:`parse_quantity` reads the same value again."""
+    if dimension is Dimension.RATIO:
+        return repr(value) if abs(value) < 1.0 else f"{value * 100.0!r} %"
+    return f"{value!r} {next(iter(UNITS[dimension]))}"
+
+
 def parse_any(text: str | int | float) -> tuple[float, str]:
     """Read a number with any unit, or without one.
 
@@ -196,7 +203,13 @@ class QuantityOf:
                 )
             return number
 
-        return core_schema.no_info_plain_validator_function(read)
+        # Written as it is read: with its unit.
+        return core_schema.no_info_plain_validator_function(
+            read,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda value: write_quantity(value, self.dimension), when_used="json-unless-none"
+            ),
+        )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

@@ -158,6 +158,7 @@ class Grading:
             prepared.install,
             file,
             seed=scenario_seed(assignment.id, name, prepared.record.sha256, self._seed),
+            worlds=self._loaded.folder,
             alone=alone,
         )
         return read_recording(file)

@@ -246,7 +246,8 @@ def _idle(recording: Recording, topic: str) -> Cause:
             "publish from a callback that runs.",
             evidence,
         )
-    runs = [format_duration(timer.period_s) for timer in testimony.timers(recording)]
+    timers = [timer for timer in testimony.timers(recording) if _fires(recording, timer)]
+    runs = [format_duration(timer.period_s) for timer in timers]
     spins = testimony.said(recording, "spin")
     though = f", although the process declared a timer of {listing(runs)}" if runs and spins else ""
     return Cause(

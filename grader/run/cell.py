@@ -25,7 +25,7 @@ from grader.recording.model import NS, Ending, Owner, Recording, Wait
 from grader.run.descendants import become_subreaper, kill_descendants
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.domain import lock_domain
-from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
+from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder, Until
 from grader.run.output import OutputReader
 from grader.run.student import StudentProcesses
 from grader.submission.record import SubmissionRecord
@@ -33,6 +33,7 @@ from grader.submission.record import SubmissionRecord
 if TYPE_CHECKING:
     from grader.run.graph import GraphObserver
     from grader.run.probe import Probe
+    from grader.run.simulator import SimulatedRobot
 
 _TICK_S = 0.02
 _CALM_TICK_S = 0.1
@@ -41,6 +42,7 @@ _PIPES_LIMIT_S = 1.0
 _LONGEST_STRETCH = 8.0
 # A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
 _SET_UP_S = 0.5
+_AFTER_CONTACT_S = 1.0
 
 
 class Abandoned(Exception):
@@ -85,6 +87,11 @@ class Cell:
         self._graph: GraphObserver = GraphObserver(
             probe.node, lambda: self._students.pids, self._students.refresh
         )
+        self._robot: SimulatedRobot | None = None
+        if order.simulator is not None:
+            from grader.run.simulator import SimulatedRobot
+
+            self._robot = SimulatedRobot(probe.node, order.simulator)
         self._waits: list[Wait] = []
         self._faults: list[str] = []
         self._next_graph = 0.0
@@ -104,6 +111,8 @@ class Cell:
             ending = self._observe()
             self._probe.recording = False
             stop_ns = time.time_ns()
+            if self._robot is not None:
+                self._robot.stop()
             tell("stopping")
             self._stop()
         finally:
@@ -128,6 +137,10 @@ class Cell:
             waits=tuple(self._waits),
             disturbance=disturbance,
             faults=tuple(self._faults),
+            truth=self._robot.truth if self._robot else (),
+            incidents=self._robot.incidents if self._robot else (),
+            scene=self._robot.scene() if self._robot else None,
+            values=self._order.values,
             environment={**self._order.facts, "domain_id": str(self._domain_id)},
         )
 
@@ -139,6 +152,8 @@ class Cell:
         ending = ending or self._await_node() or self._await_match()
         if ending is None:
             tell("matched")
+            if self._robot is not None:
+                self._robot.start()
             ending = self._await_until()
         # What arrived while the last wait ended still counts.
         self._graph.poll()
@@ -226,7 +241,7 @@ class Cell:
             self._match()
             if self._faults:
                 return Ending.FAULT
-            if self._until_met(watch):
+            if self._until_met(self._order.until, watch) or self._is_over():
                 return Ending.UNTIL
             if not self._students.poll():
                 return self._last_messages(watch)
@@ -243,10 +258,14 @@ class Cell:
         for late in self._ticks():
             if late.elapsed_s > 2 * _GRAPH_PERIOD_S:
                 break
-        return Ending.UNTIL if self._until_met(watch) else Ending.EXITED
+        met = self._until_met(self._order.until, watch)
+        return Ending.UNTIL if met else Ending.EXITED
 
-    def _until_met(self, watch: Stopwatch) -> bool:
-        until = self._order.until
+    def _is_over(self) -> bool:
+        """Whether the robot has touched something: no verdict can change any more."""
+        return self._robot is not None and self._robot.in_contact_s > _AFTER_CONTACT_S
+
+    def _until_met(self, until: Until, watch: Stopwatch) -> bool:
         conditions = []
         if until.messages is not None:
             conditions.append(all(n >= until.messages for n in self._probe.counts.values()))
@@ -254,6 +273,12 @@ class Cell:
             conditions.append(self._quiet_s(watch) >= self._longest_silence_s(until.quiet_s))
         if until.elapsed_s is not None:
             conditions.append(watch.elapsed_s >= until.elapsed_s)
+        if until.at_rest_s is not None and self._robot is not None:
+            conditions.append(self._robot.at_rest_s >= until.at_rest_s)
+        if until.travelled_m is not None and self._robot is not None:
+            conditions.append(self._robot.travelled_m >= until.travelled_m)
+        if until.any:
+            conditions.append(any(self._until_met(item, watch) for item in until.any))
         return bool(conditions) and all(conditions)
 
     def _quiet_s(self, watch: Stopwatch) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from dataclasses import dataclass, field
+from typing import Any
 
 ORDER_FILE = "order.json"
 RECORDING_FILE = "recording.mcap"
@@ -38,6 +39,7 @@ class Topic:
         reliability: Requested by the probe's first subscription.
         durability: Requested by the probe's first subscription.
         depth: Queue depth of the probe.
+        ours: The simulator's own topic: recorded, but nothing waits for it.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Topic:
     reliability: str
     durability: str
     depth: int
+    ours: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,31 @@ class Until:
     messages: int | None = None
     quiet_s: float | None = None
     elapsed_s: float | None = None
+    at_rest_s: float | None = None
+    travelled_m: float | None = None
+    any: tuple[Until, ...] = ()
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Until:
+        """Read what :func:`dataclasses.asdict` made."""
+        return cls(**{**data, "any": tuple(cls.from_dict(item) for item in data["any"])})
+
+
+@dataclass(frozen=True)
+class SimulatorOrder:
+    """The simulated robot of a scenario.
+
+    Attributes:
+        world: World file.
+        values: What stands for ``$name`` in it.
+        options: :class:`sim.description.SimulatorOptions` as JSON.
+        seed: Of noise and drift.
+    """
+
+    world: str
+    values: dict[str, str]
+    options: str
+    seed: int
 
 
 @dataclass(frozen=True)
@@ -98,6 +126,8 @@ class CellOrder:
         limits: Bounds.
         scratch: Folder of the student: working directory, home and temporary files.
         submission: The submission's facts, as JSON, to go into the recording unread.
+        simulator: The simulated robot, or None.
+        values: Random values of the scenario, to go into the recording.
         facts: Environment facts to go into the recording.
     """
 
@@ -112,6 +142,8 @@ class CellOrder:
     limits: Limits
     scratch: str
     submission: str
+    simulator: SimulatorOrder | None = None
+    values: dict[str, float] = field(default_factory=dict)
     facts: dict[str, str] = field(default_factory=dict)
 
     def to_json(self) -> str:
@@ -126,7 +158,9 @@ class CellOrder:
             Command(item["name"], tuple(item["argv"])) for item in data["commands"]
         )
         data["topics"] = tuple(Topic(**item) for item in data["topics"])
-        data["until"] = Until(**data["until"])
+        data["until"] = Until.from_dict(data["until"])
+        if data["simulator"] is not None:
+            data["simulator"] = SimulatorOrder(**data["simulator"])
         data["limits"] = Limits(**data["limits"])
         data["prefixes"] = tuple(data["prefixes"])
         return cls(**data)

@@ -73,6 +73,7 @@ class Probe:
         self._calls: dict[str, list[_Pending]] = {}
         self.messages: list[RawMessage] = []
         self.counts: dict[str, int] = {}
+        self._kept: dict[str, int] = {}
         self.last_message_ns: int | None = None
         self.recording = True
 
@@ -89,7 +90,8 @@ class Probe:
         self._limits = limits
         for topic in topics:
             self._topics[topic.name] = topic
-            self.counts[topic.name] = 0
+            if not topic.ours:
+                self.counts[topic.name] = 0
             self._subscribe(topic, topic.reliability, topic.durability)
 
     def spin_once(self, limit_s: float) -> None:
@@ -103,18 +105,21 @@ class Probe:
         rclpy.shutdown(context=self._context)
 
     def matches(self, endpoint: Endpoint) -> bool:
-        """Whether an endpoint of the student is one that the scenario records."""
+        """Whether an endpoint of the student is one that the scenario is about.
+
+        That is a publisher on a topic of the student's that is recorded, or a subscription to
+        a topic of the simulator.
+        """
         topic = self._topics.get(endpoint.topic)
-        return (
-            topic is not None
-            and endpoint.owner is Owner.STUDENT
-            and endpoint.kind is Kind.PUBLISHER
-            and endpoint.type == topic.type
-        )
+        if topic is None or endpoint.owner is not Owner.STUDENT or endpoint.type != topic.type:
+            return False
+        return endpoint.kind is (Kind.SUBSCRIPTION if topic.ours else Kind.PUBLISHER)
 
     def subscribe_leniently(self, endpoint: Endpoint) -> None:
         """Also hear a publisher whose QoS does not match what the probe requested."""
         topic = self._topics[endpoint.topic]
+        if endpoint.kind is not Kind.PUBLISHER:
+            return
         offered = endpoint.qos
         heard = not (
             (topic.reliability == "reliable" and offered.reliability == "best_effort")
@@ -185,9 +190,11 @@ class Probe:
             return
         if topic.name in self._fallbacks:
             self._seen.add(key)
-        self.counts[topic.name] += 1
-        self.last_message_ns = time.time_ns()
-        if self.counts[topic.name] > self._limits.messages:
+        self._kept[topic.name] = self._kept.get(topic.name, 0) + 1
+        if not topic.ours:
+            self.counts[topic.name] += 1
+            self.last_message_ns = time.time_ns()
+        if self._kept[topic.name] > self._limits.messages:
             return
         if len(data) > self._limits.message_bytes:
             return

@@ -18,11 +18,12 @@ from grader.ros import RosInstallation
 from grader.run.admission import Admission
 from grader.run.cell_process import CellProcess
 from grader.run.environment import RMW, student_environment
-from grader.run.order import CellOrder, Command, Limits, Topic, Until
+from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Launch, Scenario
+    from grader.assignment.model import Until as UntilModel
 
 _STARTED_EVENTS = ("matched", "stopping", "recorded")
 
@@ -47,8 +48,15 @@ def scenario_seed(assignment: str, scenario: str, submission_sha256: str, base: 
     return int.from_bytes(digest[:8], "big") >> 1
 
 
-def ros_arguments(launch: Launch) -> tuple[str, ...]:
-    """Command line arguments of a launch, as ``ros2 run`` passes them on."""
+def ros_arguments(launch: Launch, values: dict[str, float]) -> tuple[str, ...]:
+    """Command line arguments of a launch, as ``ros2 run`` passes them on.
+
+    Args:
+        launch: What is launched.
+        values: Random values of the scenario, for parameters.
+    """
+    from grader.assignment.drawing import fill_in
+
     rules: list[str] = []
     if launch.name:
         rules += ["-r", f"__node:={launch.name}"]
@@ -58,9 +66,67 @@ def ros_arguments(launch: Launch) -> tuple[str, ...]:
         rules += ["-r", f"{old}:={new}"]
     for name, value in launch.parameters.items():
         # The value is YAML to rcl, and JSON is YAML.
-        rules += ["-p", f"{name}:={json.dumps(value)}"]
+        rules += ["-p", f"{name}:={json.dumps(fill_in(value, values))}"]
     ros_args = ("--ros-args", *rules) if rules else ()
     return (*launch.arguments, *ros_args)
+
+
+def _topics(scenario: Scenario) -> tuple[Topic, ...]:
+    """What is recorded: the author's topics, and those of the simulated robot."""
+    found = {
+        topic.topic: Topic(
+            topic.topic, topic.type, topic.reliability, topic.durability, topic.depth
+        )
+        for topic in scenario.record
+    }
+    if scenario.world is not None:
+        command = scenario.topics.command
+        found.setdefault(
+            command.topic, Topic(command.topic, command.type, "reliable", "volatile", 100)
+        )
+        sensors = (
+            (scenario.odometry.enabled, scenario.topics.odometry, "nav_msgs/msg/Odometry"),
+            (scenario.lidar.enabled, scenario.topics.scan, "sensor_msgs/msg/LaserScan"),
+        )
+        for enabled, options, kind in sensors:
+            if enabled:
+                found[options.topic] = Topic(
+                    options.topic, kind, options.reliability, options.durability, 100, ours=True
+                )
+    return tuple(found.values())
+
+
+def _until(until: UntilModel) -> Until:
+    return Until(
+        messages=until.messages,
+        quiet_s=until.quiet,
+        elapsed_s=until.elapsed,
+        at_rest_s=until.at_rest,
+        travelled_m=until.travelled,
+        any=tuple(_until(item) for item in until.any),
+    )
+
+
+def _simulator(
+    scenario: Scenario, worlds: Path, values: dict[str, float], seed: int
+) -> SimulatorOrder | None:
+    from grader.assignment.drawing import world_values
+    from sim.description import SimulatorOptions
+
+    if scenario.world is None:
+        return None
+    options = SimulatorOptions(
+        robot=scenario.robot,
+        lidar=scenario.lidar,
+        odometry=scenario.odometry,
+        topics=scenario.topics,
+    )
+    return SimulatorOrder(
+        world=str((worlds / scenario.world).resolve()),
+        values=world_values(scenario, values),
+        options=options.model_dump_json(),
+        seed=seed,
+    )
 
 
 @dataclass
@@ -96,6 +162,7 @@ class Runner:
         recording: Path,
         *,
         seed: int,
+        worlds: Path = Path(),
         alone: bool = False,
     ) -> None:
         """Run one scenario and leave its recording.
@@ -107,6 +174,7 @@ class Runner:
             install: The submission's install space (merged layout).
             recording: File to write.
             seed: For everything random.
+            worlds: Folder that world files are relative to.
             alone: Let no other cell of ours run meanwhile.
 
         Raises:
@@ -115,7 +183,9 @@ class Runner:
         with self.admission.cell(alone=alone) as ticket:
             cell = self._take_cell()
             try:
-                order = self._order(assignment, scenario, submission, install, cell.folder, seed)
+                order = self._order(
+                    assignment, scenario, submission, install, cell.folder, seed, worlds
+                )
                 for event in cell.run(order):
                     if event["event"] in _STARTED_EVENTS:
                         ticket.started()
@@ -156,35 +226,26 @@ class Runner:
         install: Path,
         folder: Path,
         seed: int,
+        worlds: Path,
     ) -> CellOrder:
+        from grader.assignment.drawing import draw_values
+
         scratch = folder / "scratch"
         scratch.mkdir()
-        default_package = assignment.packages[0].name
+        values = draw_values(scenario, seed)
         every = [stimulus.every for stimulus in scenario.stimuli]
-        until = scenario.until
         return CellOrder(
             scenario=scenario.id,
             seed=seed,
             commands=tuple(
-                Command(
-                    name=f"{launch.package or default_package}/{launch.executable}",
-                    argv=(
-                        *self._program(
-                            install / "lib" / (launch.package or default_package), launch.executable
-                        ),
-                        *ros_arguments(launch),
-                    ),
-                )
+                self._command(launch, assignment.packages[0].name, install, values)
                 for launch in scenario.launch
             ),
             environment=student_environment(self.ros, install, scratch),
             prefixes=tuple(str(prefix) for prefix in (install, *self.ros.prefixes)),
-            topics=tuple(
-                Topic(t.topic, t.type, t.reliability, t.durability, t.depth)
-                for t in scenario.record
-            ),
+            topics=_topics(scenario),
             list_parameters_s=min(every) if every else None,
-            until=Until(until.messages, until.quiet, until.elapsed),
+            until=_until(scenario.until),
             limits=Limits(
                 discovery_s=scenario.discovery,
                 timeout_s=scenario.timeout,
@@ -192,6 +253,8 @@ class Runner:
             ),
             scratch=str(scratch),
             submission=to_json(submission).decode(),
+            simulator=_simulator(scenario, worlds, values, seed),
+            values=values,
             facts={
                 "assignment": assignment.id,
                 "ros_distro": self.ros.distro,
@@ -200,6 +263,15 @@ class Runner:
                 "python": ".".join(map(str, sys.version_info[:3])),
                 "sandbox": "none",
             },
+        )
+
+    def _command(
+        self, launch: Launch, default_package: str, install: Path, values: dict[str, float]
+    ) -> Command:
+        package = launch.package or default_package
+        program = self._program(install / "lib" / package, launch.executable)
+        return Command(
+            name=f"{package}/{launch.executable}", argv=(*program, *ros_arguments(launch, values))
         )
 
     def _program(self, folder: Path, executable: str) -> tuple[str, ...]:

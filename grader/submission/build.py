@@ -12,7 +12,6 @@ import json
 import os
 import re
 import shutil
-import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +22,7 @@ from grader.submission import buildlog
 from grader.submission.bounded import Outcome, OutputLimits, run_bounded
 from grader.submission.build_cache import INSTALL, BuildCache, CachedBuild
 from grader.submission.culprit import Sources, find_culprit, last_started
-from grader.submission.installed import site_packages
+from grader.submission.installed import site_packages, tidy
 from grader.submission.locate import Located
 from grader.submission.members import MIB
 from grader.submission.record import BuildRecord
@@ -89,7 +88,7 @@ def build(
     """
     limits = limits or BuildLimits()
     wall_s = limits.python_s if only_python else limits.other_s
-    workshop = _Workshop(located, sources, ros, limits, wall_s, on_progress, environ)
+    workshop = _Workshop(located, sources, ros, limits, only_python, wall_s, on_progress, environ)
     key = build_key(located.sha256, ros)
     on_progress("looking for an earlier build")
     with cache.locked(key, wait_s=wall_s + _COMPILE_S):
@@ -138,6 +137,7 @@ class _Workshop:
     sources: Sources
     ros: RosInstallation
     limits: BuildLimits
+    only_python: bool
     wall_s: float
     on_progress: Callable[[str], None]
     environ: Mapping[str, str]
@@ -165,9 +165,16 @@ class _Workshop:
             on_line=on_line,
         )
         self._check_machine(outcome, scratch, install)
-        problem = tidy(install, self.limits) or _ended_by_us(outcome, self.wall_s)
+        problem = tidy(
+            install, most_bytes=self.limits.install_bytes, most_files=self.limits.install_files
+        )
+        problem = problem or _ended_by_us(outcome, self.wall_s)
         record = self._record(outcome, finished, problem, scratch, install)
-        self._compile(environment, install, scratch)
+        if finished:
+            self._compile(environment, install, scratch)
+        else:
+            # colcon writes its own setup files first.
+            shutil.rmtree(install, ignore_errors=True)
         return record
 
     def _environment(self, scratch: Path) -> dict[str, str]:
@@ -188,7 +195,7 @@ class _Workshop:
         command += ["--build-base", str(scratch / "build"), "--install-base", str(install)]
         command += ["--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"]
         command += ["--base-paths", *folders]
-        if self.wall_s != self.limits.python_s:
+        if not self.only_python:
             # Linters and test frameworks are not there to be found on a small installation.
             command += ["--cmake-args", "-DBUILD_TESTING=OFF"]
             if self.ros.source == "wheels":
@@ -273,37 +280,4 @@ def _ended_by_us(outcome: Outcome, wall_s: float) -> str | None:
         return f"the build was ended after {wall_s:.0f} s"
     if outcome.ended_by_us == "output":
         return "the build was ended because it wrote too much output"
-    return None
-
-
-def tidy(install: Path, limits: BuildLimits) -> str | None:
-    """Take out of an install space what nobody of ours should open or follow.
-
-    Pipes, sockets and devices go, and symbolic links that lead out of it.
-
-    Returns:
-        Why it cannot be used at all, in which case it is removed, or None.
-    """
-    if install.is_symlink():
-        install.unlink()
-        return "the build put a symbolic link in place of the install space"
-    total = count = 0
-    base = os.path.realpath(install)
-    for parent, folders, names in os.walk(install):
-        for name in [*folders, *names]:
-            path = Path(parent, name)
-            status = path.lstat()
-            if stat.S_ISLNK(status.st_mode):
-                if not f"{os.path.realpath(path)}/".startswith(f"{base}/"):
-                    path.unlink()
-            elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
-                path.unlink()
-            total += status.st_size
-            count += 1
-    if total > limits.install_bytes or count > limits.install_files:
-        shutil.rmtree(install)
-        return (
-            f"the build installed more than {limits.install_files} files "
-            f"or {limits.install_bytes // MIB} MiB"
-        )
     return None

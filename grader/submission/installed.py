@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import stat
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -68,6 +69,41 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
     return InstallSpace(
         executables, tuple(in_bin), entry_points, python, match_files(python, sources)
     )
+
+
+def tidy(install: Path, *, most_bytes: int, most_files: int) -> str | None:
+    """Take out of an install space what nobody of ours should open or follow.
+
+    Pipes, sockets and devices go, and symbolic links that lead out of it.
+
+    Args:
+        install: The install space, as the student's build files left it.
+        most_bytes: Largest size of all files together.
+        most_files: Largest number of files and folders.
+
+    Returns:
+        Why it cannot be used at all, in which case it is removed, or None.
+    """
+    if install.is_symlink():
+        install.unlink()
+        return "the build put a symbolic link in place of the install space"
+    total = count = 0
+    base = os.path.realpath(install)
+    for parent, folders, names in os.walk(install):
+        for name in [*folders, *names]:
+            path = Path(parent, name)
+            status = path.lstat()
+            if stat.S_ISLNK(status.st_mode):
+                if not f"{os.path.realpath(path)}/".startswith(f"{base}/"):
+                    path.unlink()
+            elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+                path.unlink()
+            total += status.st_size
+            count += 1
+    if total > most_bytes or count > most_files:
+        shutil.rmtree(install)
+        return f"the build installed more than {most_files} files or {most_bytes} bytes"
+    return None
 
 
 def site_packages(install: Path) -> list[Path]:

@@ -17,7 +17,7 @@ from grader.submission.culprit import Sources
 from grader.submission.installed import inspect
 from grader.submission.listing import MANIFEST
 from grader.submission.locate import Located, check_path, opened, submission_id
-from grader.submission.members import ArchiveLimits
+from grader.submission.members import MIB, ArchiveLimits
 from grader.submission.package import Package, read_package, record_packages
 from grader.submission.paths import join, shown
 from grader.submission.record import SubmissionRecord
@@ -84,9 +84,20 @@ def prepare(
             builds = BuildCache(cache, limits.cache)
             return _prepare(located, ros, builds, limits, on_progress, environ)
     except SubmissionError as error:
-        # Nothing of it is known, so only its name can tell it from others.
-        sha256 = hashlib.sha256(os.fsencode(source.name)).hexdigest()
-        return Prepared(SubmissionRecord(submission_id(source), sha256, problem=str(error)), None)
+        record = SubmissionRecord(submission_id(source), _hash(source), problem=str(error))
+        return Prepared(record, None)
+
+
+def _hash(source: Path) -> str:
+    """Hash of an archive that was refused; of a folder only its name can be told."""
+    total = hashlib.sha256()
+    if source.is_dir():
+        total.update(os.fsencode(source.name))
+    else:
+        with source.open("rb") as file:
+            while block := file.read(MIB):
+                total.update(block)
+    return total.hexdigest()
 
 
 def _prepare(

@@ -57,8 +57,8 @@ class Dependency:
         name: ROS package or rosdep key.
         kind: The tag: ``depend``, ``exec_depend``, ``build_depend``, ``test_depend``, ...
         line: Line in package.xml.
-        known: Whether the name is a ROS package or rosdep key as far as this machine can
-            tell; None where it cannot tell.
+        known: True for a ROS package or rosdep key that exists, False for a slip of one or a
+            name that is known not to exist, None where this machine cannot tell.
     """
 
     name: str
@@ -77,9 +77,9 @@ class PackageRecord:
         build_type: ``ament_python``, ``ament_cmake``, ...
         manifest_error: Why package.xml cannot be used (broken XML, invalid e-mail), or None.
         dependencies: What package.xml names.
-        imports: What its Python code imports, test and setup files left aside.
+        imports: What its Python code imports; tests, launch files and setup.py left aside.
         ros_imports: Those of ``imports`` that belong to a ROS package, with that package's
-            name in ``module``.
+            name in ``module``; of several that provide a module the one that is declared.
         syntax_errors: Files that Python cannot parse.
         entry_points: console_scripts of setup.py or setup.cfg: executable -> ``module:function``.
         executables: What the build installed for ``ros2 run``, in ``lib/<package>/``.
@@ -87,7 +87,8 @@ class PackageRecord:
             not look (a missing or wrong setup.cfg).
         missing_targets: Executables whose ``module:function`` does not exist in the package,
             with what is wrong.
-        files: Python files as installed (``bot_publisher/node.py``) -> path in the submission.
+        files: Python files as installed -> path in the submission; relative to site-packages
+            (``bot_publisher/node.py``), or ``lib/<package>/...`` for scripts.
     """
 
     name: str
@@ -110,11 +111,12 @@ class BuildRecord:
     """What ``colcon build`` did.
 
     Attributes:
-        succeeded: colcon's exit status was 0.
+        succeeded: colcon's exit status was 0 and it built every package.
         duration_s: Wall time of the build when it ran, also when taken from the cache now.
         cached: Taken from the cache.
         timed_out: Ended by us after the time limit.
-        failed_packages: Packages that colcon reported as failed or aborted.
+        failed_packages: Packages that colcon did not finish: that failed, or were never begun
+            since one that they need failed or colcon did not take them for packages.
         culprit: The student's file and line that the log blames first, or None.
         log: The end of colcon's output, student's paths mapped back, at most 64 KiB.
     """

@@ -236,6 +236,11 @@ class TestMistakes:
         assert "three times as often" in found
         assert "publish once in its callback" in found
 
+    @pytest.mark.parametrize("count", range(5, 24))
+    def test_a_callback_that_publishes_twice_however_many_messages_came(self, count):
+        found = wrong(([0.0003, 0.2997] * 12)[:count])
+        assert "messages come twice as often as expected" in found
+
     def test_half_of_the_period(self):
         found = wrong([0.15] * 20, declarations=declarations(timer_s=0.15))
         assert "twice as often as expected: the process declared a timer of 150 ms" in found

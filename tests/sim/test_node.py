@@ -286,7 +286,8 @@ def test_a_long_stall_is_caught_up_in_parts(bench: Bench) -> None:
     bench.now_ns = (2 * MAX_BATCH + 3) * STEP_NS
     for _ in range(3):
         simulator.catch_up()
-    assert [lateness.steps for lateness in bench.truth.late] == [MAX_BATCH, MAX_BATCH, 3]
+    # The last three bring nothing to see, and so are not late.
+    assert [lateness.steps for lateness in bench.truth.late] == [MAX_BATCH, MAX_BATCH]
     assert bench.truth.steps[-1].index == 2 * MAX_BATCH + 3
 
 
@@ -384,7 +385,7 @@ def test_an_executor_that_spins_its_node_takes_no_commands(bench: Bench) -> None
 
 
 def test_the_clock_is_that_of_the_stamps(bench: Bench) -> None:
-    simulator = bench.simulator(topics={"clock": {"enabled": True}})
+    simulator = bench.simulator(topics={"clock": {"enabled": True, "depth": 100}})
     clock = bench.listen(Clock, "/clock", QoSProfile(depth=100))
     bench.wait(lambda: simulator.clock.publisher.get_subscription_count() == 1, "match")
     simulator.start()

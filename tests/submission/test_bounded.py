@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import GraderFault
@@ -131,6 +131,7 @@ def test_a_file_has_a_bound(tmp_path: Path) -> None:
     assert run(program, tmp_path).output == f"({2**30}, {2**30}) (0, 0)\n"
 
 
+@settings(deadline=None)
 @given(st.lists(st.binary(max_size=50)), st.integers(0, 40), st.integers(1, 40))
 def test_beginning_and_end_of_output_are_kept(blocks: list[bytes], head: int, tail: int) -> None:
     output = CappedOutput(OutputLimits(head=head, tail=tail))

@@ -12,7 +12,7 @@ import pytest
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.submission.build import BuildLimits, build_key, tidy
+from grader.submission.build import BuildLimits, build_key
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
 from grader.submission.record import BuildRecord, PackageRecord
 
@@ -141,7 +141,21 @@ def test_setup_py_that_raises_is_blamed(tree: Tree, real_ros: RosInstallation) -
     assert str(build.culprit) == f"{FOLDER}/setup.py:2: ValueError: boom"
     assert "ValueError: boom" in build.log
     assert package_of(found).executables == ()
+    assert found.install is None
     assert build_of(prepared(tree, real_ros)).cached
+
+
+def test_odd_names_of_folders_are_built(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package(folder="my bot/größe 🤖\n/'x'")
+    found = prepared(tree, real_ros)
+    assert build_of(found).succeeded
+    assert package_of(found).path == "my bot/größe 🤖\\n/'x'"
+    assert package_of(found).executables == ("bot_pub",)
+
+
+def test_a_folder_name_that_is_no_unicode_ends_well(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package(folder=os.fsdecode(b"caf\xe9"))
+    assert package_of(prepared(tree, real_ros)).path == "caf\\udce9"
 
 
 def test_without_setup_cfg_the_executable_is_misplaced(
@@ -323,26 +337,3 @@ def test_a_build_depends_on_the_submission_and_the_installation(
     (index / "std_msgs").unlink()
     again = RosInstallation(named_ros.source, named_ros.python, named_ros.prefixes)
     assert build_key("0", again) != first
-
-
-def test_an_install_space_is_tidied_before_anybody_looks_into_it(tmp_path: Path) -> None:
-    install = tmp_path / "install"
-    (install / "lib").mkdir(parents=True)
-    (install / "lib/libx.so.1").touch()
-    (install / "lib/libx.so").symlink_to("libx.so.1")
-    (install / "lib/etc").symlink_to("/etc")
-    (install / "lib/up").symlink_to("../../..")
-    os.mkfifo(install / "lib/pipe")
-    assert tidy(install, BuildLimits()) is None
-    assert {path.name for path in (install / "lib").iterdir()} == {"libx.so.1", "libx.so"}
-    assert tidy(install, BuildLimits(install_files=1)) is not None
-    assert not install.exists()
-
-
-def test_a_link_in_place_of_the_install_space_is_taken_away(tmp_path: Path) -> None:
-    (tmp_path / "precious").mkdir()
-    (tmp_path / "precious/link").symlink_to("/etc")
-    (tmp_path / "install").symlink_to("precious")
-    assert tidy(tmp_path / "install", BuildLimits()) is not None
-    assert (tmp_path / "precious/link").is_symlink()
-    assert not (tmp_path / "install").exists()

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.submission.entrypoints import Setup, parse_entry_point, parse_installed, read_setup
@@ -132,6 +132,7 @@ def test_an_installed_file_is_read() -> None:
     assert parse_installed("no section", "setup.py") == []
 
 
+@settings(deadline=None)
 @given(st.text(max_size=60))
 def test_no_text_of_an_entry_point_raises(text: str) -> None:
     parse_entry_point(text, "setup.py")

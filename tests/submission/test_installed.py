@@ -3,10 +3,17 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.submission.installed import InstallSpace, hash_of, inspect, match_files, normalised
+from grader.submission.installed import (
+    InstallSpace,
+    hash_of,
+    inspect,
+    match_files,
+    normalised,
+    tidy,
+)
 
 from .samples import Tree
 
@@ -76,7 +83,31 @@ def test_of_equal_files_the_one_with_the_most_similar_path_is_the_origin() -> No
     }
 
 
+@settings(deadline=None)
 @given(st.text(st.sampled_from("aB-_.1"), min_size=1, max_size=10))
 def test_names_of_distributions_are_compared_as_pip_does(name: str) -> None:
     assert normalised(normalised(name)) == normalised(name)
     assert normalised(name.replace("-", "_").upper()) == normalised(name)
+
+
+def test_an_install_space_is_tidied_before_anybody_looks_into_it(tmp_path: Path) -> None:
+    install = tmp_path / "install"
+    (install / "lib").mkdir(parents=True)
+    (install / "lib/libx.so.1").touch()
+    (install / "lib/libx.so").symlink_to("libx.so.1")
+    (install / "lib/etc").symlink_to("/etc")
+    (install / "lib/up").symlink_to("../../..")
+    os.mkfifo(install / "lib/pipe")
+    assert tidy(install, most_bytes=10**6, most_files=10) is None
+    assert {path.name for path in (install / "lib").iterdir()} == {"libx.so.1", "libx.so"}
+    assert tidy(install, most_bytes=1000, most_files=1) is not None
+    assert not install.exists()
+
+
+def test_a_link_in_place_of_the_install_space_is_taken_away(tmp_path: Path) -> None:
+    (tmp_path / "precious").mkdir()
+    (tmp_path / "precious/link").symlink_to("/etc")
+    (tmp_path / "install").symlink_to("precious")
+    assert tidy(tmp_path / "install", most_bytes=1000, most_files=10) is not None
+    assert (tmp_path / "precious/link").is_symlink()
+    assert not (tmp_path / "install").exists()

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
 import pytest
 
-from grader.errors import SubmissionError, UsageError
+from grader.errors import GraderFault, SubmissionError, UsageError
 from grader.submission.locate import opened, submission_id
 
 from .samples import PACKAGE, Tree, tar_bytes, tar_member, zip_bytes
@@ -108,6 +109,17 @@ def test_a_file_that_cannot_be_read_is_named(tree: Tree, monkeypatch: pytest.Mon
     listing = locate.list_files(root)
     monkeypatch.setattr(locate, "list_files", vanish)
     with pytest.raises(SubmissionError, match=r"a\.py: cannot be read"), opened(root):
+        pass
+
+
+def test_a_full_disk_is_no_fault_of_the_student(
+    tree: Tree, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> bytes:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("grader.submission.locate._copy_file", full)
+    with pytest.raises(GraderFault, match="No space left"), opened(tree.write({"a.py": "x"})):
         pass
 
 

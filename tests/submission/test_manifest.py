@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.submission.manifest import Manifest, read_manifest
@@ -136,6 +136,7 @@ def test_utf_16_is_xml_as_well() -> None:
     assert read(text.encode("utf-16")).name == "bot_publisher"
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=200), st.integers(0, len(MANIFEST)))
 def test_no_damage_to_a_manifest_raises(noise: bytes, place: int) -> None:
     data = MANIFEST.encode()

@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import SubmissionError
@@ -145,6 +145,7 @@ def test_a_link_to_something_inside_is_kept_and_one_to_nothing_is_not() -> None:
     assert [entry.path for entry in admitted([*links, *files("x")])] == ["d/good", "x"]
 
 
+@settings(deadline=None)
 @given(st.lists(NAMES, max_size=8))
 def test_whatever_the_names_nothing_leaves_the_folder(names: list[str]) -> None:
     try:
@@ -164,6 +165,7 @@ LINKS = st.dictionaries(
 )
 
 
+@settings(deadline=None)
 @given(LINKS)
 def test_links_are_followed_as_the_file_system_does(links: dict[str, str]) -> None:
     with tempfile.TemporaryDirectory() as scratch:

@@ -1,4 +1,4 @@
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.submission.paths import is_within, join, parents, shown
@@ -16,6 +16,7 @@ def test_bytes_that_are_no_unicode_are_spelled_out() -> None:
     assert shown("caf\udce9") == "caf\\udce9"
 
 
+@settings(deadline=None)
 @given(st.text(st.characters()))
 def test_what_is_shown_is_always_printable_and_can_be_written_as_utf_8(path: str) -> None:
     assert shown(path).isprintable()

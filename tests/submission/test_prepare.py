@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,7 @@ def test_a_refused_archive_is_a_problem_of_the_submission(
     (tmp_path / "eve.tar.gz").write_bytes(tar_bytes(tar_member("../../evil", b"x")))
     found = prepared(tmp_path / "eve.tar.gz", named_ros).record
     assert (found.id, found.packages) == ("eve", ())
+    assert found.sha256 == sha256((tmp_path / "eve.tar.gz").read_bytes()).hexdigest()
     assert found.problem == "eve.tar.gz: ../../evil: paths with '..' are refused"
 
 

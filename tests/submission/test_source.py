@@ -3,7 +3,7 @@ from __future__ import annotations
 import ast
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.submission.record import SourceError
@@ -76,6 +76,7 @@ def test_giant_source_is_not_even_read() -> None:
     assert "larger than 2 MiB" in error(b"#" * (MAX_BYTES + 1)).message
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=300))
 def test_no_bytes_raise(data: bytes) -> None:
     assert isinstance(parse(data, "node.py"), (ast.Module, SourceError))

@@ -1,0 +1,62 @@
+"""Random values of a scenario, drawn from its seed, and what stands for them."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+from grader.assignment.model import Scenario
+from grader.assignment.quantity import parse_any
+from grader.errors import UsageError
+from grader.nearest import did_you_mean
+
+_DECIMALS = 3
+
+
+def draw_values(scenario: Scenario, seed: int) -> dict[str, float]:
+    """Draw the random values of a scenario.
+
+    Args:
+        scenario: With its ``random``.
+        seed: The same seed gives the same values, whatever else the scenario names.
+
+    Returns:
+        Values by name in SI units, rounded to three decimals.
+    """
+    return {
+        name: round(random.Random(f"{seed}/{name}").uniform(bounds.low, bounds.high), _DECIMALS)
+        for name, bounds in scenario.random.items()
+    }
+
+
+def world_values(scenario: Scenario, values: dict[str, float]) -> dict[str, str]:
+    """The values as a world file wants them: with their unit."""
+    return {
+        name: f"{value!r} {scenario.random[name].unit}".strip() for name, value in values.items()
+    }
+
+
+def fill_in(value: Any, values: dict[str, float]) -> Any:
+    """A launch parameter with ``$name`` and quantities replaced by numbers in SI units.
+
+    Args:
+        value: As in YAML: ``$goal_x``, ``170 deg``, a number, any other text, or a list.
+        values: Random values by name.
+
+    Raises:
+        UsageError: There is no random value of that name.
+    """
+    if isinstance(value, list):
+        return [fill_in(item, values) for item in value]
+    if not isinstance(value, str):
+        return value
+    if value.startswith("$"):
+        name = value[1:]
+        if name not in values:
+            raise UsageError(f"there is no random value {name!r}." + did_you_mean(name, values))
+        return values[name]
+    try:
+        number, unit = parse_any(value)
+    except ValueError:
+        return value
+    return number if unit else value

@@ -1,0 +1,170 @@
+"""The simulated robot of a cell: runs the simulator and keeps its ground truth.
+
+The truth comes from the simulator's memory and never from a topic that a student could fake.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from pathlib import Path
+
+from rclpy.node import Node
+
+from grader.assignment.source import read_source
+from grader.recording.model import NS, Incident, Scene, Truth
+from grader.run.order import SimulatorOrder
+from sim.description import SimulatorOptions
+from sim.motion import Pose
+from sim.node import RosSimulator
+from sim.pacing import Lateness
+from sim.simulation import Simulation, Step, make_simulation
+from sim.world import World, read_world
+
+_REST_M_S = 1e-3
+_REST_RAD_S = 1e-3
+# Drifting odometry and noise never move the robot; this is motion that somebody commanded.
+_MOVED_M = 1e-3
+_MOVED_RAD = 1e-2
+_PLACES_PER_S = 10
+
+
+class SimulatedRobot:
+    """A robot in its world, driven by what the student publishes."""
+
+    def __init__(self, node: Node, order: SimulatorOrder) -> None:
+        """Create its topics; simulated time does not run yet.
+
+        Args:
+            node: The probe's node.
+            order: World, options and seed.
+
+        Raises:
+            AssignmentError: World or options are wrong.
+        """
+        options = SimulatorOptions.model_validate_json(order.options)
+        self._world = _read_world(order)
+        self._simulation: Simulation = make_simulation(self._world, options, order.seed)
+        self._ros = RosSimulator(node, self._simulation, options, self)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
+        self._start = self._simulation.pose
+        self._truth: list[Truth] = []
+        self._incidents: list[Incident] = []
+        self._stamp_ns = 0
+        self._began_ns = 0
+        self._way_m = 0.0
+        self._has_moved = False
+        self._rest_since_ns = 0
+        self._contact_ns: int | None = None
+
+    def start(self) -> None:
+        """Let simulated time run, in a thread of its own."""
+        if not self._thread.is_alive():
+            self._thread.start()
+
+    def stop(self) -> None:
+        """Stop simulated time; the truth ends here."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    @property
+    def truth(self) -> tuple[Truth, ...]:
+        """Every step so far."""
+        return tuple(self._truth)
+
+    @property
+    def incidents(self) -> tuple[Incident, ...]:
+        """What was noted so far."""
+        return tuple(self._incidents)
+
+    @property
+    def travelled_m(self) -> float:
+        """Way along the path so far."""
+        return self._way_m
+
+    @property
+    def at_rest_s(self) -> float:
+        """Simulated seconds at rest since it last moved; 0 while it moves or has never moved."""
+        return (self._stamp_ns - self._rest_since_ns) / NS if self._rest_since_ns else 0.0
+
+    @property
+    def in_contact_s(self) -> float:
+        """Simulated seconds since the first contact; 0 before."""
+        return 0.0 if self._contact_ns is None else (self._stamp_ns - self._contact_ns) / NS
+
+    def scene(self) -> Scene:
+        """World and robot, with the places of all that moves until now."""
+        robot = self._simulation.robot.model
+        steps = 1 + self._simulation.time_ns * _PLACES_PER_S // NS
+        times = [number * NS // _PLACES_PER_S for number in range(steps)]
+        return Scene(
+            radius_m=robot.radius_m,
+            max_linear_m_s=robot.limits.speed_m_s,
+            max_angular_rad_s=robot.limits.angular_speed_rad_s,
+            outlines={shape.label: tuple(shape.capsules) for shape in self._world.shapes},
+            moving={
+                obstacle.label: (
+                    obstacle.reach_m,
+                    tuple(_place(obstacle.pose_at(time)) for time in times),
+                )
+                for obstacle in self._world.moving
+            },
+            began_ns=self._began_ns,
+        )
+
+    def on_step(self, step: Step, stamp_ns: int) -> None:
+        """Keep the truth; called by the simulator."""
+        if not self._began_ns:
+            self._began_ns = stamp_ns - step.time_ns
+        self._follow(step, stamp_ns)
+        self._stamp_ns = stamp_ns
+        self._truth.append(
+            Truth(
+                time_ns=stamp_ns,
+                x_m=step.pose.x_m,
+                y_m=step.pose.y_m,
+                yaw_rad=step.pose.yaw_rad,
+                linear_m_s=step.twist.linear_m_s,
+                angular_rad_s=step.twist.angular_rad_s,
+                command_m_s=step.command.linear_m_s,
+                command_rad_s=step.command.angular_rad_s,
+                contact=step.contact,
+            )
+        )
+        for event in step.events:
+            self._incidents.append(Incident(stamp_ns, event.kind.value, event.text))
+
+    def on_late(self, lateness: Lateness) -> None:
+        """Note steps that the host did not let us do in time; called by the simulator."""
+        late_ms = lateness.late_ns / 1e6
+        text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
+        self._incidents.append(Incident(self._stamp_ns, "late", text))
+
+    def _follow(self, step: Step, stamp_ns: int) -> None:
+        if self._truth:
+            before = self._truth[-1]
+            self._way_m += math.hypot(step.pose.x_m - before.x_m, step.pose.y_m - before.y_m)
+        turned_rad = abs(math.remainder(step.pose.yaw_rad - self._start.yaw_rad, math.tau))
+        self._has_moved |= self._way_m > _MOVED_M or turned_rad > _MOVED_RAD
+        resting = (
+            abs(step.twist.linear_m_s) < _REST_M_S and abs(step.twist.angular_rad_s) < _REST_RAD_S
+        )
+        if not resting or not self._has_moved:
+            self._rest_since_ns = 0
+        elif not self._rest_since_ns:
+            self._rest_since_ns = stamp_ns
+        if step.contact is not None and self._contact_ns is None:
+            self._contact_ns = stamp_ns
+
+
+def _read_world(order: SimulatorOrder) -> World:
+    """Read the world; a scenario may have random values that its world does not use."""
+    file = Path(order.world)
+    used = read_source(file).data.get("values", {})
+    return read_world(file, {name: v for name, v in order.values.items() if name in used})
+
+
+def _place(pose: Pose | None) -> tuple[float, float, float] | None:
+    return None if pose is None else (pose.x_m, pose.y_m, pose.yaw_rad)
