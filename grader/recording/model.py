@@ -6,6 +6,7 @@ cell, the clock that DDS stamps messages with. Names are fully qualified (``/bot
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -406,11 +407,14 @@ class Recording:
         The sum of the student's waits for a CPU and the worst lateness of the metronome, over
         all samples that overlap the interval.
         """
-        waited = late = 0
-        previous_ns = self.launched_ns
-        for sample in self.disturbance:
-            if sample.time_ns >= begin_ns and previous_ns <= end_ns:
-                waited += sample.waited_ns
-                late = max(late, sample.late_ns)
-            previous_ns = sample.time_ns
+        # The first sample after the beginning covers it; the first after the end is the last.
+        first = bisect_left(self.disturbance, begin_ns, key=_time_ns)
+        last = bisect_left(self.disturbance, end_ns, key=_time_ns)
+        samples = self.disturbance[first : last + 1]
+        waited = sum(sample.waited_ns for sample in samples)
+        late = max((sample.late_ns for sample in samples), default=0)
         return (waited + late) / NS
+
+
+def _time_ns(sample: Disturbance) -> int:
+    return sample.time_ns

@@ -22,6 +22,8 @@ from grader.recording.model import Call, Endpoint, Kind, Owner
 from grader.run.order import Limits, Topic
 
 NAME = "rosgrade_probe"
+# One lost answer must not end the observation, and a blocked node must not be flooded.
+_MOST_UNANSWERED = 5
 _LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
 
 
@@ -131,7 +133,7 @@ class Probe:
         self._subscribe(topic, "best_effort", "volatile")
 
     def call_list_parameters(self, node: str) -> None:
-        """Call a node's parameter service, unless its last call is still unanswered."""
+        """Call a node's parameter service, unless several calls are still unanswered."""
         from rcl_interfaces.srv import ListParameters
 
         service = f"{node}/list_parameters"
@@ -139,7 +141,8 @@ class Probe:
             self._clients[service] = self.node.create_client(ListParameters, service)
             self._calls[service] = []
         client, calls = self._clients[service], self._calls[service]
-        if (calls and calls[-1].answered_ns is None) or not client.service_is_ready():
+        unanswered = sum(call.answered_ns is None for call in calls)
+        if unanswered >= _MOST_UNANSWERED or not client.service_is_ready():
             return
         pending = _Pending(time.time_ns(), None)
         pending.future = client.call_async(ListParameters.Request())

@@ -47,7 +47,7 @@ def lesson(folder: Path, old: str = "", new: str = "") -> Path:
         ("/cmd_vel", "cmd_vel", 10, "is relative: write the full name, '/cmd_vel'"),
     ],
 )
-def test_a_mistake_in_the_yaml_is_named_with_its_line(  # noqa: PLR0913
+def test_a_mistake_in_the_yaml_is_named_with_its_line(
     rosgrade: Rosgrade, tmp_path: Path, old: str, new: str, line: int, said: str
 ) -> None:
     place = lesson(tmp_path, old, new)
