@@ -18,6 +18,7 @@ from grader.cli import (
     doctor,
     regrade,
     selftest,
+    sim,
 )
 from grader.cli.console import print_error
 from grader.errors import GraderFault, RosgradeError
@@ -60,6 +61,7 @@ app.command("selftest")(selftest.selftest)
 app.command("validate")(catalogue.validate)
 app.command("schema")(catalogue.schema)
 app.command("checks")(catalogue.checks)
+app.command("sim")(sim.sim)
 app.command("doctor")(doctor.doctor)
 
 

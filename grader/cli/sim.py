@@ -1,0 +1,40 @@
+"""``rosgrade sim``: the simulator alone, for a student to drive against."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def sim(
+    world: Annotated[Path, typer.Argument(help="World file (YAML).")],
+    robot: Annotated[str | None, typer.Option(help="burger or waffle.")] = None,
+    pose: Annotated[str | None, typer.Option(help="Start, such as '1, 0.5, 90 deg'.")] = None,
+    options: Annotated[
+        Path | None, typer.Option(help="YAML with robot, lidar, odometry and topics.")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Of noise and drift.")] = 0,
+    domain_id: Annotated[
+        int | None, typer.Option(help="ROS domain; by default ROS_DOMAIN_ID.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="End after so many simulated seconds.")
+    ] = None,
+) -> None:
+    """Simulate a robot in a world in real time, with a live view, until Ctrl-C.
+
+    It listens to /cmd_vel and speaks on /odom and /scan, like a TurtleBot3 in Gazebo.
+    """
+    from sim.live import run
+
+    run(
+        world,
+        options_file=options,
+        robot=robot,
+        pose=pose,
+        seed=seed,
+        domain_id=domain_id,
+        duration_s=duration,
+    )
