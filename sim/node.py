@@ -6,8 +6,9 @@ there is something to publish. Steps between two messages are invisible, so they
 together with the next visible one; commands are put into the step at which they arrived, by
 the time at which the middleware received them. The result is that of doing every step at its
 time, for a third of the CPU time (a process that wakes up finds its caches cold, and that
-costs more than the physics). So a moment in which the host is busy delays messages, which is
-reported, but does not change where the robot is.
+costs more than the physics). So a moment in which this loop is held up delays messages, which
+is reported, but does not change where the robot is. A command acts from the first step that
+begins after it arrived.
 """
 
 from __future__ import annotations

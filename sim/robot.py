@@ -19,9 +19,10 @@ Sources of the figures:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from sim.motion import REST, Pose, Twist, integrate
+from sim.description import RobotOptions
+from sim.motion import NS, REST, Pose, Twist, integrate
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +62,21 @@ class RobotModel:
 BURGER = RobotModel("burger", Limits(0.22, 2.84, 1.0, 3.2), 0.10, 0.160)
 WAFFLE = RobotModel("waffle", Limits(0.26, 1.82, 1.0, 3.2), 0.22, 0.287)
 MODELS = {model.name: model for model in (BURGER, WAFFLE)}
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot and where it starts.
+
+    Attributes:
+        model: Its limits and measures.
+        start: Where it starts, at rest, in the world's frame.
+        command_timeout_ns: It stops when no command came for so long, or None.
+    """
+
+    model: RobotModel
+    start: Pose
+    command_timeout_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +137,20 @@ def step(state: State, command: Twist, dt_s: float, limits: Limits) -> State:
     if twist == REST and state.twist == REST:
         return state
     return State(integrate(state.pose, twist.linear_m_s, twist.angular_rad_s, dt_s), twist)
+
+
+def make_robot(options: RobotOptions, start: Pose) -> Robot:
+    """The robot that the YAML describes, at a start pose."""
+    model = MODELS[options.model]
+    limits = Limits(
+        options.max_speed or model.limits.speed_m_s,
+        options.max_angular_speed or model.limits.angular_speed_rad_s,
+        options.max_acceleration or model.limits.acceleration_m_s2,
+        options.max_angular_acceleration or model.limits.angular_acceleration_rad_s2,
+    )
+    model = replace(model, limits=limits, radius_m=options.radius or model.radius_m)
+    timeout_s = options.command_timeout
+    return Robot(model, start, None if timeout_s is None else round(timeout_s * NS))
 
 
 def _approach(now: float, wanted: float, limit: float, change: float) -> float:

@@ -5,17 +5,17 @@ The same world, options, seed and commands give the same steps, bit by bit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
 
 from sim.contact import ContactFinder
-from sim.description import LidarOptions, OdometryOptions, RobotOptions, SimulatorOptions
+from sim.description import LidarOptions, OdometryOptions, SimulatorOptions
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, REST, Pose, Twist, integrate
 from sim.odometry import OdometrySample, WheelOdometry
-from sim.robot import MODELS, Limits, RobotModel, State, velocity
+from sim.robot import Robot, State, make_robot, velocity
 from sim.schedule import Schedule
 from sim.world import World
 
@@ -73,21 +73,6 @@ class Step:
     events: tuple[Event, ...] = ()
     scan: Scan | None = None
     odometry: OdometrySample | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Robot:
-    """The robot of a simulation.
-
-    Attributes:
-        model: Its limits and measures.
-        start: Where it starts, at rest, in the world's frame.
-        command_timeout_ns: It stops when no command came for so long, or None.
-    """
-
-    model: RobotModel
-    start: Pose
-    command_timeout_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,20 +235,6 @@ def make_simulation(world: World, options: SimulatorOptions, seed: int = 0) -> S
     robot = make_robot(options.robot, options.start(world.start))
     world.check_start(robot.start, robot.model.radius_m)
     return Simulation(world, robot, Sensors(options.lidar, options.odometry), seed)
-
-
-def make_robot(options: RobotOptions, start: Pose) -> Robot:
-    """The robot that the YAML describes, at a start pose."""
-    model = MODELS[options.model]
-    limits = Limits(
-        options.max_speed or model.limits.speed_m_s,
-        options.max_angular_speed or model.limits.angular_speed_rad_s,
-        options.max_acceleration or model.limits.acceleration_m_s2,
-        options.max_angular_acceleration or model.limits.angular_acceleration_rad_s2,
-    )
-    model = replace(model, limits=limits, radius_m=options.radius or model.radius_m)
-    timeout_s = options.command_timeout
-    return Robot(model, start, None if timeout_s is None else round(timeout_s * NS))
 
 
 def _schedule(options: LidarOptions | OdometryOptions) -> Schedule | None:

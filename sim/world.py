@@ -23,23 +23,19 @@ The frame is fixed, x and y in metres, yaw counter-clockwise (REP-103). A world 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field, model_validator
-
 from grader.assignment.document import Place
-from grader.assignment.quantity import Angle, DurationOrZero
-from grader.assignment.source import Model, Source, parse_source, read_source
+from grader.assignment.source import Source, parse_source, read_source
 from grader.errors import AssignmentError, Problem
 from grader.nearest import did_you_mean
-from sim.coordinates import Ends, Point, PoseInPlane, PoseOrPoint, PositiveMetres, Rectangle, Size
-from sim.motion import NS, ORIGIN, Pose, wrap_angle
-from sim.script import MAX_SPEED_M_S, MovingObstacle, Waypoint
+from sim.motion import ORIGIN, Pose
+from sim.script import MovingObstacle
 from sim.shapes import Shape, box, circle, polygon, wall
+from sim.world_model import WorldModel
 
 MAX_SEGMENTS = 5_000
 MAX_MOVING = 100
@@ -124,113 +120,6 @@ class World:
         problem = self.obstruction(pose, radius_m)
         if problem is not None:
             raise AssignmentError(self.file, [problem])
-
-
-class BoxModel(Model):
-    """A filled rectangle."""
-
-    centre: Point = Field(description="Where its middle is.")
-    size: Size = Field(description="Length (along x at yaw 0) and width.")
-    yaw: Angle = Field(0.0, description="Counter-clockwise turn.")
-
-
-class CircleModel(Model):
-    """A round pillar."""
-
-    centre: Point = Field(description="Where its middle is.")
-    radius: PositiveMetres = Field(description="Its radius.")
-
-
-class PolygonModel(Model):
-    """A filled polygon."""
-
-    points: tuple[Point, ...] = Field(
-        min_length=3, description="Corners in order; the last is joined to the first."
-    )
-
-
-class RoundModel(Model):
-    """The outline of a moving pillar."""
-
-    radius: PositiveMetres = Field(description="Its radius.")
-
-
-class CornerModel(Model):
-    """The outline of a moving box."""
-
-    size: Size = Field(description="Length (along x at yaw 0) and width.")
-
-
-class WaypointModel(Model):
-    """A place at a time."""
-
-    at: DurationOrZero = Field(description="Simulated time since the start.")
-    pose: PoseOrPoint = Field(description="Where it is then; yaw may be left out.")
-
-
-class MovingModel(Model):
-    """An obstacle that follows timed waypoints in straight lines, or just appears."""
-
-    circle: RoundModel | None = Field(None, description="It is a pillar.")
-    box: CornerModel | None = Field(None, description="It is a box.")
-    path: tuple[WaypointModel, ...] = Field(min_length=1, description="Where it is when.")
-    appears: DurationOrZero = Field(0.0, description="It is there from this time on.")
-    disappears: DurationOrZero | None = Field(None, description="It is gone from this time on.")
-    repeat: bool = Field(False, description="Whether the path starts over at its end.")
-
-    @model_validator(mode="after")
-    def _consistent(self) -> MovingModel:
-        if (self.circle is None) == (self.box is None):
-            raise ValueError("give either 'circle' or 'box'")
-        if self.disappears is not None and self.disappears <= self.appears:
-            raise ValueError("it disappears before it appears")
-        obstacle = self.obstacle("")
-        for index, (before, after) in enumerate(
-            zip(obstacle.path, obstacle.path[1:], strict=False)
-        ):
-            duration_s = (after.at_ns - before.at_ns) / NS
-            if duration_s <= 0.0:
-                raise ValueError(f"path[{index + 1}] is not later than path[{index}]")
-            a, b = before.pose, after.pose
-            way_m = math.hypot(b.x_m - a.x_m, b.y_m - a.y_m)
-            way_m += abs(wrap_angle(b.yaw_rad - a.yaw_rad)) * obstacle.reach_m
-            if way_m > MAX_SPEED_M_S * duration_s:
-                raise ValueError(
-                    f"from path[{index}] to path[{index + 1}] it moves at "
-                    f"{way_m / duration_s:.3g} m/s: at most {MAX_SPEED_M_S:g} m/s are simulated"
-                )
-        if self.repeat and obstacle.path[0].pose != obstacle.path[-1].pose:
-            raise ValueError("to repeat, the last waypoint must be where the first one is")
-        return self
-
-    def obstacle(self, label: str, line: int | None = None) -> MovingObstacle:
-        """What the simulation computes with."""
-        return MovingObstacle(
-            label=label,
-            path=tuple(Waypoint(_ns(point.at), point.pose) for point in self.path),
-            radius_m=self.circle.radius if self.circle else None,
-            size_m=self.box.size if self.box else None,
-            appears_ns=_ns(self.appears),
-            disappears_ns=None if self.disappears is None else _ns(self.disappears),
-            repeat=self.repeat,
-            line=line,
-        )
-
-
-class WorldModel(Model):
-    """A world file."""
-
-    bounds: Rectangle | None = Field(None, description="A wall around everything.")
-    start: PoseInPlane = Field(ORIGIN, description="Where the robot starts if nobody says else.")
-    values: dict[str, int | float | str] = Field(
-        default_factory=dict,
-        description="What `$name` stands for in this file; a scenario may give other values.",
-    )
-    segments: tuple[Ends, ...] = Field((), description="Straight walls without thickness.")
-    boxes: tuple[BoxModel, ...] = Field((), description="Filled rectangles.")
-    circles: tuple[CircleModel, ...] = Field((), description="Round pillars.")
-    polygons: tuple[PolygonModel, ...] = Field((), description="Filled polygons.")
-    moving: tuple[MovingModel, ...] = Field((), description="Obstacles on scripts.")
 
 
 def read_world(file: Path, values: Values | None = None) -> World:
@@ -342,7 +231,3 @@ def _with_values(source: Source, given: Values) -> Source:
     if problems:
         raise AssignmentError(source.file, problems)
     return replace(source, data=data)
-
-
-def _ns(seconds: float) -> int:
-    return round(seconds * NS)

@@ -130,7 +130,7 @@ def _rows(result: CheckResult, item: ScenarioFinding) -> Iterator[tuple[str, str
     for place in finding.evidence.places:
         yield "where", one_line(str(place))
     if finding.evidence.log:
-        yield "printed", "\n".join(finding.evidence.log[:_LOG_LINES])
+        yield "printed", "\n".join(finding.evidence.log[-_LOG_LINES:])
 
 
 def _conclude(console: Console, grade: Grade) -> None:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from sim.contact import RESOLUTION_M, TOUCH_M, ContactFinder
 from sim.motion import Pose, Twist, integrate
-from sim.robot import BURGER
+from sim.robot import BURGER, Robot
 from sim.shapes import Shape, box, circle, wall
-from sim.simulation import Robot, Sensors, Simulation, Step
+from sim.simulation import Sensors, Simulation, Step
 from sim.world import World, parse_world
 
 RADIUS_M = 0.1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import pty
 import re
@@ -18,17 +17,11 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from rich.console import Console
-
 from grader.errors import UsageError
 from grader.run.domain import lock_domain
 from sim.__main__ import main
-from sim.description import SimulatorOptions
-from sim.live import Screen, parse_pose
-from sim.motion import Pose, Twist
-from sim.pacing import Lateness
-from sim.simulation import make_simulation
-from sim.world import read_world
+from sim.live import parse_pose
+from sim.motion import Pose
 
 pytestmark = [
     pytest.mark.ros,
@@ -137,32 +130,3 @@ def test_a_pose_may_have_units() -> None:
     assert parse_pose("[0, 0, 1 rad]") == Pose(0.0, 0.0, 1.0)
     with pytest.raises(UsageError, match="--pose: yaw: '90' has no unit"):
         parse_pose("0, 0, 90")
-
-
-def test_the_screen_shows_everything() -> None:
-    world, options = read_world(WORLDS / "wall.yaml", {"wall_x": 0.3}), SimulatorOptions()
-    simulation = make_simulation(world, options)
-    screen = Screen(world, simulation, options)
-    console = Console(
-        file=io.StringIO(), width=80, height=30, force_terminal=True, color_system=None
-    )
-    console.print(screen.picture(console))  # before the first step
-    assert screen.line() == "starting"
-    for index in range(300):
-        screen.on_step(simulation.advance(Twist(0.2, 0.0) if index == 0 else None), 0)
-    screen.on_late(Lateness(7, 3, 40_000_000))
-    line = screen.line()
-    assert "3.00 s  x +0.200 m" in line
-    assert line.endswith("ahead -inf m  CONTACT with segments[0]  3 steps late")
-    with console.capture() as capture:
-        console.print(screen.picture(console))
-    text = capture.get()
-    for part in (
-        "wall.yaml, burger",
-        "x +0.200 m",
-        "+0.200 m/s",
-        "segments[0]",
-        "at most 40 ms",
-        "→",
-    ):
-        assert part in text

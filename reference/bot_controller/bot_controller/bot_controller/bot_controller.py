@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import rclpy
 from geometry_msgs.msg import Twist
 from rclpy.executors import ExternalShutdownException
@@ -32,8 +30,8 @@ class BotController(Node):
         self.last_scan = self.get_clock().now()
         front = scan.ranges[0]
         # A beam that met nothing reports inf, on the real LDS-01 0.0: neither is an obstacle.
-        measured = math.isfinite(front) and front > 0.0
-        if measured and front <= STOP_DISTANCE_M:
+        # Nearer than range_min it reports -inf (REP-117), and that is one.
+        if front != 0.0 and front <= STOP_DISTANCE_M:
             self.drive(0.0)
         else:
             self.drive(SPEED_M_S)
