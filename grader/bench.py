@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 from typing import TypeVar
@@ -27,13 +29,16 @@ from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, Grading
 from grader.grade import grade
 from grader.recording.mcap_reader import read_recording
-from grader.recording.model import NS
+from grader.recording.model import NS, Recording
 from grader.report.facts import Clock
 from grader.report.files import write_whole
+from grader.run.domain import lock_domain
 from grader.run.runner import Runner
 from grader.submission.prepare import prepare
 
 ASSIGNMENT = "timed_publisher"
+ROBOT_ASSIGNMENTS = ("bot_controller", "p_controller")
+SEGMENTS = (10, 100, 1000)
 OUTPUT = Path("rosgrade-bench.json")
 T = TypeVar("T")
 
@@ -76,10 +81,13 @@ def main() -> int:
             _whole(samples, Path(name), "warm")
         for _ in range(3):
             _whole(samples, Path(name), "cold")
+        _simulator(samples)
+        for robot_assignment in ROBOT_ASSIGNMENTS:
+            _robot(samples, robot_assignment, Path(name))
     summary = samples.summary()
-    print(f"{'figure (s)':<44} {'min':>7} {'median':>7} {'max':>7}")
+    print(f"{'figure (s, or a ratio)':<56} {'min':>9} {'median':>9} {'max':>9}")
     for figure, row in summary.items():
-        print(f"{figure:<44} {row['min']:>7.3f} {row['median']:>7.3f} {row['max']:>7.3f}")
+        print(f"{figure:<56} {row['min']:>9.6f} {row['median']:>9.6f} {row['max']:>9.6f}")
     write_whole(OUTPUT, json.dumps({"runs": options.runs, "figures": summary}, indent=2) + "\n")
     print(f"written to {OUTPUT}")
     return 0
@@ -107,6 +115,43 @@ def _parts(samples: Samples, folder: Path) -> None:
         samples.add("observe: first match to SIGINT", (recording.stop_ns - matched_ns) / NS)
         samples.add("stop: SIGINT to the end", (recording.end_ns - recording.stop_ns) / NS)
     samples.timed("report", lambda: write_graded(graded, folder / "report", Clock()))
+
+
+def _simulator(samples: Samples) -> None:
+    """What a step and a scan cost, and the share of a core at real time."""
+    from sim.benchmark import scan_s, share_of_core, step_s
+
+    for _ in range(3):
+        for segments in SEGMENTS:
+            samples.add(f"simulator: a step, {segments} segments", step_s(segments))
+            samples.add(f"simulator: a scan of 360 beams, {segments} segments", scan_s(segments))
+        with lock_domain() as domain:
+            share = share_of_core(100, domain_id=domain.domain_id)
+        samples.add("simulator: share of a core at real time, 100 segments", share)
+
+
+def _robot(samples: Samples, name: str, folder: Path) -> None:
+    """Wall time of a robot assignment against the least time that its physics needs."""
+    loaded = load_assignment(name)
+    prepared = prepare(reference_of(name), ros.find(), cache=folder / "robot-cache")
+    for _ in range(3):
+        grading = Grading(loaded, Runner(ros.find()), folder / "robot-cache")
+        began_s = time.monotonic()
+        graded = grading.grade_prepared(prepared, folder / name)
+        samples.add(f"{name}: wall, all scenarios at once", time.monotonic() - began_s)
+        least_s = max(_least_s(recording) for recording in graded.recordings.values())
+        samples.add(f"{name}: least time of the longest scenario", least_s)
+
+
+def _least_s(recording: Recording) -> float:
+    """Time for the way and the turns of a run at the greatest speeds that it reached."""
+    way_m = turn_rad = 0.0
+    for before, after in pairwise(recording.truth):
+        way_m += math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
+        turn_rad += abs(math.remainder(after.yaw_rad - before.yaw_rad, math.tau))
+    speed = max((abs(truth.linear_m_s) for truth in recording.truth), default=0.0)
+    turn = max((abs(truth.angular_rad_s) for truth in recording.truth), default=0.0)
+    return max(way_m / speed if speed else 0.0, turn_rad / turn if turn else 0.0)
 
 
 def _whole(samples: Samples, folder: Path, build: str) -> None:

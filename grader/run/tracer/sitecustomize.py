@@ -90,10 +90,16 @@ def _endpoint(kind: str, node: Any, endpoint: Any) -> None:
     )
 
 
-def _hold(publisher: Any) -> None:
-    """Wait until somebody is matched with a publisher that the probe listens to."""
-    if publisher.topic_name not in _HELD_TOPICS:
+def _hold(node: Any, publisher: Any) -> None:
+    """Wait until somebody is matched with a publisher that the probe listens to.
+
+    Only with a node's first one on the topic: a node that makes a new publisher for every
+    message loses them, and that is for the judge to see.
+    """
+    key = (_full_name(node), publisher.topic_name)
+    if publisher.topic_name not in _HELD_TOPICS or key in _held:
         return
+    _held.add(key)
     import time
 
     began = time.monotonic()
@@ -111,6 +117,7 @@ def _hold(publisher: Any) -> None:
 
 
 _publishers: list[Any] = []
+_held: set[tuple[str, str]] = set()
 _nodes: list[bool] = []
 
 
@@ -161,7 +168,7 @@ def _patch_node(module: Any) -> None:
 
     def published(node: Any, publisher: Any) -> None:
         _endpoint("publisher", node, publisher)
-        _hold(publisher)
+        _hold(node, publisher)
 
     def timer_made(node: Any, timer: Any) -> None:
         _report(
