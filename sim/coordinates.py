@@ -21,6 +21,10 @@ MAX_COORDINATE_M = 10_000.0
 """Beyond it double precision no longer resolves a contact to a nanometre."""
 
 
+MIN_SIZE_M = 1e-6
+"""What is smaller is a mistake, and its direction cannot be computed."""
+
+
 def metres(value: Any) -> float:
     """Read a length: a bare number is metres.
 
@@ -66,8 +70,8 @@ class Metres:
                 number = metres(value)
             except ValueError as error:
                 raise _wrong(str(error)) from None
-            if self.positive and number <= 0.0:
-                raise _wrong(f"{value!r} is too small: it must be more than 0")
+            if self.positive and number < MIN_SIZE_M:
+                raise _wrong(_too_small(value, number))
             return number
 
         return core_schema.no_info_plain_validator_function(read)
@@ -144,9 +148,14 @@ class Entries:
             number = metres(item)
         except ValueError as error:
             raise _wrong(f"{name}: {error}") from None
-        if self.positive and number <= 0.0:
-            raise _wrong(f"{name}: {item!r} is too small: it must be more than 0")
+        if self.positive and number < MIN_SIZE_M:
+            raise _wrong(f"{name}: {_too_small(item, number)}")
         return number
+
+
+def _too_small(item: Any, number: float) -> str:
+    least = "more than 0" if number <= 0.0 else f"at least {MIN_SIZE_M:g} m"
+    return f"{item!r} is too small: it must be {least}"
 
 
 def _angle(item: Any) -> float:

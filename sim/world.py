@@ -23,6 +23,7 @@ The frame is fixed, x and y in metres, yaw counter-clockwise (REP-103). A world 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,6 +33,7 @@ from grader.assignment.document import Place
 from grader.assignment.source import Source, parse_source, read_source
 from grader.errors import AssignmentError, Problem
 from grader.nearest import did_you_mean
+from sim.coordinates import MIN_SIZE_M
 from sim.motion import ORIGIN, Pose
 from sim.script import MovingObstacle
 from sim.shapes import Shape, box, circle, polygon, wall
@@ -181,7 +183,7 @@ def _shapes(model: WorldModel, source: Source, problems: list[Problem]) -> tuple
         outline = polygon("bounds", corners, source.line(("bounds",)))
         found.append(replace(outline, corners=()))
     for i, (x1, y1, x2, y2) in enumerate(model.segments):
-        if x1 == x2 and y1 == y2:
+        if math.hypot(x2 - x1, y2 - y1) < MIN_SIZE_M:
             problems.append(source.problem(("segments", i), "both ends are the same point"))
         found.append(wall(f"segments[{i}]", x1, y1, x2, y2, source.line(("segments", i))))
     for i, item in enumerate(model.boxes):
@@ -194,7 +196,7 @@ def _shapes(model: WorldModel, source: Source, problems: list[Problem]) -> tuple
         for j, (a, b) in enumerate(
             zip(area.points, area.points[1:] + area.points[:1], strict=True)
         ):
-            if a == b:
+            if math.dist(a, b) < MIN_SIZE_M:
                 text = "this corner is the same point as the next"
                 problems.append(source.problem(("polygons", i, "points", j), text))
         found.append(polygon(f"polygons[{i}]", area.points, source.line(("polygons", i))))

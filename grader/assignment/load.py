@@ -9,7 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from grader import resources
-from grader.assignment import rules
+from grader.assignment import rules, simulation
 from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.draft import Draft
 from grader.assignment.model import Assignment, Scenario
@@ -116,6 +116,8 @@ def load_assignment(
     assignment, found = source.examine(Assignment)
     checks, more = _fit(source, catalogue)
     found += [problem for problem in more if problem not in found]
+    if assignment is not None and not found:
+        found += simulation.problems(source, assignment)
     if assignment is None or found:
         raise AssignmentError(file, sorted(found, key=lambda problem: problem.line or 0))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)

@@ -74,6 +74,10 @@ class RandomRange(Model):
         return {"low": low, "high": high, "unit": unit}
 
 
+ODOMETRY = "nav_msgs/msg/Odometry"
+LASER_SCAN = "sensor_msgs/msg/LaserScan"
+
+
 class Visibility(str, Enum):
     """When a student gets to see a check."""
 
@@ -207,6 +211,18 @@ class Scenario(Model):
         description="How long the node may take to end after SIGINT before it gets SIGTERM.",
         validate_default=False,
     )
+
+    @property
+    def recorded_types(self) -> dict[str, str]:
+        """Topic -> type of all that is recorded: `record`, and the simulated robot's topics."""
+        found = {one.topic: one.type for one in self.record}
+        if self.world is not None:
+            found.setdefault(self.topics.command.topic, self.topics.command.type)
+            if self.odometry.enabled:
+                found[self.topics.odometry.topic] = ODOMETRY
+            if self.lidar.enabled:
+                found[self.topics.scan.topic] = LASER_SCAN
+        return found
 
 
 class CheckSpec(Model):

@@ -184,7 +184,7 @@ def _topic(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
         # What a student subscribes to is there to be sent by us, not to be recorded.
         return
     for scenario in draft.scenarios_of(bound.spec) or ():
-        recorded = {one.topic: one.type for one in scenario.record}
+        recorded = scenario.recorded_types
         if topic not in recorded:
             advice = did_you_mean(topic, recorded)
             listed = f" It records: {', '.join(recorded) or 'nothing'}."

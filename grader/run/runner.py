@@ -84,14 +84,15 @@ def _topics(scenario: Scenario) -> tuple[Topic, ...]:
         found.setdefault(
             command.topic, Topic(command.topic, command.type, "reliable", "volatile", 100)
         )
-        sensors = (
-            (scenario.odometry.enabled, scenario.topics.odometry, "nav_msgs/msg/Odometry"),
-            (scenario.lidar.enabled, scenario.topics.scan, "sensor_msgs/msg/LaserScan"),
-        )
-        for enabled, options, kind in sensors:
-            if enabled:
+        for options in (scenario.topics.odometry, scenario.topics.scan):
+            if options.topic in scenario.recorded_types:
                 found[options.topic] = Topic(
-                    options.topic, kind, options.reliability, options.durability, 100, ours=True
+                    options.topic,
+                    scenario.recorded_types[options.topic],
+                    options.reliability,
+                    options.durability,
+                    100,
+                    ours=True,
                 )
     return tuple(found.values())
 

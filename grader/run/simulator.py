@@ -11,7 +11,7 @@ from pathlib import Path
 
 from rclpy.node import Node
 
-from grader.assignment.source import read_source
+from grader.assignment.simulation import read_scenario_world
 from grader.recording.model import NS, Incident, Scene, Truth
 from grader.run.order import SimulatorOrder
 from sim.description import SimulatorOptions
@@ -19,7 +19,6 @@ from sim.motion import Pose
 from sim.node import RosSimulator
 from sim.pacing import Lateness
 from sim.simulation import Simulation, Step, make_simulation
-from sim.world import World, read_world
 
 _REST_M_S = 1e-3
 _REST_RAD_S = 1e-3
@@ -43,7 +42,7 @@ class SimulatedRobot:
             AssignmentError: World or options are wrong.
         """
         options = SimulatorOptions.model_validate_json(order.options)
-        self._world = _read_world(order)
+        self._world = read_scenario_world(Path(order.world), order.values)
         self._simulation: Simulation = make_simulation(self._world, options, order.seed)
         self._ros = RosSimulator(node, self._simulation, options, self)
         self._stop = threading.Event()
@@ -157,13 +156,6 @@ class SimulatedRobot:
             self._rest_since_ns = stamp_ns
         if step.contact is not None and self._contact_ns is None:
             self._contact_ns = stamp_ns
-
-
-def _read_world(order: SimulatorOrder) -> World:
-    """Read the world; a scenario may have random values that its world does not use."""
-    file = Path(order.world)
-    used = read_source(file).data.get("values", {})
-    return read_world(file, {name: v for name, v in order.values.items() if name in used})
 
 
 def _place(pose: Pose | None) -> tuple[float, float, float] | None:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from uuid import uuid4
 
 import pytest
 
@@ -184,13 +185,13 @@ def test_a_node_that_ignores_signals_is_stopped_in_steps(
 
 
 def test_a_child_that_leaves_the_session_is_killed_and_named(run_node: RunNode) -> None:
+    marker = f"time.sleep(86399)  # {uuid4()}"
     spawn = (
-        "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(86399)'],"
-        " start_new_session=True)"
+        f"subprocess.Popen([sys.executable, '-c', 'import time; {marker}'], start_new_session=True)"
     )
     recording = run_node(nodes.timed(before_spin=spawn))
-    assert any("86399" in command for command in recording.processes[0].survivors)
-    assert not is_running("sleep(86399)")
+    assert any(marker in command for command in recording.processes[0].survivors)
+    assert not is_running(marker)
 
 
 def test_a_foreign_node_ends_the_run_as_our_fault_by_name(run_node: RunNode) -> None:

@@ -69,6 +69,11 @@ topics:
     assert options.topics.command.type.endswith("TwistStamped")
 
 
+def test_options_survive_being_written_and_read() -> None:
+    options = read("robot: {pose: [1, 2, 90 deg], max_speed: 1 m/s}\nlidar: {noise: 1 cm}")
+    assert SimulatorOptions.model_validate_json(options.model_dump_json()) == options
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -76,6 +76,12 @@ WALKER = "moving:\n  - circle: {radius: 0.1}\n    path:\n"
             r"w.yaml:2: segments\[0\]: expected \[x1, y1, x2, y2\]: 4 ent",
         ),
         ("segments:\n  - [0, 0, 0, 0]", r"w.yaml:2: segments\[0\]: both ends are the same point"),
+        ("segments:\n  - [0, 0, 0, 1e-300]", r"segments\[0\]: both ends are the same point"),
+        ("boxes: [{centre: [0, 0], size: [1, 1 nm]}]", r"boxes\[0\].size: width: unknown unit"),
+        (
+            "boxes: [{centre: [0, 0], size: [1, 1e-9]}]",
+            r"width: 1e-09 is too small: it must be at l",
+        ),
         ("segments:\n  - [0, .nan, 1, 1]", r"w.yaml:2: segments\[0\]: y1: nan is not finite"),
         ("segments:\n  - [0, .inf, 1, 1]", r"w.yaml:2: segments\[0\]: y1: inf is not finite"),
         ("segments:\n  - [0, 0, true, 1]", r"w.yaml:2: segments\[0\]: x2: expected a length"),

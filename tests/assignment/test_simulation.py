@@ -1,0 +1,135 @@
+"""Scenarios with a simulated robot: what can be caught without running is caught."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.drawing import draw_values, fill_in
+from grader.assignment.load import load_assignment
+from grader.assignment.model import Scenario
+from grader.errors import AssignmentError, UsageError
+
+YAML = """\
+rosgrade: 1
+id: lesson
+title: Test
+packages: [{name: bot, executables: [bot]}]
+scenarios:
+  - id: run
+    world: world.yaml
+    random: {x: [1 m, 2 m]}
+    launch: [{executable: bot, parameters: {goal: $x}}]
+    timeout: 5 s
+checks:
+  - {id: alive, uses: node.alive, points: 1}
+  - {id: sent, uses: messages.count, with: {topic: /cmd_vel, at_least: 1}, points: 1}
+"""
+WORLD = "values: {x: 1}\nsegments:\n  - [$x, -1, $x, 1]\n"
+
+
+def lesson(folder: Path, yaml: str = YAML, world: str | None = WORLD) -> Path:
+    place = folder / "lesson"
+    place.mkdir()
+    (place / "assignment.yaml").write_text(yaml, encoding="utf-8")
+    if world is not None:
+        (place / "world.yaml").write_text(world, encoding="utf-8")
+    return place
+
+
+def refused(folder: Path, yaml: str = YAML, world: str | None = WORLD) -> str:
+    with pytest.raises(AssignmentError) as caught:
+        load_assignment(lesson(folder, yaml, world))
+    return str(caught.value)
+
+
+def test_the_topics_of_the_robot_are_recorded_without_being_named(tmp_path: Path) -> None:
+    loaded = load_assignment(lesson(tmp_path))
+    assert loaded.assignment.scenarios[0].recorded_types == {
+        "/cmd_vel": "geometry_msgs/msg/Twist",
+        "/odom": "nav_msgs/msg/Odometry",
+        "/scan": "sensor_msgs/msg/LaserScan",
+    }
+
+
+def test_a_world_that_is_not_there_is_named_with_the_line_of_the_scenario(tmp_path: Path) -> None:
+    told = refused(tmp_path, world=None)
+    assert "assignment.yaml:7: scenarios[0].world: " in told
+    assert "world.yaml: No such file" in told
+
+
+def test_a_mistake_in_the_world_is_named_with_its_own_line(tmp_path: Path) -> None:
+    told = refused(tmp_path, world="values: {x: 1}\ncircles:\n  - {centre: [1, 1], radius: -1 m}\n")
+    assert "world.yaml:3: circles[0].radius" in told
+
+
+def test_a_robot_that_may_start_inside_a_wall_is_refused(tmp_path: Path) -> None:
+    yaml = YAML.replace("[1 m, 2 m]", "[-1 m, 1 m]").replace("x: [", "x: [", 1)
+    world = "values: {x: 1}\nboxes:\n  - {centre: [$x, 0], size: [1, 1]}\n"
+    told = refused(tmp_path, yaml, world)
+    assert "a robot with radius 0.1 m cannot be at (0, 0)" in told
+    assert "with x = " in told
+
+
+def test_a_parameter_with_an_unknown_value_names_the_nearest(tmp_path: Path) -> None:
+    told = refused(tmp_path, YAML.replace("goal: $x", "goal: $xx").replace("{x: [", "{xxx: ["))
+    assert "assignment.yaml:9: " in told
+    assert "there is no random value 'xx'. Did you mean 'xxx'?" in told
+
+
+def a_scenario(**changes: object) -> Scenario:
+    return Scenario.model_validate(
+        {"id": "run", "launch": [{"executable": "bot"}], "timeout": "5 s", **changes}
+    )
+
+
+def test_values_are_drawn_from_the_seed_and_within_bounds() -> None:
+    scenario = a_scenario(random={"x": ["-2 m", "2 m"], "turn": ["10 deg", "20 deg"]})
+    drawn = [draw_values(scenario, seed) for seed in range(200)]
+    assert drawn == [draw_values(scenario, seed) for seed in range(200)]
+    assert all(-2.0 <= values["x"] <= 2.0 for values in drawn)
+    assert all(0.174 <= values["turn"] <= 0.35 for values in drawn)
+    assert len({values["x"] for values in drawn}) > 150
+
+
+def test_another_random_value_does_not_change_the_first() -> None:
+    one = a_scenario(random={"x": [0, 1]})
+    two = a_scenario(random={"y": [0, 1], "x": [0, 1]})
+    assert draw_values(one, 5)["x"] == draw_values(two, 5)["x"]
+
+
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("$x", 1.5),
+        ("180 deg", pytest.approx(3.14159, abs=1e-4)),
+        ("20 cm", pytest.approx(0.2)),
+        ("burger", "burger"),
+        ("3 apples", "3 apples"),
+        ("1.5", "1.5"),
+        (True, True),
+        ([1, "$x"], [1, 1.5]),
+    ],
+)
+def test_parameters_are_filled_in(written: object, value: object) -> None:
+    assert fill_in(written, {"x": 1.5}) == value
+
+
+def test_a_value_that_was_not_drawn_is_refused() -> None:
+    with pytest.raises(UsageError, match="there is no random value 'y'"):
+        fill_in("$y", {"x": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("bounds", "said"),
+    [
+        (["1 m", "2 deg"], "have different units"),
+        (["2 m", "1 m"], "is above the highest"),
+        (["1 m"], "written as"),
+        (["1 furlong", "2 furlong"], "unknown unit 'furlong'"),
+    ],
+)
+def test_bounds_that_make_no_sense_are_refused(bounds: list[str], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        a_scenario(random={"x": bounds})
