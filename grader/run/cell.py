@@ -25,8 +25,10 @@ from grader.recording.model import NS, Ending, Owner, Recording, Wait
 from grader.run.descendants import become_subreaper, kill_descendants
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.domain import lock_domain
-from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder, Until
+from grader.run.ending import EndingConditions
+from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 from grader.run.output import OutputReader
+from grader.run.stopwatch import Stopwatch
 from grader.run.student import StudentProcesses
 from grader.submission.record import SubmissionRecord
 
@@ -39,31 +41,12 @@ _TICK_S = 0.02
 _CALM_TICK_S = 0.1
 _GRAPH_PERIOD_S = 0.1
 _PIPES_LIMIT_S = 1.0
-_LONGEST_STRETCH = 8.0
 # A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
 _SET_UP_S = 0.5
-_AFTER_CONTACT_S = 1.0
 
 
 class Abandoned(Exception):
     """Whoever ordered the run is gone."""
-
-
-class Stopwatch:
-    """Time since its start, less what the host took from us meanwhile."""
-
-    def __init__(self, meter: DisturbanceMeter) -> None:
-        """Start now."""
-        self._meter = meter
-        self.start_ns = time.time_ns()
-        self._wall_s = time.monotonic()
-        self._taken_s = meter.taken_s
-
-    @property
-    def elapsed_s(self) -> float:
-        """Undisturbed seconds; at least an eighth of the wall time, so that every wait ends."""
-        wall_s = time.monotonic() - self._wall_s
-        return max(wall_s - (self._meter.taken_s - self._taken_s), wall_s / _LONGEST_STRETCH)
 
 
 def tell(event: str, **data: Any) -> None:
@@ -92,6 +75,7 @@ class Cell:
             from grader.run.simulator import SimulatedRobot
 
             self._robot = SimulatedRobot(probe.node, order.simulator)
+        self._ending = EndingConditions(probe, self._output, self._robot)
         self._waits: list[Wait] = []
         self._faults: list[str] = []
         self._next_graph = 0.0
@@ -241,7 +225,7 @@ class Cell:
             self._match()
             if self._faults:
                 return Ending.FAULT
-            if self._until_met(self._order.until, watch) or self._is_over():
+            if self._ending.met(self._order.until, watch) or self._ending.is_over():
                 return Ending.UNTIL
             if not self._students.poll():
                 return self._last_messages(watch)
@@ -258,43 +242,8 @@ class Cell:
         for late in self._ticks():
             if late.elapsed_s > 2 * _GRAPH_PERIOD_S:
                 break
-        met = self._until_met(self._order.until, watch)
+        met = self._ending.met(self._order.until, watch)
         return Ending.UNTIL if met else Ending.EXITED
-
-    def _is_over(self) -> bool:
-        """Whether the robot has touched something: no verdict can change any more."""
-        return self._robot is not None and self._robot.in_contact_s > _AFTER_CONTACT_S
-
-    def _until_met(self, until: Until, watch: Stopwatch) -> bool:
-        conditions = []
-        if until.messages is not None:
-            conditions.append(all(n >= until.messages for n in self._probe.counts.values()))
-        if until.quiet_s is not None:
-            conditions.append(self._quiet_s(watch) >= self._longest_silence_s(until.quiet_s))
-        if until.elapsed_s is not None:
-            conditions.append(watch.elapsed_s >= until.elapsed_s)
-        if until.at_rest_s is not None and self._robot is not None:
-            conditions.append(self._robot.at_rest_s >= until.at_rest_s)
-        if until.travelled_m is not None and self._robot is not None:
-            conditions.append(self._robot.travelled_m >= until.travelled_m)
-        if until.any:
-            conditions.append(any(self._until_met(item, watch) for item in until.any))
-        return bool(conditions) and all(conditions)
-
-    def _quiet_s(self, watch: Stopwatch) -> float:
-        last_ns = self._probe.last_message_ns
-        if last_ns is None:
-            return watch.elapsed_s
-        return min(watch.elapsed_s, (time.time_ns() - last_ns) / NS)
-
-    def _longest_silence_s(self, quiet_s: float) -> float:
-        """How long silence must last: a timer that has not fired yet may still publish."""
-        periods = [
-            float(item.data["period_s"])
-            for item in self._output.declarations
-            if item.kind == "timer" and isinstance(item.data.get("period_s"), int | float)
-        ]
-        return max([quiet_s, *(1.2 * period + 0.2 for period in periods)])
 
     def _wait(self, what: str, limit_s: float) -> Iterator[Stopwatch]:
         """Tick until the caller leaves the loop; the wait is recorded either way."""

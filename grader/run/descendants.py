@@ -80,7 +80,8 @@ def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:
     killed: dict[int, str] = {}
     deadline = time.monotonic() + limit_s
     while (alive := descendants(of)) and time.monotonic() < deadline:
-        killed.update(alive)
+        # One that is dying has lost its command line: the first look counts.
+        killed = {**alive, **killed}
         for number in (signal.SIGSTOP, signal.SIGKILL):
             for pid in alive:
                 try:
