@@ -5,7 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType, ModuleType
 
-from grader.checks import dependency, executor, messages, node, package, qos, timing, topic
+from grader.checks import (
+    contact,
+    dependency,
+    drive,
+    executor,
+    goal,
+    limits,
+    log,
+    messages,
+    node,
+    package,
+    proportional,
+    qos,
+    stop,
+    timing,
+    topic,
+    turning,
+    untouched,
+)
 from grader.checks.check import Check
 from grader.nearest import did_you_mean
 
@@ -18,6 +36,15 @@ FAMILIES: tuple[ModuleType, ...] = (
     messages,
     timing,
     executor,
+    log,
+    drive,
+    stop,
+    contact,
+    goal,
+    turning,
+    proportional,
+    limits,
+    untouched,
 )
 
 

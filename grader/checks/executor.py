@@ -11,6 +11,7 @@ from grader.assignment.quantity import Duration, Ratio, format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
+from grader.checks.concerned import concerned_nodes
 from grader.checks.death import cause_of_death, dead, ended_early
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Finding, Moment, Plot
@@ -33,7 +34,9 @@ class Responsive(Parameters):
         "one may be late, unless it is 100 %.",
     )
     node: Annotated[str, AfterValidator(node_name)] | None = Field(
-        None, description="Name of the node; by default every node of the student."
+        None,
+        description="Name of the node; by default every node of the student that has an endpoint "
+        "on a recorded topic, or every node if none has.",
     )
 
     @field_validator("share")
@@ -86,7 +89,8 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
         missing = why_no_node(recording)
     if missing is not None:
         return missing.finding(expected)
-    names = [parameters.node] if parameters.node else [n.name for n in recording.student_nodes]
+    nodes = concerned_nodes(recording) or recording.student_nodes
+    names = [parameters.node] if parameters.node else [node.name for node in nodes]
     groups = [_answers(recording, name, parameters) for name in dict.fromkeys(names)]
     groups = [group for group in groups if group.judged]
     if not groups:

@@ -10,6 +10,7 @@ from grader.assignment.quantity import Duration, format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import NoParameters, Parameters, Subject, check
+from grader.checks.concerned import concerned_nodes
 from grader.checks.death import cause_of_death, dead, ended_early
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.node_absence import why_no_node, why_not_node
@@ -88,7 +89,8 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
     """The node stays alive until it is asked to end.
 
     Judged by the process, which must still run when the observation ends, and by the ROS
-    graph, which must not have lost the node before.
+    graph, which must not have lost the node before. Of several nodes those count that have an
+    endpoint on a topic that is recorded; a helper node may come and go.
 
     Explains an exception (with the line in your file), a crash with its signal, and a main()
     that returned, such as one that does not call rclpy.spin.
@@ -121,15 +123,21 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
 
 
 def _gone(recording: Recording, name: str | None) -> Node | None:
-    """A node that vanished early and gave no sign of life after."""
-    for node in recording.student_nodes:
-        if name not in (None, node.name):
-            continue
-        if node.vanished_ns is None or node.vanished_ns >= recording.stop_ns:
-            continue
-        if not _lives_after(recording, node.name, node.vanished_ns):
-            return node
-    return None
+    """A node that the scenario is about, and that vanished early without a sign of life after."""
+    if name is not None:
+        nodes = tuple(node for node in recording.student_nodes if node.name == name)
+        return next((node for node in nodes if _vanished(recording, node)), None)
+    concerned = concerned_nodes(recording)
+    nodes = concerned or recording.student_nodes
+    gone = [node for node in nodes if _vanished(recording, node)]
+    # Of nodes that the scenario is not about, one is as good as another.
+    return gone[0] if gone and (concerned or len(gone) == len(nodes)) else None
+
+
+def _vanished(recording: Recording, node: Node) -> bool:
+    if node.vanished_ns is None or node.vanished_ns >= recording.stop_ns:
+        return False
+    return not _lives_after(recording, node.name, node.vanished_ns)
 
 
 def _lives_after(recording: Recording, name: str, time_ns: int) -> bool:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from grader.checks.cause import Cause
 from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
+from grader.submission.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 
 _LOG_LINES = 15
@@ -85,12 +87,21 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
     aborted = {found[1] for found in _ABORTED.finditer(_clean(build))}
     others = [other for other in build.failed_packages if other not in {name, *aborted}]
     if name not in aborted or not others:
-        return _failed(build, name)
+        return _failed(_own(submission, build, name), name)
     return Cause(
         f"it was not built, because {codes(others)} failed to build",
         f"Mend {codes(others)} first: `colcon build --packages-select {others[0]}`.",
         _evidence(build, others[0]),
     )
+
+
+def _own(submission: SubmissionRecord, build: BuildRecord, name: str) -> BuildRecord:
+    """The build without the culprit, if that only kept another package from being built."""
+    folder = existing_package(submission, name).path
+    if build.culprit is None or is_within(build.culprit.file, folder):
+        return build
+    was_started = f"Starting >>> {name}" in _clean(build).splitlines()
+    return replace(build, culprit=None) if was_started else build
 
 
 def _failed(build: BuildRecord, name: str) -> Cause:

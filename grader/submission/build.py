@@ -12,7 +12,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -28,11 +28,12 @@ from grader.submission.members import MIB
 from grader.submission.record import BuildRecord
 from grader.submission.rosdistro import PACKAGES
 
-VERSION = 1
+VERSION = 2
 """Raise it when the same submission would now be built differently."""
 
 _CMAKE_INCLUDE = Path(__file__).with_name("wheels.cmake")
 _PROGRESS = re.compile(r"(Starting >>>|Finished <<<) (\S+)")
+_STOPPED = "Exception in job execution"
 _UNSAID = "colcon could not build this package; the log says why"
 _COMPILE_S = 60.0
 _LEAST_FREE_BYTES = 64 * MIB
@@ -148,22 +149,7 @@ class _Workshop:
         scratch.mkdir()
         environment = self._environment(scratch)
         finished: set[str] = set()
-
-        def on_line(line: str) -> None:
-            match = _PROGRESS.match(line)
-            if match and match[1].startswith("Finished"):
-                finished.add(match[2])
-            elif match:
-                self.on_progress(f"building {match[2]}")
-
-        outcome = run_bounded(
-            self._command(environment, scratch, install),
-            cwd=scratch,
-            environment=environment,
-            wall_s=self.wall_s,
-            output=self.limits.output,
-            on_line=on_line,
-        )
+        outcome = self._colcon_build(environment, scratch, install, finished)
         self._check_machine(outcome, scratch, install)
         problem = tidy(
             install, most_bytes=self.limits.install_bytes, most_files=self.limits.install_files
@@ -176,6 +162,43 @@ class _Workshop:
             # colcon writes its own setup files first.
             shutil.rmtree(install, ignore_errors=True)
         return record
+
+    def _colcon_build(
+        self, environment: Mapping[str, str], scratch: Path, install: Path, finished: set[str]
+    ) -> Outcome:
+        """Build what can be built; the names of the packages are added to ``finished``."""
+        started: set[str] = set()
+
+        def on_line(line: str) -> None:
+            match = _PROGRESS.match(line)
+            if match and match[1].startswith("Finished"):
+                finished.add(match[2])
+            elif match:
+                started.add(match[2])
+                self.on_progress(f"building {match[2]}")
+
+        failed: set[str] = set()
+        outcomes: list[Outcome] = []
+        while True:
+            command = self._command(environment, scratch, install)
+            if failed:
+                command += ["--packages-skip", *sorted(failed | finished)]
+                command += ["--packages-skip-by-dep", *sorted(failed)]
+            outcome = run_bounded(
+                command,
+                cwd=scratch,
+                environment=environment,
+                wall_s=self.wall_s - sum(item.duration_s for item in outcomes),
+                output=self.limits.output,
+                on_line=on_line,
+            )
+            outcomes.append(outcome)
+            # Where setup.py raises before anything is built, colcon's executor stops with the
+            # exception, whatever --continue-on-error says; the others are still to be built.
+            stopped = not outcome.ended_by_us and _STOPPED in outcome.output
+            if not stopped or started - finished <= failed:
+                return _together(outcomes)
+            failed = started - finished
 
     def _environment(self, scratch: Path) -> dict[str, str]:
         environment = self.ros.environment(self.environ)
@@ -260,6 +283,17 @@ class _Workshop:
         if folders:
             command = [str(self.ros.python), "-I", "-S", "-m", "compileall", "-qq", *folders]
             run_bounded(command, cwd=scratch, environment=environment, wall_s=_COMPILE_S)
+
+
+def _together(outcomes: Sequence[Outcome]) -> Outcome:
+    """One outcome of several commands: it succeeded if all did."""
+    last = outcomes[-1]
+    return Outcome(
+        status=next((item.status for item in outcomes if item.status), last.status),
+        ended_by_us=last.ended_by_us,
+        output="".join(item.output for item in outcomes),
+        duration_s=sum(item.duration_s for item in outcomes),
+    )
 
 
 def _colcon(ros: RosInstallation, path: str) -> list[str]:

@@ -7,8 +7,9 @@ All times are seconds since launch. ``recording()`` is a run of a good timed pub
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from grader.checks.catalogue import get
@@ -20,6 +21,7 @@ from grader.recording.model import (
     Disturbance,
     Ending,
     Endpoint,
+    Incident,
     Kind,
     LogLine,
     Message,
@@ -28,6 +30,8 @@ from grader.recording.model import (
     Process,
     Qos,
     Recording,
+    Scene,
+    Truth,
 )
 from grader.submission.record import (
     BuildRecord,
@@ -36,6 +40,12 @@ from grader.submission.record import (
     PackageRecord,
     SubmissionRecord,
 )
+from sim.description import SimulatorOptions
+from sim.lidar import Scan
+from sim.motion import Pose, Twist
+from sim.odometry import OdometrySample
+from sim.simulation import Simulation, make_simulation
+from sim.world import parse_world
 
 LAUNCH_NS = 1_700_000_000 * NS
 FIRST_S = 0.7
@@ -320,3 +330,213 @@ def nodeless(**changes: Any) -> Recording:
         "declarations": (declared("started"),),
     }
     return silent(**{**defaults, **changes})
+
+
+# --- Runs with a simulated robot -----------------------------------------------------------
+
+BEGAN_S = 0.5
+DELAY_S = 0.001
+ODOMETRY = "nav_msgs/msg/Odometry"
+SCAN = "sensor_msgs/msg/LaserScan"
+
+
+@dataclass(frozen=True)
+class Senses:
+    """What a controller knows: simulated time, and the newest of each sensor or None."""
+
+    time_s: float
+    odometry: OdometrySample | None
+    scan: Scan | None
+    new_odometry: bool
+    new_scan: bool
+
+
+Controller = Callable[[Senses], tuple[float, float] | None]
+"""Called after every step of 10 ms; returns a command (linear, angular), or None for none."""
+
+
+def on_odometry(law: Callable[[Pose], tuple[float, float]]) -> Controller:
+    """A controller that works in the odometry callback."""
+
+    def control(senses: Senses) -> tuple[float, float] | None:
+        if not senses.new_odometry or senses.odometry is None:
+            return None
+        return law(senses.odometry.pose)
+
+    return control
+
+
+def on_timer(period_s: float, law: Callable[[Pose], tuple[float, float]]) -> Controller:
+    """A controller that works in a timer, with the newest odometry."""
+    ticks = [1]
+
+    def control(senses: Senses) -> tuple[float, float] | None:
+        if senses.odometry is None or senses.time_s < ticks[0] * period_s:
+            return None
+        ticks[0] += 1
+        return law(senses.odometry.pose)
+
+    return control
+
+
+def on_scan(law: Callable[[list[float]], tuple[float, float]]) -> Controller:
+    """A controller that works in the scan callback."""
+
+    def control(senses: Senses) -> tuple[float, float] | None:
+        if not senses.new_scan or senses.scan is None:
+            return None
+        return law([float(item) for item in senses.scan.ranges_m])
+
+    return control
+
+
+def drive(
+    controller: Controller,
+    *,
+    world: str = "{}",
+    seconds: float = 10.0,
+    rest_s: float | None = 1.0,
+    options: Mapping[str, Any] | None = None,
+    **changes: Any,
+) -> Recording:
+    """Let a controller drive the simulated robot, and record it as a cell would.
+
+    Args:
+        controller: Who drives. Its commands arrive 1 ms after the data they were made from.
+        world: The world's YAML.
+        seconds: Simulated time at most.
+        rest_s: The run ends when the robot has moved and been at rest for so long, or None.
+        options: ``robot``, ``lidar`` and ``odometry`` as in YAML.
+        changes: Fields of the recording to replace.
+    """
+    place = parse_world(world)
+    simulation = make_simulation(
+        place, SimulatorOptions.model_validate(dict(options or {})), seed=1
+    )
+    truth: list[Truth] = []
+    incidents: list[Incident] = []
+    found: dict[str, list[Message]] = {"/cmd_vel": [], "/odom": [], "/scan": []}
+    command: Twist | None = None
+    odometry, scan, moved, rested = None, None, False, 0
+    for _ in range(round(seconds * 100)):
+        step = simulation.advance(command)
+        command = None
+        time_s = BEGAN_S + step.time_ns / NS
+        pose, velocity = step.pose, step.twist
+        truth.append(
+            Truth(
+                at(time_s), pose.x_m, pose.y_m, pose.yaw_rad, velocity.linear_m_s,
+                velocity.angular_rad_s, step.command.linear_m_s, step.command.angular_rad_s,
+                step.contact,
+            )
+        )  # fmt: skip
+        incidents += [Incident(at(time_s), event.kind.value, event.text) for event in step.events]
+        if step.odometry is not None:
+            odometry = step.odometry
+            _record(found["/odom"], "/odom", ODOMETRY, time_s, _odometry_value(odometry, time_s))
+        if step.scan is not None:
+            scan = step.scan
+            _record(found["/scan"], "/scan", SCAN, time_s, _scan_value(simulation, scan))
+        said = controller(
+            Senses(
+                step.time_ns / NS, odometry, scan, step.odometry is not None, step.scan is not None
+            )
+        )
+        if said is not None:
+            command = Twist(*said)
+            value = twist((said[0], 0, 0), (0, 0, said[1]))
+            _record(found["/cmd_vel"], "/cmd_vel", TWIST, time_s + DELAY_S, value)
+        resting = abs(velocity.linear_m_s) < 1e-3 and abs(velocity.angular_rad_s) < 1e-3
+        moved |= not resting
+        rested = rested + 1 if moved and resting else 0
+        if rest_s is not None and rested >= rest_s * 100:
+            break
+    return simulated(
+        truth,
+        scene_of(simulation),
+        incidents=tuple(incidents),
+        messages={topic: tuple(items) for topic, items in found.items() if items},
+        **changes,
+    )
+
+
+def simulated(truth: Sequence[Truth], scene: Scene, **changes: Any) -> Recording:
+    """A healthy run with a simulated robot that ended with its last step."""
+    end_s = (truth[-1].time_ns - LAUNCH_NS) / NS
+    defaults: dict[str, Any] = {
+        "truth": tuple(truth),
+        "scene": scene,
+        "stop_s": end_s,
+        "end_s": end_s + 0.1,
+        "matched_s": BEGAN_S,
+        "processes": (process(exited_s=end_s + 0.1),),
+        "messages": {},
+        "calls": (),
+    }
+    return recording(**{**defaults, **changes})
+
+
+def scene_of(simulation: Simulation) -> Scene:
+    """World and robot as a cell records them."""
+    model = simulation.robot.model
+    times = range(0, simulation.time_ns + 1, NS // 10)
+    return Scene(
+        radius_m=model.radius_m,
+        max_linear_m_s=model.limits.speed_m_s,
+        max_angular_rad_s=model.limits.angular_speed_rad_s,
+        outlines={shape.label: tuple(shape.capsules) for shape in simulation.world.shapes},
+        moving={
+            item.label: (
+                item.reach_m,
+                tuple(
+                    None if (pose := item.pose_at(time)) is None
+                    else (pose.x_m, pose.y_m, pose.yaw_rad)
+                    for time in times
+                ),
+            )
+            for item in simulation.world.moving
+        },
+        began_ns=at(BEGAN_S),
+    )  # fmt: skip
+
+
+def _record(
+    found: list[Message], topic: str, type: str, time_s: float, value: Mapping[str, Any]
+) -> None:
+    found.append(message(time_s, value, sequence=len(found) + 1, topic=topic, type=type))
+
+
+def _stamp(time_s: float) -> dict[str, int]:
+    sec, nanosec = divmod(at(time_s), NS)
+    return {"sec": sec, "nanosec": nanosec}
+
+
+def _odometry_value(sample: OdometrySample, time_s: float) -> dict[str, Any]:
+    pose = sample.pose
+    return {
+        "header": {"stamp": _stamp(time_s), "frame_id": "odom"},
+        "child_frame_id": "base_footprint",
+        "pose": {
+            "pose": {
+                "position": {"x": pose.x_m, "y": pose.y_m, "z": 0.0},
+                "orientation": {
+                    "x": 0.0,
+                    "y": 0.0,
+                    "z": math.sin(0.5 * pose.yaw_rad),
+                    "w": math.cos(0.5 * pose.yaw_rad),
+                },
+            }
+        },
+    }
+
+
+def _scan_value(simulation: Simulation, scan: Scan) -> dict[str, Any]:
+    lidar = simulation.lidar
+    return {
+        "angle_min": lidar.angle_min_rad,
+        "angle_max": lidar.angle_max_rad,
+        "angle_increment": lidar.angle_increment_rad,
+        "range_min": lidar.options.range_min,
+        "range_max": lidar.options.range_max,
+        "ranges": [float(item) for item in scan.ranges_m],
+    }

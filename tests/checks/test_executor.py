@@ -62,6 +62,14 @@ class TestGood:
         assert finding.status is Status.PASSED
         assert "the process declared a timer and that its executor spins" in finding.observed
 
+    def test_a_second_node_that_nobody_spins_and_that_is_not_on_the_topic(self):
+        settings = "/settings"
+        run = recording(
+            nodes=(node(), node(settings)),
+            calls=(*calls(), *(call(t, None, of=settings) for t in (1.0, 1.5, 2.0, 2.5))),
+        )
+        assert responsive(run).status is Status.PASSED
+
     def test_a_node_that_publishes_nothing_is_judged_from_its_appearance(self):
         run = recording(messages={}, endpoints=(reader(),))
         assert responsive(run).status is Status.PASSED
@@ -108,15 +116,25 @@ class TestBlocked:
         run = recording(calls=(call(1.0, None),))
         assert responsive(run).status is Status.FAILED
 
-    def test_every_node_counts_unless_one_is_named(self):
+    def test_every_node_on_the_topic_counts_unless_one_is_named(self):
         twin = "/twin"
         run = recording(
             nodes=(node(), node(twin)),
-            endpoints=(endpoint(), reader()),
+            endpoints=(endpoint(), endpoint(node=twin), reader()),
             calls=(*calls(), *(call(t, None, of=twin) for t in (1.0, 1.5, 2.0, 2.5))),
         )
         assert "`/twin` answered 0 of 4" in failing("executor.responsive", run)
         assert responsive(run, node="bot_publisher").status is Status.PASSED
+
+    def test_every_node_counts_if_none_is_on_the_topic(self):
+        twin = "/twin"
+        run = recording(
+            messages={},
+            nodes=(node(), node(twin)),
+            endpoints=(endpoint("/elsewhere"), reader()),
+            calls=(*calls(), *(call(t, None, of=twin) for t in (1.0, 1.5, 2.0, 2.5))),
+        )
+        assert "`/twin` answered 0 of 4" in failing("executor.responsive", run)
 
     def test_no_node(self):
         run = nodeless(processes=(died(-11),), ending=Ending.EXITED)

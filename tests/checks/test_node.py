@@ -245,6 +245,21 @@ class TestAlive:
         run = recording(nodes=(node(vanished_s=1.5),), messages=messages(every(0.3, 2)), calls=())
         assert "left the ROS graph 1.50 s after launch" in failing("node.alive", run, name=NODE)
 
+    def test_a_helper_node_that_was_destroyed_is_not_the_node(self):
+        helper = node("/settings", appeared_s=0.2, vanished_s=0.9)
+        run = recording(nodes=(helper, node()))
+        assert judge("node.alive", run).status is Status.PASSED
+        mute = recording(nodes=(helper, node()), endpoints=(reader(),), messages={})
+        assert judge("node.alive", mute).status is Status.PASSED
+
+    def test_a_publisher_that_was_destroyed_while_a_helper_node_lives(self):
+        run = recording(
+            nodes=(node(vanished_s=1.5), node("/settings")),
+            messages=messages(every(0.3, 2)),
+            calls=(),
+        )
+        assert "`/bot_publisher` left the ROS graph 1.50 s" in failing("node.alive", run)
+
     def test_a_graph_that_lost_a_working_node_for_a_moment_proves_nothing(self):
         lost = (node(vanished_s=1.5),)
         assert judge("node.alive", recording(nodes=lost)).status is Status.PASSED

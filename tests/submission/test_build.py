@@ -200,6 +200,29 @@ def test_a_bad_e_mail_is_told_and_does_not_hide_other_packages(
     assert package_of(found, "other").executables == ("other",)
 
 
+def test_a_setup_py_that_raises_does_not_keep_others_from_being_built(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    tree.package()
+    for name in ("aaa_notes", "zzz_notes"):
+        broken = {
+            "package.xml": MANIFEST.replace("bot_publisher", name),
+            "setup.py": "raise RuntimeError('not finished')\n",
+            "resource/bot_publisher": None,
+        }
+        tree.package(broken, folder=f"src/{name}")
+    waiting = {
+        "package.xml": MANIFEST.replace("bot_publisher", "waiting").replace("rclpy", "aaa_notes"),
+        "setup.py": SETUP_PY.replace("'bot_publisher'", "'waiting'"),
+    }
+    tree.package(dict(waiting), folder="src/waiting")
+    found = prepared(tree, real_ros)
+    build = build_of(found)
+    assert build.failed_packages == ("aaa_notes", "waiting", "zzz_notes")
+    assert str(build.culprit) == "src/aaa_notes/setup.py:1: RuntimeError: not finished"
+    assert package_of(found).executables == ("bot_pub",)
+
+
 DAEMON = """
 import os, sys, time
 if 'install' in sys.argv and os.fork() == 0:

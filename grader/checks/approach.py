@@ -1,0 +1,298 @@
+"""The way to a goal pose: errors, arrival, and why it was not reached."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from grader.assignment.quantity import format_duration
+from grader.checks.cause import Cause
+from grader.checks.contact import why_touched
+from grader.checks.finding import Evidence, Moment, Plot
+from grader.checks.immobility import why_cut_short, why_not_moved
+from grader.checks.lateness import taken_s
+from grader.checks.measure import degrees, metres, point, speed, turn
+from grader.checks.reference import Goal, UnknownValue
+from grader.checks.track import is_at_rest, over_time, turned_rad
+from grader.recording.model import NS, Ending, Recording, Truth
+from sim.motion import Pose, wrap_angle
+
+_WEAVES = 4
+
+
+@dataclass(frozen=True)
+class Approach:
+    """A run towards a goal.
+
+    Attributes:
+        recording: The run; its robot moved.
+        goal: In the world's frame.
+    """
+
+    recording: Recording
+    goal: Pose
+
+    @property
+    def truth(self) -> tuple[Truth, ...]:
+        """Every step."""
+        return self.recording.truth
+
+    def distance_m(self, step: Truth) -> float:
+        """Distance from the goal."""
+        return math.hypot(self.goal.x_m - step.x_m, self.goal.y_m - step.y_m)
+
+    def bearing_error_rad(self, step: Truth | Pose) -> float:
+        """How far the robot would have to turn to look at the goal, in [-pi, pi]."""
+        direction = math.atan2(self.goal.y_m - step.y_m, self.goal.x_m - step.x_m)
+        return wrap_angle(direction - step.yaw_rad)
+
+    def heading_error_rad(self, step: Truth | Pose) -> float:
+        """How far the robot would have to turn to the goal's heading, in [-pi, pi]."""
+        return wrap_angle(self.goal.yaw_rad - step.yaw_rad)
+
+    def arrival(self, position_m: float) -> int | None:
+        """Index of the first step within a distance of the goal, or None."""
+        return next(
+            (i for i, step in enumerate(self.truth) if self.distance_m(step) <= position_m), None
+        )
+
+    def driven(self, position_m: float) -> int | None:
+        """Index of the step after which, near the goal, nothing but turns is commanded.
+
+        Args:
+            position_m: How near the goal it must be.
+
+        Returns:
+            The step after the last one with a commanded speed, or None where speed was
+            commanded to the end or the robot was not near then.
+        """
+        index = len(self.truth)
+        while index and self.truth[index - 1].command_m_s == 0.0:
+            index -= 1
+        if index == len(self.truth) or self.distance_m(self.truth[index]) > position_m:
+            return None
+        return index
+
+    @property
+    def distance_plot(self) -> Plot:
+        """Distance from the goal over time."""
+        return over_time(self.recording, "Distance from the goal", "distance (m)", self.distance_m)
+
+    @property
+    def heading_plot(self) -> Plot:
+        """Heading error over time."""
+        return over_time(
+            self.recording,
+            "Turn to the goal's heading",
+            "heading error (°)",
+            lambda step: math.degrees(self.heading_error_rad(step)),
+        )
+
+
+def approach(recording: Recording, goal: Goal) -> Approach | Cause:
+    """What there is to judge, or why there is nothing."""
+    cause = why_not_moved(recording)
+    if cause is not None and not recording.truth:
+        return cause
+    try:
+        pose = goal.pose(recording.values)
+    except UnknownValue as error:
+        return Cause(str(error), ours=True)
+    return cause or Approach(recording, pose)
+
+
+def why_not_there(run: Approach, position_m: float) -> Cause | None:
+    """Why the robot is not at the goal's position in the end; None if it is."""
+    truth = run.truth
+    last = truth[-1]
+    left_m = run.distance_m(last)
+    if left_m <= position_m:
+        return None
+    deeper = why_cut_short(run.recording) or why_touched(run.recording)
+    if deeper is not None:
+        return deeper
+    nearest = min(range(len(truth)), key=lambda i: run.distance_m(truth[i]))
+    nearest_m = run.distance_m(truth[nearest])
+    evidence = Evidence(
+        moments=(
+            Moment("nearest to the goal", run.recording.since_launch_s(truth[nearest].time_ns)),
+        ),
+        plots=(run.distance_plot,),
+    )
+    if is_at_rest(last):
+        seen = f"came to rest at {point(last.x_m, last.y_m)}, {metres(left_m)} from the goal"
+        words, hint = _wrong_place(run, position_m) or (
+            (
+                f"it had been there, {metres(nearest_m)} near, and drove on",
+                "Compare the distance in every callback, and stop where it is small.",
+            )
+            if nearest_m <= position_m
+            else (
+                "",
+                "Is goal_x, goal_y what your node reads? The distance is "
+                "math.hypot(goal_x - x, goal_y - y).",
+            )
+        )
+        return Cause(f"{seen}: {words}" if words else seen, hint, evidence)
+    return _still_moving(run, position_m, nearest_m, evidence)
+
+
+def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: Evidence) -> Cause:
+    truth, recording = run.truth, run.recording
+    last = truth[-1]
+    left_m = run.distance_m(last)
+    lost_s = taken_s(recording, truth[0].time_ns, truth[-1].time_ns)
+    watched_s = (truth[-1].time_ns - truth[0].time_ns) / NS
+    seen = f"is still {metres(left_m)} from the goal when the observation ends"
+    if lost_s > 0.25 * watched_s and recording.ending is Ending.TIMEOUT:
+        return Cause(
+            f"{seen}; the machine took up to {format_duration(lost_s)} of "
+            f"{format_duration(watched_s)} from the run",
+            ours=True,
+            disturbed=True,
+        )
+    turns = abs(turned_rad(truth)) / math.tau
+    moving = f"at {speed(last.linear_m_s)} and {turn(last.angular_rad_s)}"
+    if turns >= 1.5:
+        return Cause(
+            f"{seen}: it turned {turns:.1f} times around",
+            "Does it turn towards the goal? The error is atan2(dy, dx) - yaw in radians, "
+            "normalised to [-pi, pi]; yaw comes from the quaternion.",
+            evidence,
+        )
+    if nearest_m <= position_m:
+        return Cause(
+            f"{seen}: it had been there, {metres(nearest_m)} near, and drove on {moving}",
+            "Stop where the distance is below your tolerance: publish linear.x = 0.0.",
+            evidence,
+        )
+    began_m = run.distance_m(truth[0])
+    if left_m > began_m:
+        return Cause(
+            f"{seen}, farther than at its start ({metres(began_m)}), {moving}",
+            "It drives away: look at the sign of the heading error and at atan2(dy, dx), which "
+            "takes y first.",
+            evidence,
+        )
+    if _weaves(run):
+        return Cause(
+            f"{seen}: it weaves from side to side, {moving}",
+            "The angular gain is too large for the delay of odometry: make it smaller.",
+            evidence,
+        )
+    return Cause(
+        f"{seen}, {moving}, after {format_duration(watched_s)}",
+        "If it is on its way, it is too slow: a larger gain, within the limits of the robot.",
+        evidence,
+    )
+
+
+def _weaves(run: Approach) -> bool:
+    """Whether the turn changes its sense again and again, with some force."""
+    left = [step.angular_rad_s > 0.0 for step in run.truth if abs(step.angular_rad_s) > 0.3]
+    return sum(a != b for a, b in pairwise(left)) >= _WEAVES
+
+
+def _wrong_place(run: Approach, position_m: float) -> tuple[str, str] | None:
+    """A classic place to go to instead of the goal."""
+    goal, last, first = run.goal, run.truth[-1], run.truth[0]
+    cos, sin = math.cos(first.yaw_rad), math.sin(first.yaw_rad)
+    frame = (
+        "that is the goal counted from where the robot started",
+        "The goal is in the frame of odometry: subtract the position that odometry reports.",
+    )
+    swapped = "x and y are swapped", "goal_x belongs to position.x; atan2 takes y first."
+    sign = "Look at the signs: dx = goal_x - x, dy = goal_y - y."
+    places: tuple[tuple[float, float, tuple[str, str]], ...] = (
+        (first.x_m + goal.x_m, first.y_m + goal.y_m, frame),
+        (
+            first.x_m + cos * goal.x_m - sin * goal.y_m,
+            first.y_m + sin * goal.x_m + cos * goal.y_m,
+            frame,
+        ),
+        (goal.y_m, goal.x_m, swapped),
+        (goal.x_m, -goal.y_m, ("that is the goal with the sign of y changed", sign)),
+        (-goal.x_m, goal.y_m, ("that is the goal with the sign of x changed", sign)),
+        (-goal.x_m, -goal.y_m, ("that is the goal with both signs changed", sign)),
+    )
+    for x_m, y_m, words in places:
+        if math.hypot(goal.x_m - x_m, goal.y_m - y_m) > 2.0 * position_m and (
+            math.hypot(last.x_m - x_m, last.y_m - y_m) <= position_m
+        ):
+            return words
+    return None
+
+
+def why_not_aligned(run: Approach, heading_rad: float) -> Cause | None:
+    """Why the robot does not look as the goal does in the end; None if it does."""
+    last = run.truth[-1]
+    off_rad = run.heading_error_rad(last)
+    if abs(off_rad) <= heading_rad:
+        return None
+    deeper = why_cut_short(run.recording) or why_touched(run.recording)
+    if deeper is not None:
+        return deeper
+    evidence = Evidence(plots=(run.heading_plot,))
+    seen = (
+        f"is at the goal's position, but looks to {degrees(last.yaw_rad)} instead of "
+        f"{degrees(run.goal.yaw_rad)}"
+    )
+    if not is_at_rest(last):
+        turns = abs(turned_rad(run.truth)) / math.tau
+        more = f", {turns:.1f} turns in all" if turns >= 1.5 else ""
+        return Cause(
+            f"{seen} and still turns at {turn(last.angular_rad_s)} when the observation ends"
+            f"{more}",
+            "Normalise the error to [-pi, pi] with atan2(sin(e), cos(e)), and make the gain "
+            "smaller if it oscillates.",
+            evidence,
+        )
+    words, hint = _wrong_heading(run, heading_rad)
+    return Cause(f"{seen}{words}", hint, evidence)
+
+
+def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
+    theta, last = run.goal.yaw_rad, run.truth[-1]
+    radians = "Angles in ROS are radians (REP-103), and so is goal_theta already."
+    headings = (
+        (math.radians(theta), ": goal_theta was taken for degrees", radians),
+        (math.degrees(theta), ": goal_theta was converted to degrees", radians),
+        (
+            -theta,
+            ": that is the goal's heading with its sign changed",
+            "Counter-clockwise is positive (REP-103): error = goal_theta - yaw.",
+        ),
+        (
+            theta + math.pi,
+            ": that is the opposite of the goal's heading",
+            "Look at how you normalise the angle, and at the arguments of atan2(y, x).",
+        ),
+        (
+            2.0 * math.asin(max(-1.0, min(1.0, theta / 2.0))),
+            ": as if z of the quaternion were the angle",
+            "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z)): z alone is the sine of half the angle.",
+        ),
+    )
+    for heading, words, hint in headings:
+        if abs(wrap_angle(heading - theta)) > 2.0 * heading_rad and (
+            abs(wrap_angle(heading - last.yaw_rad)) <= heading_rad
+        ):
+            return words, hint
+    driven = run.driven(math.inf)
+    if driven is not None and abs(turned_rad(run.truth[driven:])) < heading_rad:
+        return (
+            ": it has not turned since it arrived",
+            "After the position is reached, turn on the spot by the error goal_theta - yaw.",
+        )
+    return "", "The error is goal_theta - yaw in radians; yaw comes from the quaternion."
+
+
+def headings(truth: Sequence[Truth]) -> list[float]:
+    """Heading of every step without jumps: full turns are counted."""
+    found: list[float] = []
+    for step in truth:
+        before = found[-1] if found else step.yaw_rad
+        found.append(before + wrap_angle(step.yaw_rad - before))
+    return found

@@ -1,0 +1,101 @@
+"""Contact of the simulated robot: the check, and contact as the cause of other findings."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from grader.checks.cause import Cause
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.immobility import why_cut_short, why_not_judged, why_not_moved
+from grader.checks.measure import metres, speed, turn
+from grader.checks.node_absence import why_no_node
+from grader.checks.track import has_moved, is_at_rest, speed_plot, way_m
+from grader.checks.wording import code
+from grader.recording.model import NS, Recording, Truth
+
+_HINT = (
+    "Stop early enough: the robot needs time to see (a scan comes every 0.2 s) and to brake, and "
+    "its edge is ahead of its middle."
+)
+# Rest before something moving ran into the robot.
+_RESTED_NS = NS // 5
+
+
+class NoContact(Parameters):
+    """Parameters of motion.no_contact."""
+
+    moving: bool = Field(
+        True,
+        description="Whether the robot must also have moved: one that always stands touches "
+        "nothing.",
+    )
+
+
+@check("motion.no_contact", Subject.RECORDING, NoContact)
+def no_contact(recording: Recording, parameters: NoContact) -> Finding:
+    """The robot touches nothing.
+
+    Judged by the simulator. Something that runs into a robot at rest does not count.
+
+    Explains what was touched, when and how fast, and a process that ended while the robot was
+    driving; a robot that never moved does not pass, unless `moving` is false.
+    """
+    expected = "touches nothing"
+    cause = why_not_moved(recording) if parameters.moving else why_not_judged(recording)
+    if cause is None and not parameters.moving:
+        cause = why_no_node(recording) or (
+            None if has_moved(recording.truth) else why_cut_short(recording)
+        )
+    if cause is not None and _touch(recording) is None:
+        return cause.finding(expected)
+    touched = why_touched(recording)
+    if touched is not None:
+        cause = why_cut_short(recording)
+        return (cause.after(touched.observed) if cause else touched).finding(expected)
+    way = metres(way_m(recording.truth))
+    return Finding.passed(
+        expected, f"no contact on {way}", Evidence(plots=(speed_plot(recording),))
+    )
+
+
+def why_touched(recording: Recording) -> Cause | None:
+    """What the robot drove into, when and how fast; None if it did not."""
+    index = _touch(recording)
+    if index is None:
+        return None
+    step, before = recording.truth[index], recording.truth[max(index - 1, 0)]
+    when_s = recording.since_launch_s(step.time_ns)
+    name = step.contact or "something"
+    if abs(before.linear_m_s) < 1e-3:
+        motion = f"while turning at {turn(before.angular_rad_s)}"
+    else:
+        way = "backwards " if before.linear_m_s < 0.0 else ""
+        motion = f"{way}at {speed(abs(before.linear_m_s))}"
+    return Cause(
+        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch",
+        _HINT,
+        Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
+    )
+
+
+def _touch(recording: Recording) -> int | None:
+    """Index of the first step of a contact that is the robot's own doing."""
+    truth = recording.truth
+    before: str | None = None
+    for index, step in enumerate(truth):
+        if step.contact is not None and step.contact != before and not _was_hit(truth, index):
+            return index
+        before = step.contact
+    return None
+
+
+def _was_hit(truth: tuple[Truth, ...], index: int) -> bool:
+    """Whether something moving ran into the robot while it stood."""
+    step = truth[index]
+    if not (step.contact or "").startswith("moving") or step.command_m_s:
+        return False
+    since = index
+    while since and step.time_ns - truth[since].time_ns < _RESTED_NS:
+        since -= 1
+    return all(is_at_rest(item) for item in truth[since:index])

@@ -1,0 +1,307 @@
+"""Checks of driving ahead: the speed, the way, the direction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from statistics import median
+
+from pydantic import Field
+
+from grader.assignment.quantity import (
+    Angle,
+    AngularSpeed,
+    PositiveLength,
+    Ratio,
+    Speed,
+    format_duration,
+)
+from grader.checks.cause import Cause
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.contact import why_touched
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.ground import ahead, nearest
+from grader.checks.immobility import why_cut_short, why_not_moved
+from grader.checks.lateness import taken_s
+from grader.checks.measure import degrees, metres, speed, turn
+from grader.checks.scan import misreading
+from grader.checks.track import (
+    departure,
+    final_rest,
+    over_time,
+    speed_plot,
+    turned_rad,
+    way_m,
+)
+from grader.checks.wording import percent
+from grader.recording.model import NS, Recording, Scene, Truth
+
+_LEAST_SHARE = 0.9
+_LEAST_STEPS = 30
+# The simulated robots need a quarter of a second to their full speed.
+_SPEEDING_UP_NS = NS // 2
+_WAY_TOLERANCE_M = 2e-3
+_SPEED_HINT = "linear.x is the speed in metres per second."
+
+
+class Drives(Parameters):
+    """Parameters of motion.drives."""
+
+    speed: Speed = Field(description="Expected speed ahead.")
+    tolerance: Ratio = Field(0.10, description="How far the speed may be off: a share of it.")
+    until_distance: PositiveLength | None = Field(
+        None,
+        description="With something straight ahead that is nearer than this, the speed no longer "
+        "counts. By default it always counts.",
+    )
+
+
+@check("motion.drives", Subject.RECORDING, Drives)
+def drives(recording: Recording, parameters: Drives) -> Finding:
+    """The robot drives ahead at the right speed.
+
+    Judged by the true speed, while nothing is near ahead: after it has sped up, and until it
+    comes to rest for good. The median must be the speed within `tolerance`, and nine tenths of
+    the time must be, too.
+
+    Explains a robot that never moved (the process ended, nothing published, commands of zero
+    or not-a-number), a factor, a limit of the robot, driving backwards, driving on and off, and
+    a speed that varies.
+    """
+    wanted, share = parameters.speed, parameters.tolerance
+    expected = f"drives at {speed(wanted)} (within {percent(share)}) while nothing is near ahead"
+    cause = why_not_moved(recording)
+    if cause is not None or recording.scene is None:
+        return (cause or Cause("there is no world", ours=True)).finding(expected)
+    low, high = sorted((wanted * (1.0 - share), wanted * (1.0 + share)))
+    steps = _free(recording.truth, recording.scene, parameters)
+    evidence = Evidence(plots=(speed_plot(recording, (low, high)),))
+    if not steps:
+        return _too_short(recording).finding(expected)
+    middle = median(step.linear_m_s for step in steps)
+    good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
+    seen = f"median {speed(middle)}, in that range for {percent(round(good, 3))} of the time"
+    if low <= middle <= high and good >= _LEAST_SHARE:
+        return Finding.passed(expected, seen, evidence)
+    deeper = why_cut_short(recording) or why_touched(recording)
+    if deeper is not None and low <= middle <= high:
+        return deeper.finding(expected)
+    words, hint = _wrong_speed(steps, recording.scene, wanted, middle, (low, high))
+    return Finding.failed(expected, f"{seen}: {words}", hint, evidence)
+
+
+def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Truth]:
+    """The steps in which the speed counts."""
+    begin = departure(truth)
+    if begin is None:
+        return []
+    rest = final_rest(truth)
+    end = len(truth) if rest is None else rest
+    # Braking before the final rest is judged where the robot stopped.
+    while rest is not None and end > begin and not truth[end - 1].command_m_s:
+        end -= 1
+    since_ns = truth[begin].time_ns + _SPEEDING_UP_NS
+    found = []
+    for step in truth[begin:end]:
+        if step.contact is not None:
+            break
+        if step.time_ns < since_ns:
+            continue
+        if parameters.until_distance is not None:
+            sight = ahead(scene, step)
+            if sight is not None and sight.distance_m < parameters.until_distance:
+                continue
+        found.append(step)
+    return found if len(found) >= _LEAST_STEPS else []
+
+
+def _too_short(recording: Recording) -> Cause:
+    cause = why_cut_short(recording) or why_touched(recording)
+    if cause is not None:
+        return cause
+    way = metres(way_m(recording.truth))
+    return Cause(
+        f"the robot drove too shortly to tell its speed: {way} in all",
+        "Drive on as long as nothing is near ahead; one command holds until the next.",
+        Evidence(plots=(speed_plot(recording),)),
+    )
+
+
+def _wrong_speed(
+    steps: Sequence[Truth], scene: Scene, wanted: float, middle: float, band: tuple[float, float]
+) -> tuple[str, str]:
+    """What is wrong with the speed, and what to try."""
+    low, high = band
+    command = median(step.command_m_s for step in steps)
+    if abs(middle) < 1e-3 and any(abs(step.angular_rad_s) > 0.01 for step in steps):
+        return (
+            "the robot turns on the spot instead of driving",
+            "The speed ahead is linear.x, the turn is angular.z.",
+        )
+    pauses = sum(1 for rests, _ in groupby(steps, key=lambda s: abs(s.linear_m_s) < 1e-3) if rests)
+    if pauses >= 2:
+        return (
+            f"the robot drives on and off, it stood still {pauses} times",
+            "Two places that publish contradict each other, or a range that is not measured "
+            "(inf, 0.0) counts as an obstacle now and then.",
+        )
+    if pauses:
+        return (
+            "the robot stood still in between",
+            "Which message made it stop? Log what the callback compares.",
+        )
+    if middle * wanted < 0.0:
+        return "the robot drives backwards", "Forward is a positive linear.x (REP-103)."
+    limit = scene.max_linear_m_s
+    if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
+        return (
+            f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}",
+            _SPEED_HINT,
+        )
+    if low <= middle <= high:
+        slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)
+        return (
+            f"the speed varies between {speed(slowest)} and {speed(fastest)}",
+            "Publish the same speed every time, as long as nothing is near ahead.",
+        )
+    factor = middle / wanted
+    words = f"{factor:.3g} times the expected speed"
+    if abs(command - middle) > 0.05 * abs(command):
+        words += f", although {speed(command)} was commanded"
+    return words, _SPEED_HINT
+
+
+class KeepsDriving(Parameters):
+    """Parameters of motion.keeps_driving."""
+
+    distance: PositiveLength = Field(description="How far it must go at least, along its path.")
+
+
+@check("motion.keeps_driving", Subject.RECORDING, KeepsDriving)
+def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
+    """The robot drives on where nothing is ahead.
+
+    Judged by the way along its true path.
+
+    Explains an obstacle beside the path that counted as one ahead (`min(ranges)`), a beam
+    without return (0.0 or inf) that counted as one, contact, a robot that is too slow or never
+    moved, and a process that ended.
+    """
+    wanted_m = parameters.distance
+    expected = f"drives {metres(wanted_m)} without stopping, for nothing is near ahead"
+    cause = why_not_moved(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    truth = recording.truth
+    gone_m = way_m(truth)
+    if gone_m >= wanted_m - _WAY_TOLERANCE_M:
+        evidence = Evidence(plots=(speed_plot(recording),))
+        return Finding.passed(expected, f"went {metres(gone_m)}", evidence)
+    cause = why_cut_short(recording) or why_touched(recording)
+    if cause is None:
+        rest = final_rest(truth)
+        seen = f"{metres(gone_m)} in all"
+        cause = _too_slow(recording, seen) if rest is None else _stopped(recording, rest, seen)
+    return cause.finding(expected)
+
+
+def _stopped(recording: Recording, rest: int, seen: str) -> Cause:
+    step = recording.truth[rest]
+    when_s = recording.since_launch_s(step.time_ns)
+    evidence = Evidence(
+        moments=(Moment("the robot stopped", when_s),), plots=(speed_plot(recording),)
+    )
+    around = nearest(recording.scene, step) if recording.scene is not None else None
+    misread = misreading(recording, step.time_ns, around, None)
+    if misread is not None:
+        return Cause(f"stopped after {seen}: {misread.words}", misread.hint, evidence)
+    return Cause(
+        f"stopped after {seen}, {when_s:.2f} s after launch",
+        "Which message made it stop? Log what the callback compares.",
+        evidence,
+    )
+
+
+def _too_slow(recording: Recording, seen: str) -> Cause:
+    truth = recording.truth
+    begin = departure(truth) or 0
+    driven_s = (truth[-1].time_ns - truth[begin].time_ns) / NS
+    waited_s = (truth[begin].time_ns - truth[0].time_ns) / NS
+    average = way_m(truth) / driven_s if driven_s else 0.0
+    lost_s = taken_s(recording, truth[0].time_ns, truth[-1].time_ns)
+    words = (
+        f"was still on its way when the observation ended: {seen}, at {speed(average)} on "
+        f"average, {format_duration(waited_s)} after the beginning"
+    )
+    if lost_s > 0.25 * (driven_s + waited_s):
+        return Cause(
+            f"{words}; the machine took {format_duration(lost_s)} from the run",
+            ours=True,
+            disturbed=True,
+        )
+    return Cause(words, _SPEED_HINT, Evidence(plots=(speed_plot(recording),)))
+
+
+class Straight(Parameters):
+    """Parameters of motion.straight."""
+
+    tolerance: AngularSpeed = Field(
+        0.01, description="Largest angular.z that still counts as zero, either way."
+    )
+    heading: Angle = Field(
+        0.035, description="How far the heading may be off that of the start, either way."
+    )
+
+
+@check("motion.straight", Subject.RECORDING, Straight)
+def straight(recording: Recording, parameters: Straight) -> Finding:
+    """The robot drives straight ahead.
+
+    Judged by the commands in force and by the true heading: `angular.z` is zero all the time,
+    and the heading stays that of the start.
+
+    Explains a robot that never moved, an angular.z that is not zero (the first command), and
+    values that stand in the wrong field.
+    """
+    expected = f"drives straight: angular.z is zero (within {turn(parameters.tolerance)})"
+    cause = why_not_moved(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    truth = recording.truth
+    evidence = Evidence(
+        plots=(
+            over_time(
+                recording,
+                "Commanded turn",
+                "angular.z (rad/s)",
+                lambda step: step.command_rad_s,
+                (-parameters.tolerance, parameters.tolerance),
+            ),
+        )
+    )
+    turning = [step for step in truth if abs(step.command_rad_s) > parameters.tolerance]
+    if turning:
+        first = turning[0]
+        worst = max(turning, key=lambda step: abs(step.command_rad_s))
+        when_s = recording.since_launch_s(first.time_ns)
+        still = all(step.command_m_s == 0.0 for step in turning)
+        words = f"angular.z = {turn(worst.command_rad_s)} was commanded"
+        words += ", and linear.x = 0 with it" if still else ""
+        return Finding.failed(
+            expected,
+            f"{words} (from {when_s:.2f} s after launch, {percent(len(turning) / len(truth))} of "
+            "the time)",
+            "The speed ahead is linear.x, the turn is angular.z: leave angular.z at 0.0.",
+            Evidence(moments=(Moment("first turn commanded", when_s),), plots=evidence.plots),
+        )
+    off_rad = max((turned_rad(truth[: end + 1]) for end in range(0, len(truth), 25)), key=abs)
+    off_rad = max(off_rad, turned_rad(truth), key=abs)
+    if abs(off_rad) > parameters.heading:
+        return Finding.failed(
+            expected,
+            f"the heading changed by {degrees(off_rad)}, through commands of less than "
+            f"{turn(parameters.tolerance)} that add up",
+            "Leave angular.z at exactly 0.0.",
+            evidence,
+        )
+    return Finding.passed(expected, f"heading within {degrees(off_rad)} of the start", evidence)

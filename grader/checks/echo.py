@@ -1,0 +1,111 @@
+"""Echoes of messages: lines of output that show the values of a message soon after it."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from grader.checks.field import number_at
+from grader.checks.printed import numbers, shows
+from grader.recording.model import NS, LogLine, Message, Recording
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the log should show of one message.
+
+    Attributes:
+        message: The message.
+        values: Path of each field -> its value.
+    """
+
+    message: Message
+    values: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Echo:
+    """Lines that show one message.
+
+    Attributes:
+        wanted: The message, with its values.
+        lines: At least one; all values are in them together.
+    """
+
+    wanted: Wanted
+    lines: tuple[LogLine, ...]
+
+
+def wanted_values(messages: Sequence[Message], fields: Sequence[str]) -> tuple[Wanted, ...]:
+    """What the log should show of each message.
+
+    Raises:
+        NoSuchField: The messages have no such field, or it holds no number.
+    """
+    return tuple(
+        Wanted(message, {path: number_at(message.value, path) for path in fields})
+        for message in messages
+    )
+
+
+def output_lines(recording: Recording) -> tuple[LogLine, ...]:
+    """What the student's processes wrote, oldest first.
+
+    Messages on /rosout are left out: a logger writes each of them to stderr as well, and one
+    line must not count twice.
+    """
+    lines = (line for line in recording.log if line.stream != "rosout")
+    return tuple(sorted(lines, key=lambda line: line.time_ns))
+
+
+def echoes(
+    recording: Recording,
+    wanted: Sequence[Wanted],
+    decimals: int,
+    within_ns: int,
+    *,
+    forgive: bool = False,
+) -> tuple[Echo, ...]:
+    """Messages that are followed by lines which show their values.
+
+    A line serves one message, so that a single line does not stand for many messages with the
+    same values.
+
+    Args:
+        recording: The run.
+        wanted: What to look for, in the order of the messages.
+        decimals: How many decimals must be right.
+        within_ns: How soon after its message a line must have come.
+        forgive: Allow what the host took meanwhile in addition.
+    """
+    lines = output_lines(recording)
+    times = [line.time_ns for line in lines]
+    printed = [numbers(line.text) for line in lines]
+    found = []
+    free = 0
+    for item in wanted:
+        begin_ns = item.message.stamp_ns
+        end_ns = begin_ns + within_ns
+        if forgive:
+            end_ns += round(recording.taken_s(begin_ns, end_ns) * NS)
+        first = max(free, bisect_left(times, begin_ns))
+        missing = set(item.values)
+        for index in range(first, len(lines)):
+            if times[index] > end_ns:
+                break
+            missing -= shown(printed[index], item, decimals)
+            if not missing:
+                free = index + 1
+                found.append(Echo(item, lines[first:free]))
+                break
+    return tuple(found)
+
+
+def shown(printed: Sequence[float], wanted: Wanted, decimals: int) -> set[str]:
+    """Fields whose values are among the numbers of a line."""
+    return {
+        path
+        for path, value in wanted.values.items()
+        if any(shows(number, value, decimals) for number in printed)
+    }

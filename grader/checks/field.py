@@ -1,0 +1,60 @@
+"""Paths to a number in a message, such as ``pose.pose.position.x`` or ``ranges[0]``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+from pydantic import AfterValidator
+
+from grader.checks.value import NoSuchField
+from grader.nearest import did_you_mean
+
+_NAME = r"[A-Za-z][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*"
+_PATH = re.compile(rf"{_NAME}(?:\.{_NAME})*")
+_STEP = re.compile(r"[A-Za-z0-9_]+")
+
+
+def _field_path(text: str) -> str:
+    if not _PATH.fullmatch(text):
+        raise ValueError(
+            f"{text!r} is not a field: write its path, such as 'pose.pose.position.x' or "
+            "'ranges[0]'"
+        )
+    return text
+
+
+FieldPath = Annotated[str, AfterValidator(_field_path)]
+
+
+def number_at(message: Mapping[str, Any], path: str) -> float:
+    """The number in a field of a message.
+
+    Args:
+        message: Fields by name.
+        path: Names with dots between them, indices of arrays in brackets, counted from 0.
+
+    Raises:
+        NoSuchField: The message has no such field, or it holds no number.
+    """
+    here: Any = message
+    done = "the message"
+    for step in _STEP.findall(path):
+        if isinstance(here, Mapping):
+            if step not in here:
+                raise NoSuchField(
+                    f"{done} has no field {step!r}; it has {', '.join(sorted(here))}."
+                    + did_you_mean(step, here)
+                )
+            here = here[step]
+        elif isinstance(here, Sequence) and not isinstance(here, str) and step.isdigit():
+            if int(step) >= len(here):
+                raise NoSuchField(f"{done} has {len(here)} items, so there is no [{step}]")
+            here = here[int(step)]
+        else:
+            raise NoSuchField(f"{done} has no field {step!r}: it is a plain value")
+        done = step
+    if not isinstance(here, int | float):
+        raise NoSuchField(f"{path} is not a number")
+    return float(here)

@@ -1,0 +1,33 @@
+"""What the machine took from a run with a simulated robot."""
+
+from __future__ import annotations
+
+import re
+
+from grader.recording.model import Recording
+
+_MILLISECONDS = re.compile(r"(\d+) ms")
+# Late steps are noted before they are done, at the stamp of the step before them.
+_MARGIN_NS = 20_000_000
+
+
+def taken_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
+    """How much later than without the machine's doing the robot can have got a command, at most.
+
+    The student's waits for a CPU and the probe's lateness, and how late the simulator itself
+    was with its sensors' messages.
+
+    Args:
+        recording: The run.
+        begin_ns: Beginning of the interval.
+        end_ns: Its end.
+    """
+    late_ms = [
+        int(found[1])
+        for item in recording.incidents
+        if item.kind == "late"
+        and begin_ns - _MARGIN_NS <= item.time_ns <= end_ns
+        and (found := _MILLISECONDS.search(item.text))
+    ]
+    simulator_s = max(late_ms, default=0) / 1e3
+    return recording.taken_s(begin_ns, max(begin_ns, end_ns)) + simulator_s

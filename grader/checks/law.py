@@ -1,0 +1,192 @@
+"""Which law a series of commands follows: in proportion to the error, or what else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+
+_LEAST_FIT = 5
+_ZERO_RAD_S = 1e-4
+# Near zero the command may pause, near half a turn both senses are right.
+_PAUSE_RAD = 0.15
+_EITHER_WAY_RAD = 0.3
+_SMALL_RAD = 0.1
+_MOST_SIZES = 4
+_SAME = 1e-6
+_PLATEAU = 3
+_FEW_WRONG = 0.05
+_SHORT_OF = 0.8
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A command and the error it answers.
+
+    Attributes:
+        error_rad: In [-pi, pi].
+        command_rad_s: angular.z as published.
+    """
+
+    error_rad: float
+    command_rad_s: float
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether it clearly turns away from the error."""
+        size = abs(self.error_rad)
+        return (
+            _PAUSE_RAD < size < math.pi - _EITHER_WAY_RAD
+            and abs(self.command_rad_s) > _ZERO_RAD_S
+            and self.error_rad * self.command_rad_s < 0.0
+        )
+
+
+class Law(Enum):
+    """What the commands follow."""
+
+    PROPORTIONAL = auto()
+    """A line through the origin is the best there is to say, good or bad."""
+    NOTHING_TO_DO = auto()
+    """There was hardly an error, and hardly a command."""
+    TOO_FEW = auto()
+    ZERO = auto()
+    STEPS = auto()
+    NOT_NORMALISED = auto()
+    WRONG_SIGN = auto()
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A law with its figures.
+
+    Attributes:
+        law: Which.
+        gain: Slope of the line through the origin, in rad/s for each rad.
+        r2: Coefficient of determination of that line, at most 1.
+        used: How many commands the line was laid through.
+        values: For steps: the sizes of the commands, in rad/s.
+        share: For an error that is not normalised: share of the commands that are a turn off.
+    """
+
+    law: Law
+    gain: float = 0.0
+    r2: float = 0.0
+    used: int = 0
+    values: tuple[float, ...] = ()
+    share: float = 0.0
+
+
+def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> Verdict:
+    """Find the law behind commands.
+
+    Args:
+        samples: In the order of time; finite.
+        limit_rad_s: What the robot can do; larger commands say little of the law.
+        least_r2: What counts as a good fit.
+    """
+    turning = [item for item in samples if abs(item.command_rad_s) > _ZERO_RAD_S]
+    small = all(abs(item.error_rad) <= _SMALL_RAD for item in samples)
+    if samples and small and len(turning) < _LEAST_FIT:
+        return Verdict(Law.NOTHING_TO_DO, used=len(samples))
+    if len(samples) < _LEAST_FIT:
+        return Verdict(Law.TOO_FEW, used=len(samples))
+    if not turning:
+        return Verdict(Law.ZERO, used=len(samples))
+    sizes = sorted({round(abs(item.command_rad_s), 3) for item in turning})
+    if len(sizes) <= _MOST_SIZES and len(turning) > 2 * len(sizes):
+        return Verdict(Law.STEPS, used=len(turning), values=tuple(sizes))
+    telling = [
+        _toward(item)
+        for item in samples
+        if abs(item.command_rad_s) > _ZERO_RAD_S or abs(item.error_rad) > _PAUSE_RAD
+    ]
+    wrong = sum(item.is_wrong for item in telling) / len(telling) if telling else 0.0
+    best = _fit(telling, limit_rad_s)
+    if wrong <= _FEW_WRONG and best.r2 >= least_r2 and best.gain > 0.0:
+        return best
+    return _otherwise(telling, limit_rad_s, least_r2, wrong) or best
+
+
+def _otherwise(
+    samples: Sequence[Sample], limit_rad_s: float, least_r2: float, wrong: float
+) -> Verdict | None:
+    """A mistake that explains commands which are not in proportion to the error."""
+    if wrong <= _FEW_WRONG:
+        return None
+    raw = [
+        Sample(item.error_rad - math.copysign(math.tau, item.error_rad), item.command_rad_s)
+        if item.is_wrong
+        else item
+        for item in samples
+    ]
+    turned = _fit(raw, limit_rad_s)
+    mirrored = _fit([Sample(-item.error_rad, item.command_rad_s) for item in samples], limit_rad_s)
+    if turned.gain > 0.0 and turned.r2 >= max(0.8 * least_r2, mirrored.r2):
+        return Verdict(Law.NOT_NORMALISED, turned.gain, turned.r2, turned.used, share=wrong)
+    if mirrored.gain > 0.0 and wrong > 0.5:
+        return Verdict(Law.WRONG_SIGN, -mirrored.gain, mirrored.r2, mirrored.used)
+    # The line of those that turn the right way, with no merit for the others.
+    fit = _fit(samples, limit_rad_s)
+    return Verdict(Law.PROPORTIONAL, fit.gain, min(fit.r2, 1.0 - wrong - least_r2), fit.used)
+
+
+def _toward(item: Sample) -> Sample:
+    """Near half a turn the error may be read with either sign: take that of the command."""
+    if abs(item.error_rad) > math.pi - _EITHER_WAY_RAD and (
+        item.error_rad * item.command_rad_s < 0.0
+    ):
+        return Sample(item.error_rad - math.copysign(math.tau, item.error_rad), item.command_rad_s)
+    return item
+
+
+def _fit(samples: Sequence[Sample], limit_rad_s: float) -> Verdict:
+    """Lay a line through the origin and the commands that are at no limit.
+
+    A command at a limit is left out only if the line asks for at least that much there, so that
+    a step does not pass for a clamp.
+    """
+    if not samples:
+        return Verdict(Law.TOO_FEW)
+    sizes = [abs(item.command_rad_s) for item in samples]
+    highest = max(sizes)
+    lowest = min((size for size in sizes if size > _ZERO_RAD_S), default=0.0)
+    clamp = highest if _count(sizes, highest) >= _PLATEAU else math.inf
+    floor = lowest if _count(sizes, lowest) >= _PLATEAU and lowest < highest else 0.0
+    clamp = min(clamp, limit_rad_s * 0.999)
+    high, low = clamp * (1.0 - _SAME), floor * (1.0 + _SAME)
+    inside = [item for item in samples if low < abs(item.command_rad_s) < high]
+    if len(inside) < _LEAST_FIT:
+        # Without a clamp of its own the law shows in what was asked for beyond the limit too.
+        inside, high, low = list(samples), math.inf, 0.0
+    slope = _gain(inside)
+
+    def counts(item: Sample) -> bool:
+        size, wanted = abs(item.command_rad_s), slope * abs(item.error_rad)
+        if size >= high:
+            return wanted < _SHORT_OF * clamp
+        return size > low or wanted > floor / _SHORT_OF
+
+    kept = [item for item in samples if counts(item)]
+    gain = _gain(kept)
+    return Verdict(Law.PROPORTIONAL, gain, _r2(kept, gain), len(kept))
+
+
+def _count(sizes: Sequence[float], size: float) -> int:
+    return sum(math.isclose(item, size, rel_tol=_SAME) for item in sizes)
+
+
+def _gain(samples: Sequence[Sample]) -> float:
+    square = sum(item.error_rad**2 for item in samples)
+    product = sum(item.error_rad * item.command_rad_s for item in samples)
+    return product / square if square > 0.0 else 0.0
+
+
+def _r2(samples: Sequence[Sample], gain: float) -> float:
+    mean = sum(item.command_rad_s for item in samples) / len(samples)
+    total = sum((item.command_rad_s - mean) ** 2 for item in samples)
+    rest = sum((item.command_rad_s - gain * item.error_rad) ** 2 for item in samples)
+    if total <= 0.0:
+        return 1.0 if rest <= 0.0 else 0.0
+    return 1.0 - rest / total

@@ -1,0 +1,111 @@
+"""Checks of what a node logs: that it follows the messages that the node was sent."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from grader.assignment.model import TopicName
+from grader.assignment.quantity import Duration, format_duration
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.echo import Echo, echoes, wanted_values
+from grader.checks.field import FieldPath
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.log_absence import why_not_logged
+from grader.checks.printed import quote
+from grader.checks.value import NoSuchField
+from grader.checks.wording import code, codes, counted
+from grader.recording.model import NS, Kind, Recording
+
+_SHOWN_LINES = 5
+
+
+class Follows(Parameters):
+    """Parameters of log.follows."""
+
+    topic: TopicName = Field(description="Fully qualified name of a topic that the cell sends.")
+    fields: tuple[FieldPath, ...] = Field(
+        min_length=1,
+        description="Numbers of the message that must be logged, such as "
+        "`pose.pose.position.x` or `ranges[0]`.",
+    )
+    decimals: int = Field(
+        2, ge=0, le=9, description="How many decimals must be right; rounding and cutting off are."
+    )
+    at_least: int = Field(
+        1, ge=1, description="How many messages must be followed, each by log lines of its own."
+    )
+    within: Duration = Field(
+        0.5,
+        description="How soon after its message a line must come, by default 500 ms.",
+        validate_default=False,
+    )
+
+
+@check("log.follows", Subject.RECORDING, Follows)
+def follows(recording: Recording, parameters: Follows) -> Finding:
+    """The node logs what it receives.
+
+    Lines on stdout and stderr (rclpy's loggers write to stderr) must follow messages on the
+    topic and show the values of their fields. Any formatting is right: one line or several,
+    rounded or exact, the whole message; other numbers and other lines do not matter. Where the
+    lines come from does not matter either, a callback or a timer.
+
+    Explains a subscription that is missing, of another type, or that requests a QoS that the
+    publisher does not offer; an executor that never spins or that a callback blocks; other
+    values (another beam of a scan, the nearest of all, z instead of y, centimetres, too few
+    decimals); values that are logged only in the callback of another topic; and a callback that
+    logs nothing.
+    """
+    expected = (
+        f"log lines that show {codes(parameters.fields)} of messages on {code(parameters.topic)}, "
+        f"to {counted(parameters.decimals, 'decimal')}, within "
+        f"{format_duration(parameters.within)} of {counted(parameters.at_least, 'message')} or more"
+    )
+    if recording.student_endpoints(Kind.PUBLISHER, parameters.topic):
+        return Finding.failed(
+            expected,
+            f"the node itself publishes on {code(parameters.topic)}, so its log shows nothing of "
+            "what it was sent",
+            "Only the robot publishes its sensors: remove this publisher, and subscribe.",
+        )
+    messages = recording.on(parameters.topic)
+    try:
+        wanted = wanted_values(messages, parameters.fields)
+    except NoSuchField as error:
+        return Finding.error(
+            expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
+        )
+    within_ns = round(parameters.within * NS)
+    found = echoes(recording, wanted, parameters.decimals, within_ns)
+    if len(found) >= parameters.at_least:
+        return _passed(recording, parameters, expected, found)
+    return why_not_logged(
+        recording,
+        parameters.topic,
+        wanted,
+        found,
+        needed=parameters.at_least,
+        decimals=parameters.decimals,
+        within_ns=within_ns,
+    ).finding(expected)
+
+
+def _passed(
+    recording: Recording, parameters: Follows, expected: str, found: tuple[Echo, ...]
+) -> Finding:
+    lines = [line for echo in found for line in echo.lines]
+    number = len(recording.on(parameters.topic))
+    return Finding.passed(
+        expected,
+        f"log lines follow {len(found)} of {counted(number, 'message')}: " + quote(lines[-1].text),
+        Evidence(
+            moments=tuple(
+                Moment(
+                    f"logged a message on {parameters.topic}",
+                    recording.since_launch_s(echo.lines[-1].time_ns),
+                )
+                for echo in (found[0], found[-1])
+            ),
+            log=tuple(line.text for line in lines[:_SHOWN_LINES]),
+        ),
+    )

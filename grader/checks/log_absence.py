@@ -1,0 +1,269 @@
+"""Why the log does not show what the node was sent: one cause, the deepest that can be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from grader.assignment.quantity import format_duration
+from grader.checks import testimony
+from grader.checks.cause import Cause
+from grader.checks.death import cause_of_death, dead
+from grader.checks.delivery import why_not_delivered
+from grader.checks.echo import Echo, Wanted, echoes, output_lines, shown
+from grader.checks.failure import interrupted_place
+from grader.checks.finding import Evidence, Moment, Table
+from grader.checks.misreading import explain
+from grader.checks.printed import numbers, quote
+from grader.checks.wording import code, codes, counted, listing, value_text
+from grader.recording.model import NS, Call, Kind, LogLine, Recording
+
+_LOG_LINES = 5
+# An answer that was asked for later than this before the end may be missing for that reason.
+_ANSWER_NS = NS
+# Share of the time that the host may take before silence says nothing any more.
+_STARVED = 0.5
+
+
+def why_not_logged(
+    recording: Recording,
+    topic: str,
+    wanted: Sequence[Wanted],
+    found: Sequence[Echo],
+    *,
+    needed: int,
+    decimals: int,
+    within_ns: int,
+) -> Cause:
+    """Why fewer messages than needed were followed by log lines with their values.
+
+    Args:
+        recording: The run.
+        topic: Fully qualified topic name.
+        wanted: What the log should show, by message.
+        found: Messages that were followed, too few.
+        needed: How many there should have been.
+        decimals: How many decimals must be right.
+        within_ns: How soon after its message a line must have come.
+    """
+    cause = why_not_delivered(recording, topic)
+    if cause is not None:
+        return cause
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0]).after(_seen(topic, found))
+    if len(wanted) < needed:
+        return Cause(
+            f"only {counted(len(wanted), 'message was', 'messages were')} sent on {code(topic)}",
+            ours=True,
+            disturbed=True,
+        )
+    cause = (
+        _disturbed(recording, topic, wanted, needed, decimals, within_ns)
+        or _never_spins(recording, topic)
+        or _blocked(recording, topic, found)
+        or _dropped(recording, topic)
+    )
+    if cause is not None:
+        return cause
+    if found:
+        return _few(recording, topic, wanted, found)
+    near = _near(recording, wanted, within_ns)
+    return (
+        _elsewhere(recording, topic, wanted, near, decimals)
+        or _other_values(recording, topic, wanted, near, decimals)
+        or _silent(recording, topic)
+    )
+
+
+def _seen(topic: str, found: Sequence[Echo]) -> str:
+    if found:
+        return f"log lines follow {counted(len(found), 'message')} on {code(topic)}"
+    return f"no log line shows a message on {code(topic)}"
+
+
+def _disturbed(
+    recording: Recording,
+    topic: str,
+    wanted: Sequence[Wanted],
+    needed: int,
+    decimals: int,
+    within_ns: int,
+) -> Cause | None:
+    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].message.stamp_ns + within_ns
+    taken_s = recording.taken_s(begin_ns, end_ns)
+    starved = taken_s >= _STARVED * (end_ns - begin_ns) / NS
+    if not starved and (len(echoes(recording, wanted, decimals, within_ns, forgive=True)) < needed):
+        return None
+    return Cause(
+        f"log lines for {code(topic)} are late or missing, but the machine took "
+        f"{format_duration(taken_s)} from the process meanwhile",
+        ours=True,
+        disturbed=True,
+    )
+
+
+def _never_spins(recording: Recording, topic: str) -> Cause | None:
+    process = next(
+        (item for item in recording.processes if testimony.never_spun(recording, item.name)), None
+    )
+    if process is None:
+        return None
+    place = interrupted_place(recording, process.name)
+    where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
+    return Cause(
+        f"the callback is never called: the subscription to {code(topic)} is there and its QoS "
+        f"matches, but rclpy.spin() was never called{where}",
+        "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
+        Evidence(places=(place,) if place else ()),
+    )
+
+
+def _blocked(recording: Recording, topic: str, found: Sequence[Echo]) -> Cause | None:
+    """The node's parameter service tells: it answers only while the executor comes round."""
+    first_ns = recording.on(topic)[0].stamp_ns
+    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
+    calls = [
+        call
+        for call in recording.calls
+        if call.service.rpartition("/")[0] in nodes
+        and call.requested_ns <= recording.stop_ns - _ANSWER_NS
+    ]
+    unanswered = [call for call in calls if call.answered_ns is None]
+    if not unanswered or any(_answered_after(call, first_ns) for call in calls):
+        return None
+    since_s = recording.since_launch_s(unanswered[0].requested_ns)
+    process = testimony.process_of(recording, min(nodes))
+    place = interrupted_place(recording, process.name) if process is not None else None
+    where = f" ({place.file}:{place.line})" if place else ""
+    return Cause(
+        f"{_seen(topic, found)}: its callback is not called, because something keeps the executor "
+        f"from coming round{where}. The subscription is there and its QoS matches, but from "
+        f"{since_s:.2f} s after launch on the node's parameter service answers no call either",
+        "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
+        "callback, in the constructor or in main(), and for a node that is not given to "
+        "rclpy.spin().",
+        Evidence(
+            moments=(Moment("first call that was not answered", since_s),),
+            places=(place,) if place else (),
+        ),
+    )
+
+
+def _answered_after(call: Call, time_ns: int) -> bool:
+    return call.answered_ns is not None and call.answered_ns >= time_ns
+
+
+def _dropped(recording: Recording, topic: str) -> Cause | None:
+    """Output that was not kept may have held what is missing."""
+    dropped = sum(process.dropped_bytes for process in recording.processes)
+    if not dropped:
+        return None
+    return Cause(
+        f"nothing about {code(topic)} is in the output that was kept, but the process wrote "
+        f"{dropped} bytes more",
+        "Write less: a line for each message is enough.",
+        ours=True,
+    )
+
+
+def _few(
+    recording: Recording, topic: str, wanted: Sequence[Wanted], found: Sequence[Echo]
+) -> Cause:
+    times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
+    written = listing(f"{time_s:.2f} s" for time_s in times_s)
+    return Cause(
+        f"log lines follow only {len(found)} of {counted(len(wanted), 'message')} on "
+        f"{code(topic)}, written {written} after launch",
+        "Log in every call of the callback, or at least once in a second.",
+        Evidence(
+            moments=tuple(Moment(f"logged a message on {topic}", time_s) for time_s in times_s),
+            log=tuple(line.text for echo in found for line in echo.lines)[:_LOG_LINES],
+        ),
+    )
+
+
+def _near(recording: Recording, wanted: Sequence[Wanted], within_ns: int) -> list[LogLine]:
+    """Lines that could have been an answer to a message."""
+    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].message.stamp_ns + within_ns
+    return [line for line in output_lines(recording) if begin_ns <= line.time_ns <= end_ns]
+
+
+def _elsewhere(
+    recording: Recording,
+    topic: str,
+    wanted: Sequence[Wanted],
+    near: Sequence[LogLine],
+    decimals: int,
+) -> Cause | None:
+    """The values are logged, but not when the messages come."""
+    last = wanted[-1]
+    for line in output_lines(recording):
+        if line in near or shown(numbers(line.text), last, decimals) != set(last.values):
+            continue
+        late_s = (line.time_ns - last.message.stamp_ns) / NS
+        others = [name for name in recording.messages if name != topic and recording.on(name)]
+        came = f" in which messages came on {codes(others)}" if others else ""
+        return Cause(
+            f"the values of {code(topic)} are logged, but not when its messages come: "
+            f"{quote(line.text)} was written {format_duration(late_s)} after the last of them, "
+            f"at a time{came}",
+            f"Log in the callback of {code(topic)} itself, from the message that it is given.",
+            Evidence(
+                moments=(Moment("logged too late", recording.since_launch_s(line.time_ns)),),
+                log=(line.text,),
+            ),
+        )
+    return None
+
+
+def _other_values(
+    recording: Recording,
+    topic: str,
+    wanted: Sequence[Wanted],
+    near: Sequence[LogLine],
+    decimals: int,
+) -> Cause | None:
+    """Lines come, but they show something else."""
+    if not near:
+        return None
+    item = wanted[-1]
+    printed = [numbers(line.text) for line in near]
+    carried = {path for line in printed for path in shown(line, item, decimals)}
+    missing = [path for path in item.values if path not in carried] or list(item.values)
+    values = listing(f"{code(path)} = {_rounded(item.values[path], decimals)}" for path in missing)
+    # A line with numbers is more likely to be meant than one without.
+    told = next((line for line in reversed(near) if numbers(line.text)), near[-1])
+    reason = explain(numbers(told.text), item, missing, decimals)
+    rows = tuple((path, value_text(value)) for path, value in item.values.items())
+    return Cause(
+        f"log lines follow messages on {code(topic)}, but none shows {values}: "
+        f"{quote(told.text)}" + (f", which {reason}" if reason else ""),
+        f"Log the fields of the message that the callback is given: {_fields(missing)}.",
+        Evidence(
+            moments=(Moment("other values logged", recording.since_launch_s(told.time_ns)),),
+            log=tuple(line.text for line in near[:_LOG_LINES]),
+            tables=(Table(f"A message on {topic}", ("field", "value"), rows),),
+        ),
+    )
+
+
+def _fields(paths: Sequence[str]) -> str:
+    return listing(code(f"msg.{path}") for path in paths)
+
+
+def _rounded(value: float, decimals: int) -> str:
+    return f"{value:.{max(decimals, 1)}f}"
+
+
+def _silent(recording: Recording, topic: str) -> Cause:
+    answers = [call for call in recording.calls if call.answered_ns is not None]
+    spins = ", and its executor comes round" if answers else ""
+    wrote = next(iter(output_lines(recording)), None)
+    other = f"; the process wrote {quote(wrote.text)}" if wrote else ""
+    return Cause(
+        f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
+        f"type and its QoS match{spins}{other}",
+        "Call self.get_logger().info(...) or print(...) in the callback. What debug() logs is not "
+        "shown by default, and an `except: pass` hides an error.",
+        Evidence(log=tuple(line.text for line in output_lines(recording)[:_LOG_LINES])),
+    )

@@ -1,0 +1,98 @@
+"""What a wrong number in the log stands for: another field, another unit, too few decimals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from grader.checks.echo import Wanted
+from grader.checks.printed import shows
+from grader.checks.value import leaves
+from grader.checks.wording import code, listing
+
+_FACTORS = (
+    (100.0, "100 times the value, as in centimetres,"),
+    (1000.0, "1000 times the value, as in millimetres,"),
+)
+_MOST_NAMED = 2
+
+
+def explain(printed: Sequence[float], wanted: Wanted, missing: Sequence[str], decimals: int) -> str:
+    """Say in a clause what a line shows instead of the values, or nothing.
+
+    Args:
+        printed: Numbers of the line.
+        wanted: The message, and the values that the line should show.
+        missing: Those of its fields that it does not show.
+        decimals: How many decimals must be right.
+
+    Returns:
+        Such as ``shows `ranges[180]```; empty where no relation is seen.
+    """
+    for path in missing:
+        value = wanted.values[path]
+        for number in printed:
+            relation = _relation(number, value)
+            if relation:
+                return f"shows {relation.format(path=code(path))}"
+    others = [name for number in printed for name in _names(number, wanted, decimals)]
+    named = list(dict.fromkeys(others))[:_MOST_NAMED]
+    return f"shows {listing(map(code, named), last='or')}" if named else ""
+
+
+def _relation(number: float, value: float) -> str:
+    """How a number is made of a value."""
+    if not (math.isfinite(number) and math.isfinite(value)) or not value:
+        return ""
+    for decimals in (1, 0):
+        if number and math.isclose(number, round(value, decimals), abs_tol=1e-9):
+            words = "1 decimal" if decimals else "no decimals"
+            return f"{{path}} rounded to {words}"
+    if math.isclose(number, -value, rel_tol=0.005):
+        return "{path} with the opposite sign"
+    for factor, words in _FACTORS:
+        if math.isclose(number, factor * value, rel_tol=0.005):
+            return f"{words} of {{path}}"
+    return ""
+
+
+def _names(number: float, wanted: Wanted, decimals: int) -> Iterator[str]:
+    """Fields, and statistics of arrays, that a number stands for; the likeliest first.
+
+    Zeros are in nearly every message, and so tell nothing unless they are all there is.
+    """
+    fields = leaves(wanted.message.value)
+    numeric = {
+        path: float(value)
+        for path, value in fields.items()
+        if isinstance(value, int | float) and path not in wanted.values
+    }
+    for label, value in (*_statistics(wanted.message.value), *_spokes(numeric), *numeric.items()):
+        if shows(number, value, decimals) and _tells(number, label):
+            yield label
+
+
+def _tells(number: float, label: str) -> bool:
+    # Among 36 covariances a zero is always found.
+    return bool(number) or "covariance" not in label
+
+
+def _statistics(value: Mapping[str, object]) -> Iterator[tuple[str, float]]:
+    """Least and greatest of each array of numbers."""
+    for name, item in value.items():
+        if isinstance(item, Sequence) and not isinstance(item, str) and len(item) > 1:
+            finite = [x for x in item if isinstance(x, int | float) and math.isfinite(x)]
+            if finite:
+                yield f"min({name})", float(min(finite))
+                yield f"max({name})", float(max(finite))
+
+
+def _spokes(numeric: Mapping[str, float]) -> Iterator[tuple[str, float]]:
+    """Beams that are taken for the one ahead: the middle one, those at the sides."""
+    beams = [path for path in numeric if path.startswith("ranges[")]
+    count = len(beams)
+    for share in (2, 4):
+        for index in range(1, share):
+            path = f"ranges[{index * (count + 1) // share}]"
+            if path in numeric:
+                yield path, numeric[path]

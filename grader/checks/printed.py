@@ -1,0 +1,63 @@
+"""Numbers in lines of output, in whatever way a program formats them."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from grader.checks.wording import code
+
+_NUMBER = re.compile(
+    r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|[-+]?\b(?:inf|nan)\b",
+    re.IGNORECASE,
+)
+# `1,37` as some locales write it. In `(1,37)` it could be two numbers as well: both are tried.
+_DECIMAL_COMMA = re.compile(r"(?<![0-9.,])[-+]?[0-9]+,[0-9]+(?![0-9.,])")
+# What rclpy's loggers put before a text: `[INFO] [1700000000.123456789] [bot]: `.
+_LOG_PREFIX = re.compile(r"\s*\[[A-Z]+\] \[[0-9.]+\] \[[^\]]*\]: ?")
+# A float32 and its decimal text differ by less.
+_FLOAT_NOISE = 1e-6
+_LONGEST_QUOTE = 80
+
+
+def logged_text(line: str) -> str:
+    """A line without what a ROS logger puts before it."""
+    return _LOG_PREFIX.sub("", line, count=1)
+
+
+def quote(line: str) -> str:
+    """A line for a finding: without its prefix, marked as code, shortened."""
+    text = logged_text(line).strip()
+    return code(text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}...")
+
+
+def numbers(line: str) -> tuple[float, ...]:
+    """Every number that a line may be read to show, in the order of the text.
+
+    Args:
+        line: Any text; the prefix of a ROS logger is left out.
+    """
+    text = logged_text(line)
+    found: list[float] = []
+    for match in _NUMBER.finditer(text):
+        number = float(match[0])
+        found.append(number)
+        # In `front-1.37` the sign is a dash.
+        if match[0].startswith("-") and text[: match.start()][-1:].isalnum():
+            found.append(-number)
+    found += [float(match[0].replace(",", ".")) for match in _DECIMAL_COMMA.finditer(text)]
+    return tuple(found)
+
+
+def shows(number: float, value: float, decimals: int) -> bool:
+    """Whether a printed number stands for a value.
+
+    Args:
+        number: As printed: rounded, cut off or exact.
+        value: What it should be.
+        decimals: How many of its decimals must be right; the last of them may be one off,
+            because cutting off is right too.
+    """
+    if not (math.isfinite(number) and math.isfinite(value)):
+        return number == value or (math.isnan(number) and math.isnan(value))
+    return abs(number - value) <= 10.0**-decimals + _FLOAT_NOISE

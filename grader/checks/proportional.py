@@ -1,0 +1,232 @@
+"""The check that the turn is commanded in proportion to the heading error."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import Literal
+
+from pydantic import Field
+
+from grader.assignment.quantity import Frequency, PositiveLength, Ratio
+from grader.checks.approach import Approach, approach, why_not_there
+from grader.checks.cause import Cause
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.command import ODOMETRY, TOPIC, commands, number
+from grader.checks.finding import Evidence, Finding, Plot
+from grader.checks.immobility import why_cut_short
+from grader.checks.law import Law, Sample, Verdict, examine
+from grader.checks.measure import metres
+from grader.checks.reference import GoalPose
+from grader.checks.silence import why_silent
+from grader.checks.track import pose_at
+from grader.checks.wording import counted, percent
+from grader.recording.model import NS, Message, Recording
+
+_GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
+_MOST_POINTS = 400
+_LEAST_SAMPLES = 8
+_NO_SPEED_M_S = 1e-3
+_MOST_BEHIND = 2
+_WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
+_FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
+
+
+class Proportional(Parameters):
+    """Parameters of motion.proportional."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    phase: Literal["position", "align"] = Field(
+        description="`position`: on the way, against the direction of the goal. `align`: at the "
+        "goal, against its heading."
+    )
+    position: PositiveLength = Field(
+        0.1,
+        description="How near the goal the first phase no longer counts: there its direction "
+        "changes faster than odometry tells.",
+    )
+    r2: Ratio = Field(0.9, description="Least coefficient of determination R² of the line.")
+    gain_min: Frequency | None = Field(
+        None, description="Least gain, in rad/s for each rad: `0.1 Hz` is 0.1 per second."
+    )
+    gain_max: Frequency | None = Field(None, description="Greatest gain.")
+
+
+@check("motion.proportional", Subject.RECORDING, Proportional)
+def proportional(recording: Recording, parameters: Proportional) -> Finding:
+    """The turn is commanded in proportion to the heading error.
+
+    Judged by every published command, against the error at the newest odometry before it (so
+    that the delay of odometry costs nothing), normalised to [-pi, pi]. A line through the
+    origin is laid through them: its slope is the gain, R² tells how well it fits. Commands at a
+    limit (of the robot, or a clamp of your own) and the pause near zero within your tolerance
+    do not count.
+
+    Explains commands that know only a few values (bang-bang), an error that is not normalised,
+    a wrong sign, commands that have nothing to do with the error, and a gain out of range.
+    """
+    phase = parameters.phase
+    expected = (
+        f"angular.z in proportion to the heading error to {_WHAT[phase]} (R² at least "
+        f"{parameters.r2:.2g}{_range_words(parameters)})"
+    )
+    run = approach(recording, parameters.goal)
+    if isinstance(run, Cause):
+        return run.finding(expected)
+    if not recording.on(TOPIC):
+        return why_silent(recording, TOPIC).finding(expected)
+    arrival = run.arrival(parameters.position)
+    if phase == "align" and arrival is None:
+        cause = why_not_there(run, parameters.position)
+        return (cause or Cause("never near the goal")).finding(expected)
+    scene = recording.scene
+    limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
+    # Odometry that is on its way, or waits for a busy callback, is not yet known.
+    tried = [_samples(run, parameters, behind) for behind in range(_MOST_BEHIND + 1)]
+    verdicts = [examine(samples, limit_rad_s, parameters.r2) for samples in tried]
+    good = [index for index, item in enumerate(verdicts) if _is_good(item, parameters)]
+    index = max(good, key=lambda i: verdicts[i].r2, default=0)
+    verdict, samples = verdicts[index], tried[index]
+    evidence = Evidence(plots=(_plot(samples, phase),))
+    if good:
+        return _judge_gain(verdict, parameters, expected, evidence)
+    deeper = why_cut_short(recording)
+    if deeper is not None and len(samples) < _LEAST_SAMPLES:
+        return deeper.finding(expected)
+    if verdict.law is Law.NOTHING_TO_DO:
+        return Finding.passed(
+            expected,
+            f"there was hardly an error to correct, and hardly a turn was commanded "
+            f"({counted(len(samples), 'command')})",
+            evidence,
+        )
+    observed, hint = _words(verdict, parameters, len(samples))
+    return Finding.failed(expected, observed, hint, evidence)
+
+
+def _range_words(parameters: Proportional) -> str:
+    low, high = parameters.gain_min, parameters.gain_max
+    if low is not None and high is not None:
+        return f", gain {low:.3g} to {high:.3g} 1/s"
+    if low is not None:
+        return f", gain at least {low:.3g} 1/s"
+    return f", gain at most {high:.3g} 1/s" if high is not None else ""
+
+
+def _is_good(verdict: Verdict, parameters: Proportional) -> bool:
+    return verdict.law is Law.PROPORTIONAL and verdict.r2 >= parameters.r2 and verdict.gain > 0.0
+
+
+def _samples(run: Approach, parameters: Proportional, behind: int) -> list[Sample]:
+    """Commands of the phase, each with the error that it can have known.
+
+    Args:
+        run: The run.
+        parameters: Say which phase.
+        behind: By how many messages the student was behind the newest odometry.
+    """
+    recording, truth = run.recording, run.truth
+    arrival = run.arrival(parameters.position)
+    arrival_ns = math.inf if arrival is None else truth[arrival].time_ns
+    odometry = recording.on(ODOMETRY)
+    found: list[Sample] = []
+    driving: list[Sample] = []
+    for item in commands(recording):
+        # What was sent before the first odometry, or after the end, knows no error.
+        seen_ns = _seen_ns(odometry, item.time_ns, behind)
+        if seen_ns is None or item.time_ns > truth[-1].time_ns or not item.twist.is_finite:
+            continue
+        pose = pose_at(truth, seen_ns)
+        if parameters.phase == "position":
+            if seen_ns < arrival_ns:
+                error = run.bearing_error_rad(pose)
+                found.append(Sample(error, item.twist.angular_rad_s))
+        elif seen_ns >= arrival_ns:
+            sample = Sample(run.heading_error_rad(pose), item.twist.angular_rad_s)
+            drives = abs(item.twist.linear_m_s) > _NO_SPEED_M_S
+            (driving if drives else found).append(sample)
+    # One that drives on while it turns is judged by what it does then.
+    return found if len(found) >= _LEAST_SAMPLES else [*driving, *found]
+
+
+def _seen_ns(odometry: Sequence[Message], time_ns: int, behind: int) -> int | None:
+    """Time at which the newest odometry that was known was measured, or None before the first."""
+    if not odometry:
+        return time_ns
+    index = bisect_right(odometry, time_ns, key=_stamp_ns)
+    if index <= behind:
+        return None
+    message = odometry[index - 1 - behind]
+    sec, nanosec = (number(message.value, "header", "stamp", key) for key in ("sec", "nanosec"))
+    return message.stamp_ns if sec is None or nanosec is None else int(sec) * NS + int(nanosec)
+
+
+def _stamp_ns(message: Message) -> int:
+    return message.stamp_ns
+
+
+def _judge_gain(
+    verdict: Verdict, parameters: Proportional, expected: str, evidence: Evidence
+) -> Finding:
+    low, high = parameters.gain_min or 0.0, parameters.gain_max or math.inf
+    seen = f"gain {verdict.gain:.3g} 1/s, R² {verdict.r2:.3f}, {counted(verdict.used, 'command')}"
+    if low <= verdict.gain <= high:
+        return Finding.passed(expected, seen, evidence)
+    size = "small" if verdict.gain < low else "large"
+    hint = "The gain is the factor of the error."
+    return Finding.failed(expected, f"{seen}: the gain is too {size}", hint, evidence)
+
+
+def _words(verdict: Verdict, parameters: Proportional, number: int) -> tuple[str, str]:
+    """What the commands are instead, and what to try."""
+    formula = f"angular.z = gain * error, with the error {_FORMULA[parameters.phase]}"
+    wrap = "normalised by atan2(sin(e), cos(e))"
+    if verdict.law is Law.TOO_FEW:
+        return (
+            f"only {counted(number, 'command')} in this phase to judge, at more than "
+            f"{metres(parameters.position)} from the goal"
+            if parameters.phase == "position"
+            else f"only {counted(number, 'command')} in this phase to judge",
+            f"Publish {formula}, in every callback.",
+        )
+    if verdict.law is Law.ZERO:
+        return (
+            f"all of {counted(number, 'command')} in this phase have angular.z = 0, although there "
+            "is an error",
+            f"Publish {formula}.",
+        )
+    if verdict.law is Law.STEPS:
+        values = ", ".join(f"{value:.3g}" for value in verdict.values)
+        return (
+            f"angular.z has only {counted(len(verdict.values), 'size')} ({values} rad/s) whatever "
+            "the error is: that is on-off control (bang-bang)",
+            f"Publish {formula}.",
+        )
+    if verdict.law is Law.NOT_NORMALISED:
+        return (
+            f"{percent(round(verdict.share, 3))} of the commands fit an error that is a full turn "
+            f"off: it is not normalised to [-pi, pi] (gain {verdict.gain:.3g} 1/s)",
+            f"Publish {formula}, {wrap}.",
+        )
+    if verdict.law is Law.WRONG_SIGN:
+        return (
+            f"it turns away from the error: gain {verdict.gain:.3g} 1/s",
+            f"Publish {formula}; counter-clockwise is positive (REP-103).",
+        )
+    return (
+        f"the commands do not follow the error: gain {verdict.gain:.3g} 1/s, R² {verdict.r2:.2f}, "
+        f"{counted(verdict.used, 'command')}",
+        f"Publish {formula}, {wrap}, from the newest odometry.",
+    )
+
+
+def _plot(samples: Sequence[Sample], phase: str) -> Plot:
+    shown = samples[:: max(1, len(samples) // _MOST_POINTS)]
+    return Plot(
+        "Command over error",
+        f"heading error to {_WHAT[phase]} (rad)",
+        "angular.z (rad/s)",
+        tuple(item.error_rad for item in shown),
+        tuple(item.command_rad_s for item in shown),
+    )

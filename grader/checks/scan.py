@@ -1,0 +1,93 @@
+"""What the LiDAR told the student: the recorded scans, and the classic ways to misread them."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+
+from grader.checks.command import SCAN, number
+from grader.checks.ground import Sight
+from grader.checks.measure import metres, side
+from grader.checks.wording import code
+from grader.recording.model import Message, Recording
+
+# As near as this is "the same distance" for an explanation.
+_SAME_M = 0.06
+_CONE_RAD = math.radians(20.0)
+
+
+@dataclass(frozen=True)
+class Misreading:
+    """How a scan was probably misread.
+
+    Attributes:
+        words: A clause to follow what was seen.
+        hint: What to try.
+    """
+
+    words: str
+    hint: str
+
+
+def newest(recording: Recording, time_ns: int) -> Message | None:
+    """The last scan that was published by a time."""
+    scans = recording.on(SCAN)
+    index = bisect_right(scans, time_ns, key=_stamp_ns)
+    return scans[index - 1] if index else None
+
+
+def front(scan: Message) -> float | None:
+    """What the beam straight ahead reports, in metres; may be inf, NaN or 0.0."""
+    ranges = scan.value.get("ranges")
+    start, step = number(scan.value, "angle_min"), number(scan.value, "angle_increment")
+    if not isinstance(ranges, list | tuple) or not ranges or start is None or not step:
+        return None
+    return float(ranges[round(-start / step) % len(ranges)])
+
+
+def misreading(
+    recording: Recording, time_ns: int, nearest: Sight | None, distance_m: float | None
+) -> Misreading | None:
+    """Why the robot may have seen an obstacle ahead where there is none.
+
+    Args:
+        recording: The run.
+        time_ns: When it stopped, or did not start.
+        nearest: The nearest thing then, in any direction.
+        distance_m: At which it should stop, or None where that is not known.
+    """
+    scan = newest(recording, time_ns)
+    if (
+        nearest is not None
+        and abs(nearest.bearing_rad) > _CONE_RAD
+        and (
+            nearest.distance_m <= distance_m + _SAME_M
+            if distance_m is not None
+            else nearest.distance_m <= 1.0
+        )
+    ):
+        return Misreading(
+            f"{code(nearest.name)} was then {metres(nearest.distance_m)} away, "
+            f"{side(nearest.bearing_rad)}, as if the nearest of all beams counted",
+            "Look at the beam straight ahead only, not at min(ranges): its index is "
+            "round(-angle_min / angle_increment).",
+        )
+    seen = None if scan is None else front(scan)
+    if seen == 0.0:
+        return Misreading(
+            "the beam straight ahead reported 0.0 then, which means that nothing came back",
+            "A range below range_min is no obstacle: ignore ranges outside of range_min to "
+            "range_max.",
+        )
+    if seen is not None and not math.isfinite(seen):
+        return Misreading(
+            f"the beam straight ahead reported {seen:g} then: nothing within its range",
+            "inf is a normal range: nothing is there, so drive on. Every comparison with nan is "
+            "false.",
+        )
+    return None
+
+
+def _stamp_ns(message: Message) -> int:
+    return message.stamp_ns

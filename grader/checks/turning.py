@@ -1,0 +1,206 @@
+"""Checks of how a robot turns on its way to a goal pose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from pydantic import Field
+
+from grader.assignment.quantity import Angle, PositiveLength, Speed
+from grader.checks.approach import Approach, approach, why_not_there
+from grader.checks.cause import Cause
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.contact import why_touched
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.immobility import why_cut_short
+from grader.checks.measure import degrees, metres, speed
+from grader.checks.reference import GoalPose
+from grader.checks.track import speed_plot
+from grader.recording.model import NS, Recording, Truth
+from sim.motion import wrap_angle
+
+_GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
+# Way that braking and the delay of odometry may still cost after the position is reached.
+_RUN_OUT_M = 0.02
+_OFF_RAD = 0.5
+_PAUSE_NS = NS // 5
+_WRAP_HINT = (
+    "An angle error beyond [-pi, pi] makes the long way of the short one: normalise it with "
+    "atan2(sin(e), cos(e)) before you multiply it by the gain."
+)
+
+
+class TwoPhases(Parameters):
+    """Parameters of motion.two_phases."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    position: PositiveLength = Field(description="How near the goal counts as reached.")
+    speed: Speed = Field(0.01, description="Commanded speed that still counts as none.")
+
+
+@check("motion.two_phases", Subject.RECORDING, TwoPhases)
+def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
+    """At the goal's position the robot only turns, it no longer drives.
+
+    Judged by the commands in force and the true way. Within `position` of the goal the robot
+    may drive on towards it, as far as its own tolerance says; but once it has looked away from
+    the goal, or has turned without driving, it may not drive any more (2 cm are allowed for
+    braking and the delay of odometry).
+
+    Explains why the position was not reached, a speed in the second phase, and driving and
+    turning by turns.
+    """
+    expected = (
+        f"no linear motion once within {metres(parameters.position)} of the goal, only turning"
+    )
+    run = approach(recording, parameters.goal)
+    if isinstance(run, Cause):
+        return run.finding(expected)
+    arrival = run.arrival(parameters.position)
+    if arrival is None:
+        cause = why_not_there(run, parameters.position)
+        return (cause or Cause("never near the goal")).finding(expected)
+    stray = _stray(run, arrival, parameters.speed)
+    evidence = Evidence(plots=(speed_plot(recording), run.distance_plot))
+    way = sum(_way_m(before, after) for before, after in stray)
+    if way <= _RUN_OUT_M:
+        return Finding.passed(expected, f"{metres(way)} after it had begun to turn", evidence)
+    deeper = why_cut_short(recording) or why_touched(recording)
+    if deeper is not None:
+        return deeper.finding(expected)
+    first = stray[0][1]
+    fastest = max((abs(after.command_m_s) for _, after in stray))
+    when_s = recording.since_launch_s(first.time_ns)
+    return Finding.failed(
+        expected,
+        f"drove {metres(way)} while it turned at the goal, commanded with up to {speed(fastest)} "
+        f"(from {when_s:.2f} s after launch)",
+        "In the second phase linear.x is 0.0. Remember that the position was reached: a flag that "
+        "is set once does not fall back into the first phase.",
+        Evidence(moments=(Moment("drives again", when_s),), plots=evidence.plots),
+    )
+
+
+def _stray(run: Approach, arrival: int, none_m_s: float) -> list[tuple[Truth, Truth]]:
+    """Pairs of steps between which the robot drives where it should only turn."""
+    found = []
+    turning = False
+    still_since: int | None = None
+    for before, after in pairwise(run.truth[arrival:]):
+        if abs(after.command_m_s) <= none_m_s:
+            still_since = still_since or after.time_ns
+            turning |= after.time_ns - still_since >= _PAUSE_NS
+            continue
+        still_since = None
+        if turning or abs(run.bearing_error_rad(after)) > _OFF_RAD:
+            found.append((before, after))
+    return found
+
+
+def _way_m(before: Truth, after: Truth) -> float:
+    return math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
+
+
+class ShortWay(Parameters):
+    """Parameters of motion.short_way."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
+    tolerance: Angle = Field(
+        math.radians(30.0),
+        description="How far it may turn the wrong way before it passes half a turn: near half "
+        "a turn both ways are short.",
+    )
+
+
+@dataclass(frozen=True)
+class _Detour:
+    """A turn by the long way.
+
+    Attributes:
+        step: Where it begins.
+        error_rad: What would have been the short way from there.
+        away_rad: How far it turned away before it passed half a turn, or the run ended.
+        what: What it turned to.
+    """
+
+    step: Truth
+    error_rad: float
+    away_rad: float
+    what: str
+
+
+@check("motion.short_way", Subject.RECORDING, ShortWay)
+def short_way(recording: Recording, parameters: ShortWay) -> Finding:
+    """The robot always turns by the short way.
+
+    Judged by the true heading, in the first phase against the direction of the goal, in the
+    second (once driving has ended near the goal) against the goal's heading. The long way
+    leads away from the error and through half a turn; overshooting by less is no long way.
+
+    Explains where it turned the long way, from which error, and why the robot never moved.
+    """
+    expected = "turns by the short way, never more than half a turn for an error"
+    run = approach(recording, parameters.goal)
+    if isinstance(run, Cause):
+        return run.finding(expected)
+    detours = list(_detours(run, parameters))
+    evidence = Evidence(plots=(run.heading_plot,))
+    if not detours:
+        deeper = why_cut_short(recording)
+        if deeper is not None and run.arrival(parameters.position) is None:
+            return deeper.finding(expected)
+        return Finding.passed(expected, "no long way", evidence)
+    first = detours[0]
+    when_s = recording.since_launch_s(first.step.time_ns)
+    long_rad = math.tau - abs(first.error_rad)
+    more = f", and {len(detours) - 1} more times" if len(detours) > 1 else ""
+    return Finding.failed(
+        expected,
+        f"turned away from {first.what} through half a turn: {degrees(long_rad)} "
+        f"{_sense(-first.error_rad)} where {degrees(abs(first.error_rad))} "
+        f"{_sense(first.error_rad)} would do ({when_s:.2f} s after launch{more})",
+        _WRAP_HINT,
+        Evidence(moments=(Moment("turns the long way", when_s),), plots=evidence.plots),
+    )
+
+
+def _sense(angle_rad: float) -> str:
+    return "counter-clockwise" if angle_rad > 0.0 else "clockwise"
+
+
+def _detours(run: Approach, parameters: ShortWay) -> Iterator[_Detour]:
+    truth = run.truth
+    arrival = run.arrival(parameters.position)
+    driven = run.driven(parameters.position)
+    first = truth if arrival is None else truth[:arrival]
+    yield from _away(first, run.bearing_error_rad, parameters.tolerance, "the goal")
+    if driven is not None:
+        yield from _away(
+            truth[driven:], run.heading_error_rad, parameters.tolerance, "the goal's heading"
+        )
+
+
+def _away(
+    truth: Sequence[Truth], error: Callable[[Truth], float], tolerance_rad: float, what: str
+) -> Iterator[_Detour]:
+    """Turns away from an error, by more than the tolerance, through half a turn."""
+    away_rad = 0.0
+    begin: Truth | None = None
+    for before, after in pairwise(truth):
+        error_rad = error(before)
+        turned_rad = wrap_angle(after.yaw_rad - before.yaw_rad)
+        if turned_rad * error_rad >= 0.0:
+            if turned_rad:
+                away_rad, begin = 0.0, None
+            continue
+        begin = begin or before
+        away_rad += abs(turned_rad)
+        crosses = error_rad * error(after) < 0.0 and abs(error_rad) > math.pi / 2.0
+        if crosses and away_rad > tolerance_rad:
+            yield _Detour(begin, error(begin), away_rad, what)
+        if crosses:
+            away_rad, begin = 0.0, None

@@ -1,0 +1,394 @@
+"""log.follows: log lines must show what the node was sent, when it was sent."""
+
+from dataclasses import replace
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.recording.model import Endpoint, Kind, LogLine, Owner, Qos
+from tests.checks.builder import (
+    RELIABLE,
+    at,
+    call,
+    declared,
+    died,
+    endpoint,
+    failing,
+    judge,
+    message,
+    node,
+    output,
+    process,
+    recording,
+    taken,
+    traceback,
+)
+
+BOT = "/bot_subscriber"
+ODOMETRY = "nav_msgs/msg/Odometry"
+SCAN = "sensor_msgs/msg/LaserScan"
+LATCHED = replace(RELIABLE, durability="transient_local")
+POSITION = {
+    "topic": "/odom",
+    "fields": ["pose.pose.position.x", "pose.pose.position.y"],
+    "at_least": 2,
+}
+FRONT = {"topic": "/scan", "fields": ["ranges[0]"], "at_least": 2}
+# One sends from 1 s to 2 s, the other from 3 s to 4 s.
+ODOM_TIMES_S = [1.0, 1.2, 1.4, 1.6, 1.8, 2.0]
+SCAN_TIMES_S = [3.0, 3.2, 3.4, 3.6, 3.8, 4.0]
+X, Y, AHEAD, LEFT, BEHIND = 1.372, -0.618, 1.834, 0.618, 2.5
+RANGES = [AHEAD, *[LEFT] * 90, *[2.0] * 89, BEHIND, *[3.0] * 179]
+
+
+def odometry(x=X, y=Y):
+    return {
+        "child_frame_id": "base_footprint",
+        "pose": {
+            "pose": {
+                "position": {"x": x, "y": y, "z": 0.0},
+                "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+            },
+            "covariance": [1e-5, *[0.0] * 35],
+        },
+        "twist": {"twist": {"linear": {"x": 0.25, "y": 0.0, "z": 0.0}}},
+    }
+
+
+def scan():
+    return {"range_min": 0.12, "range_max": 3.5, "ranges": list(RANGES), "intensities": []}
+
+
+def sent(topic, type, value, times_s):
+    return tuple(
+        message(t, value, sequence=n, topic=topic, type=type)
+        for n, t in enumerate(times_s, start=1)
+    )
+
+
+def subscription(topic="/odom", type=ODOMETRY, qos=RELIABLE):
+    return endpoint(topic, kind=Kind.SUBSCRIPTION, type=type, node=BOT, qos=qos)
+
+
+def publisher(topic="/odom", type=ODOMETRY, qos=RELIABLE) -> Endpoint:
+    return endpoint(topic, type=type, node="/probe", owner=Owner.PROBE, qos=qos)
+
+
+def lines(text, times_s, delay_s=0.01):
+    return tuple(line for t in times_s for line in output(text, time_s=t + delay_s))
+
+
+def run(log: tuple[LogLine, ...] = (), **changes):
+    """A subscriber that spins, is sent odometry first and scans then, and writes these lines."""
+    healthy = {
+        "submission": recording().submission,
+        "messages": {
+            "/odom": sent("/odom", ODOMETRY, odometry(), ODOM_TIMES_S),
+            "/scan": sent("/scan", SCAN, scan(), SCAN_TIMES_S),
+        },
+        "nodes": (node(BOT), node("/probe", 0.0, owner=Owner.PROBE)),
+        "endpoints": (
+            subscription(),
+            subscription("/scan", SCAN),
+            publisher(),
+            publisher("/scan", SCAN),
+        ),
+        "declarations": (declared("started", 0.05), declared("node", 0.3), declared("spin", 0.41)),
+        "calls": tuple(call(0.5 * index, of=BOT) for index in range(1, 9)),
+        "log": tuple(sorted(log, key=lambda line: line.time_ns)),
+    }
+    return recording(**{**healthy, **changes})
+
+
+def position(log=(), **changes):
+    return failing("log.follows", run(log, **changes), **POSITION)
+
+
+def front(log=(), **changes):
+    return failing("log.follows", run(log, **changes), **FRONT)
+
+
+class TestAnyFormatIsRight:
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "[INFO] [1700000000.123456789] [bot]: Position: x = 1.37, y = -0.62",
+            "1.372 -0.618",
+            "(1.37,-0.61)",
+            "x:1.37y:-0.62",
+            '{"x": 1.372, "y": -0.618}',
+            "x: 1,37; y: -0,62",
+            "1.372e+00|-6.18e-01",
+            "geometry_msgs.msg.Point(x=1.372, y=-0.618, z=0.0)",
+            "x: 1.372\ny: -0.618",
+            "Position:\n\tx\n1.4e3 1.372\n\ty\n-0.618",
+            "\x1b[32mx=1.37\x1b[0m y=-0.62",
+            "y -0.62 x 1.37",
+        ],
+    )
+    def test_of_two_numbers(self, text):
+        finding = judge("log.follows", run(lines(text, ODOM_TIMES_S)), **POSITION)
+        assert finding.status is Status.PASSED, finding
+        assert "follow 6 of 6 messages" in finding.observed
+        assert finding.evidence.log[0] == text.splitlines()[0]
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "front 1.83 m",
+            "front-1.83",
+            "1.834000",
+            "array('f', [1.834, 0.5])",
+            "range=+1.84",
+            "1,83",
+        ],
+    )
+    def test_of_one_number(self, text):
+        finding = judge("log.follows", run(lines(text, SCAN_TIMES_S)), **FRONT)
+        assert finding.status is Status.PASSED, finding
+
+    def test_on_stdout_too(self):
+        log = tuple(replace(line, stream="stdout") for line in lines("1.37 -0.62", ODOM_TIMES_S))
+        assert judge("log.follows", run(log), **POSITION).status is Status.PASSED
+
+    def test_of_a_beam_that_measures_nothing(self):
+        value = {**scan(), "ranges": [float("inf"), *RANGES[1:]]}
+        changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
+        good = run(lines("[INFO] [1.5] [bot]: Front: inf", SCAN_TIMES_S), messages=changed)
+        assert judge("log.follows", good, **FRONT).status is Status.PASSED
+        bad = run(lines("[INFO] [1.5] [bot]: information", SCAN_TIMES_S), messages=changed)
+        assert "none shows `ranges[0]` = inf" in failing("log.follows", bad, **FRONT)
+
+
+class TestAnyRhythmIsRight:
+    def test_not_every_message_needs_a_line(self):
+        finding = judge("log.follows", run(lines("1.37 -0.62", [1.0, 2.0])), **POSITION)
+        assert finding.status is Status.PASSED
+        assert "follow 2 of 6 messages" in finding.observed
+
+    def test_a_timer_may_log_also_when_no_message_comes_any_more(self):
+        log = lines("1.37 -0.62", [0.5 + 0.3 * index for index in range(12)])
+        assert judge("log.follows", run(log), **POSITION).status is Status.PASSED
+
+    def test_one_line_does_not_stand_for_many_messages(self):
+        found = position(lines("1.37 -0.62", [1.0]))
+        assert "log lines follow only 1 of 6 messages on `/odom`" in found
+        assert "Log in every call of the callback" in found
+
+    def test_values_that_change_must_be_those_of_the_message(self):
+        values = [odometry(x=1.0 + 0.1 * index) for index in range(6)]
+        changed = tuple(
+            message(t, value, topic="/odom", type=ODOMETRY)
+            for t, value in zip(ODOM_TIMES_S, values, strict=True)
+        )
+        fresh = tuple(
+            line
+            for index, t in enumerate(ODOM_TIMES_S)
+            for line in lines(f"{1.0 + 0.1 * index:.2f} -0.62", [t])
+        )
+        good = judge("log.follows", run(fresh, messages={"/odom": changed}), **POSITION)
+        assert "follow 6 of 6 messages" in good.observed
+        stale = lines("1.00 -0.62", ODOM_TIMES_S)
+        assert "only 1 of 6" in failing(
+            "log.follows", run(stale, messages={"/odom": changed}), **POSITION
+        )
+
+    def test_a_line_must_come_soon(self):
+        late = lines("1.83", SCAN_TIMES_S, delay_s=0.15)
+        assert judge("log.follows", run(late), **FRONT).status is Status.PASSED
+        finding = judge("log.follows", run(late), **FRONT, within="100 ms")
+        assert finding.status is Status.FAILED
+
+
+class TestOtherValues:
+    def test_another_beam(self):
+        assert "`2.50`, which shows `ranges[180]`" in front(lines("2.50", SCAN_TIMES_S))
+
+    def test_the_nearest_of_all_beams(self):
+        found = front(lines("front 0.618", SCAN_TIMES_S))
+        assert "none shows `ranges[0]` = 1.83" in found
+        assert "which shows `min(ranges)`" in found
+        assert "`msg.ranges[0]`" in found
+
+    def test_the_greatest_measurable_distance(self):
+        assert "shows `range_max`" in front(lines("3.5", SCAN_TIMES_S))
+
+    def test_z_in_place_of_y(self):
+        found = position(lines("1.37 0.0", ODOM_TIMES_S))
+        assert "none shows `pose.pose.position.y` = -0.62: `1.37 0.0`" in found
+        assert "`pose.pose.position.x`" not in found
+
+    def test_the_velocity(self):
+        found = position(lines("v = 0.25", ODOM_TIMES_S))
+        assert "`pose.pose.position.x` = 1.37 and `pose.pose.position.y` = -0.62" in found
+        assert "shows `twist.twist.linear.x`" in found
+
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            ("1.8", "`ranges[0]` rounded to 1 decimal"),
+            ("2", "`ranges[0]` rounded to no decimals"),
+            ("-1.834", "`ranges[0]` with the opposite sign"),
+            ("183.4", "100 times the value, as in centimetres, of `ranges[0]`"),
+            ("1834 mm", "1000 times the value, as in millimetres, of `ranges[0]`"),
+        ],
+    )
+    def test_the_value_in_another_form(self, text, words):
+        assert words in front(lines(text, SCAN_TIMES_S))
+
+    def test_a_number_that_is_nothing_known(self):
+        found = front(lines("front 0.77", SCAN_TIMES_S))
+        assert "which shows" not in found
+
+    def test_text_without_numbers(self):
+        found = front(lines("[INFO] [1700000000.1] [bot]: Scan received", SCAN_TIMES_S))
+        assert "`Scan received`" in found and "which" not in found
+
+    def test_nothing_is_kept_of_the_loggers_own_numbers(self):
+        assert "none shows" in front(lines("[INFO] [1.834] [bot]: hello", SCAN_TIMES_S))
+
+    def test_values_that_are_logged_in_the_other_callback(self):
+        found = position(lines("1.37 -0.62", SCAN_TIMES_S))
+        assert "logged, but not when its messages come: `1.37 -0.62` was written 1.01 s after" in (
+            found
+        )
+        assert "messages came on `/scan`" in found
+        assert "Log in the callback of `/odom` itself" in found
+
+
+class TestSilence:
+    def test_a_callback_that_logs_nothing(self):
+        found = front(lines("1.37 -0.62", ODOM_TIMES_S))
+        assert "nothing is logged when messages come on `/scan`" in found
+        assert "its executor comes round" in found
+        assert "debug()" in found
+
+    def test_no_subscription(self):
+        endpoints = (subscription("/scan", SCAN), publisher(), publisher("/scan", SCAN))
+        found = position(endpoints=endpoints)
+        assert "`/scan` only" in found and "create_subscription" in found
+
+    def test_another_type(self):
+        endpoints = (subscription(type="geometry_msgs/msg/Pose"), publisher())
+        found = position(endpoints=endpoints)
+        assert "its callback is never called: `/odom` carries `nav_msgs/msg/Odometry`" in found
+        assert "only a part" in found
+        assert "from nav_msgs.msg import Odometry" in found
+
+    def test_qos_that_does_not_match(self):
+        finding = judge(
+            "log.follows", run(endpoints=(subscription(qos=LATCHED), publisher())), **POSITION
+        )
+        assert finding.status is Status.FAILED
+        assert "its callback is never called: the subscription's QoS does not match" in (
+            finding.observed
+        )
+        assert "durability volatile offered, transient_local requested" in finding.observed
+        assert "offers less than it requests" in finding.hint
+        assert finding.evidence.tables[0].rows == (
+            ("durability", "volatile offered, transient_local requested"),
+        )
+
+    def test_one_of_two_subscriptions_that_matches_is_enough_to_look_further(self):
+        endpoints = (subscription(qos=LATCHED), subscription(), publisher())
+        assert "nothing is logged" in position(endpoints=endpoints)
+
+    def test_a_subscription_of_best_effort_matches(self):
+        qos = Qos(reliability="best_effort", durability="volatile")
+        assert "nothing is logged" in position(endpoints=(subscription(qos=qos), publisher()))
+
+    def test_a_subscription_that_was_destroyed(self):
+        gone = replace(subscription(), vanished_ns=at(0.6))
+        assert "vanished before the first message" in position(endpoints=(gone, publisher()))
+
+    def test_spin_that_was_never_called(self):
+        log = output(
+            "Traceback (most recent call last):\n"
+            '  File "/w/install/lib/python3.12/site-packages/bot_publisher/node.py", line 9, in f\n'
+            "    time.sleep(1.0)\n"
+            "KeyboardInterrupt",
+            time_s=4.55,
+        )
+        found = position(log, declarations=(declared("started"), declared("node")), calls=())
+        assert "the subscription to `/odom` is there and its QoS matches" in found
+        assert "rclpy.spin() was never called" in found
+        assert "src/bot_publisher/bot_publisher/node.py:9" in found
+
+    def test_an_executor_that_another_callback_blocks(self):
+        calls = (call(0.5, of=BOT), call(1.5, None, of=BOT), call(2.0, None, of=BOT))
+        found = front(lines("1.37 -0.62", ODOM_TIMES_S), calls=calls)
+        assert "something keeps the executor from coming round" in found
+        assert "from 1.50 s after launch on the node's parameter service answers no call" in found
+        assert "`while True`" in found
+
+    def test_an_executor_that_answers_is_not_blocked(self):
+        calls = (call(1.5, None, of=BOT), call(3.2, of=BOT))
+        assert "nothing is logged" in front(calls=calls)
+
+    def test_a_process_that_died(self):
+        log = output(traceback("AttributeError: 'LaserScan' object has no attribute 'range'"))
+        found = front(log, processes=(died(1, exited_s=3.1),))
+        assert "no log line shows a message on `/scan`: the process" in found
+        assert "AttributeError" in found
+
+    def test_a_node_that_publishes_the_topic_itself(self):
+        forged = endpoint("/odom", type=ODOMETRY, node=BOT)
+        log = lines("1.37 -0.62", ODOM_TIMES_S)
+        found = position(log, endpoints=(subscription(), forged, publisher()))
+        assert "the node itself publishes on `/odom`" in found
+
+
+class TestNotTheStudentsFault:
+    def errs(self, subject, parameters=FRONT):
+        finding = judge("log.follows", subject, **parameters)
+        assert finding.status is Status.ERROR, finding
+        return finding
+
+    def test_nothing_was_sent(self):
+        finding = self.errs(run(messages={"/odom": run().on("/odom")}))
+        assert "nothing was sent on `/scan`" in finding.observed and finding.disturbed
+
+    def test_too_little_was_sent(self):
+        messages = {"/scan": sent("/scan", SCAN, scan(), [3.0])}
+        finding = self.errs(run(lines("1.83", [3.0]), messages=messages))
+        assert "only 1 message was sent on `/scan`" in finding.observed
+
+    def test_lines_that_the_host_made_late(self):
+        log = lines("1.83", [3.99, 4.49])
+        assert judge("log.follows", run(log), **FRONT, within="300 ms").status is Status.FAILED
+        finding = self.errs(
+            run(log, disturbance=taken(2.9, 4.4, waited_s=0.3)), {**FRONT, "within": "300 ms"}
+        )
+        assert finding.disturbed and "the machine took 300 ms" in finding.observed
+
+    def test_a_host_that_took_half_of_the_time(self):
+        self.errs(run(disturbance=taken(2.9, 4.4, waited_s=0.9)))
+
+    def test_output_that_was_not_kept(self):
+        finding = self.errs(run(processes=(process(dropped_bytes=1000),)))
+        assert "1000 bytes more" in finding.observed
+
+    @pytest.mark.parametrize(
+        ("field", "words"),
+        [
+            ("range[0]", "no field 'range'"),
+            ("ranges[360]", "360 items, so there is no [360]"),
+            ("ranges", "ranges is not a number"),
+            ("range_max.x", "range_max has no field 'x'"),
+        ],
+    )
+    def test_a_field_that_the_message_does_not_have(self, field, words):
+        finding = self.errs(run(), {"topic": "/scan", "fields": [field]})
+        assert "the assignment expects what sensor_msgs/msg/LaserScan cannot be" in finding.observed
+        assert words in finding.observed
+
+
+def test_a_path_that_is_none_is_the_authors_mistake():
+    with pytest.raises(ValueError, match="'ranges 0' is not a field"):
+        judge("log.follows", run(), topic="/scan", fields=["ranges 0"])
+
+
+def test_a_message_on_rosout_does_not_count_besides_its_line():
+    log = lines("1.83", [3.0])
+    log += tuple(replace(line, stream="rosout", level="INFO") for line in log)
+    assert "follow only 1 of 6" in front(log)

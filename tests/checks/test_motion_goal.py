@@ -1,0 +1,342 @@
+"""Reaching a goal with a proportional controller, on runs of the real simulator core."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.checks.finding import Status
+from tests.checks.builder import (
+    died,
+    drive,
+    failing,
+    judge,
+    on_odometry,
+    on_timer,
+    output,
+    simulated,
+    taken,
+    traceback,
+)
+
+GOAL = (0.8, 0.5, 2.0)
+BEHIND = (-0.6, 0.15, -math.pi / 2)
+REACHES = {"position": "0.1 m", "heading": "0.1 rad"}
+
+
+def wrap(angle):
+    return math.atan2(math.sin(angle), math.cos(angle))
+
+
+def clamp(value, limit):
+    return max(-limit, min(limit, value))
+
+
+class Student:
+    """The lecture's controller, with every classic mistake to switch on."""
+
+    def __init__(self, goal, **style):
+        self.goal = goal
+        self.linear, self.angular = style.pop("linear", 0.6), style.pop("angular", 1.5)
+        self.top, self.spin = style.pop("top", 0.22), style.pop("spin", 2.84)
+        self.near, self.straight = style.pop("near", 0.05), style.pop("straight", 0.05)
+        self.turn_first = style.pop("turn_first", None)
+        self.constant = style.pop("constant", None)
+        self.wrap = style.pop("wrap", wrap)
+        self.wrap_theta = style.pop("wrap_theta", self.wrap)
+        self.law = style.pop("law", lambda error: self.angular * error)
+        self.align_law = style.pop("align_law", self.law)
+        self.creep = style.pop("creep", 0.0)
+        self.forgets = style.pop("forgets", False)
+        self.arrived = False
+        assert not style
+
+    def __call__(self, pose):
+        x, y, theta = self.goal
+        dx, dy = x - pose.x_m, y - pose.y_m
+        distance = math.hypot(dx, dy)
+        if not self.arrived and distance > self.near:
+            error = self.wrap(math.atan2(dy, dx) - pose.yaw_rad)
+            speed = self.constant or clamp(self.linear * distance, self.top)
+            if self.turn_first is not None and abs(error) > self.turn_first:
+                speed = 0.0
+            return speed, clamp(self.law(error), self.spin)
+        self.arrived = not self.forgets
+        error = self.wrap_theta(theta - pose.yaw_rad)
+        if abs(error) < self.straight:
+            return 0.0, 0.0
+        return self.creep, clamp(self.align_law(error), self.spin)
+
+
+def run_to(goal, start=(0.0, 0.0, 0.0), seconds=40.0, period_s=None, **style):
+    student = Student(goal, **style)
+    controller = on_odometry(student) if period_s is None else on_timer(period_s, student)
+    pose = [start[0], start[1], f"{start[2]} rad"]
+    return drive(controller, seconds=seconds, options={"robot": {"pose": pose}})
+
+
+def yaml(goal):
+    return [goal[0], goal[1], f"{goal[2]!r} rad"]
+
+
+def checks(goal):
+    """Every check of the assignment with its parameters."""
+    pose = yaml(goal)
+    return {
+        "motion.reaches": {"goal": pose, **REACHES},
+        "motion.two_phases": {"goal": pose, "position": "0.1 m"},
+        "motion.short_way": {"goal": pose},
+        "proportional on the way": {"goal": pose, "phase": "position"},
+        "proportional at the goal": {"goal": pose, "phase": "align"},
+        "motion.overshoot": {"goal": pose, "most": "5 cm", "heading": "0.1 rad"},
+        "motion.within_limits": {},
+        "motion.no_contact": {},
+    }
+
+
+def lost(run, goal):
+    """The checks that a run does not pass, with what they say."""
+    found = {}
+    for name, parameters in checks(goal).items():
+        check = "motion.proportional" if name.startswith("prop") else name
+        finding = judge(check, run, **parameters)
+        if finding.status is not Status.PASSED:
+            assert finding.status is Status.FAILED, finding
+            found[name] = finding.observed
+    return found
+
+
+ANGLES = st.floats(-math.pi, math.pi)
+GOALS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), ANGLES)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    goal=GOALS,
+    heading=ANGLES,
+    linear=st.floats(0.3, 1.0),
+    angular=st.floats(0.8, 4.0),
+    spin=st.sampled_from([1.0, 1.5, 2.84]),
+    turn_first=st.sampled_from([None, 0.3]),
+    constant=st.sampled_from([None, 0.1, 0.2]),
+    period_s=st.sampled_from([None, 0.02, 0.05, 0.1]),
+)
+def test_a_good_controller_passes_every_check(
+    goal, heading, linear, angular, spin, turn_first, constant, period_s
+):
+    if math.hypot(goal[0], goal[1]) < 0.3:
+        goal = (goal[0] + 1.0, goal[1], goal[2])
+    if constant is not None:
+        # At a constant speed it could circle around the goal.
+        turn_first = 0.3
+    if period_s == 0.1:
+        angular = min(angular, 2.0)
+    run = run_to(
+        goal,
+        (0.0, 0.0, heading),
+        linear=linear,
+        angular=angular,
+        spin=spin,
+        turn_first=turn_first,
+        constant=constant,
+        period_s=period_s,
+    )
+    assert lost(run, goal) == {}
+    straight_m = math.hypot(goal[0], goal[1])
+    assert judge("motion.settles", run, within="40 s").status is Status.PASSED
+    finding = judge("motion.path_length", run, goal=yaml(goal), most="100 %")
+    assert finding.status is Status.PASSED, (finding, straight_m)
+
+
+@settings(max_examples=30, deadline=None)
+@given(goal=GOALS, heading=ANGLES, size=st.sampled_from([0.3, 0.5, 1.0]))
+def test_bang_bang_is_never_proportional(goal, heading, size):
+    if math.hypot(goal[0], goal[1]) < 0.3:
+        goal = (goal[0] + 1.0, goal[1], goal[2])
+    run = run_to(
+        goal,
+        (0.0, 0.0, heading),
+        law=lambda error: math.copysign(size, error) if abs(error) > 0.05 else 0.0,
+        turn_first=0.3,
+    )
+    pose = yaml(goal)
+    for phase in ("position", "align"):
+        finding = judge("motion.proportional", run, goal=pose, phase=phase)
+        assert finding.status is Status.FAILED or "hardly an error" in finding.observed, finding
+
+
+def test_the_gain_is_told():
+    run = run_to(GOAL, angular=1.7)
+    finding = judge("motion.proportional", run, goal=yaml(GOAL), phase="align")
+    assert finding.status is Status.PASSED
+    assert "gain 1.7 1/s" in finding.observed
+    assert finding.evidence.plots[0].y_label == "angular.z (rad/s)"
+
+
+def test_a_gain_out_of_range():
+    run = run_to(GOAL, angular=0.5)
+    said = failing("motion.proportional", run, goal=yaml(GOAL), phase="align", gain_min="0.8 Hz")
+    assert "gain 0.5 1/s" in said and "too small" in said
+
+
+def test_a_goal_by_names_of_random_values():
+    run = run_to(GOAL)
+    named = {"goal": ["goal_x", "goal_y", "goal_theta"], **REACHES}
+    values = dict(zip(("goal_x", "goal_y", "goal_theta"), GOAL, strict=True))
+    known = simulated(run.truth, run.scene, values=values)
+    assert judge("motion.reaches", known, **named).status is Status.PASSED
+    finding = judge(
+        "motion.reaches", simulated(run.truth, run.scene, values={"goal_a": 1}), **named
+    )
+    assert finding.status is Status.ERROR
+    assert "no random value 'goal_x'. Did you mean 'goal_a'?" in finding.observed
+
+
+def test_a_full_turn_more_is_the_same_heading():
+    run = run_to((0.6, 0.0, 3.1))
+    goal = [0.6, 0.0, f"{3.1 - math.tau} rad"]
+    assert judge("motion.reaches", run, goal=goal, **REACHES).status is Status.PASSED
+
+
+class TestMistakes:
+    """Each mistake loses the checks that it should, with its own words, and no others."""
+
+    def test_nothing_wrapped(self):
+        run = run_to(BEHIND, (0, 0, -3.0), wrap=lambda error: error)
+        found = lost(run, BEHIND)
+        assert "through half a turn" in found["motion.short_way"]
+        assert "full turn off" in found["proportional on the way"]
+
+    def test_theta_not_wrapped(self):
+        goal = (-0.2, -0.16, math.radians(170))
+        start = (0.4, 0.0, math.radians(-165))
+        run = run_to(goal, start, wrap_theta=lambda error: error)
+        found = lost(run, goal)
+        assert set(found) == {"motion.short_way", "proportional at the goal"}
+        assert "335° counter-clockwise where 25° clockwise would do" in found["motion.short_way"]
+        assert "full turn off" in found["proportional at the goal"]
+
+    def test_bang_bang(self):
+        run = run_to(GOAL, align_law=lambda error: math.copysign(0.5, error))
+        found = lost(run, GOAL)
+        assert set(found) == {"proportional at the goal"}
+        assert "(0.5 rad/s) whatever the error is" in found["proportional at the goal"]
+
+    def test_three_steps(self):
+        def law(error):
+            size = 1.2 if abs(error) > 1.0 else 0.6 if abs(error) > 0.3 else 0.2
+            return math.copysign(size, error)
+
+        run = run_to(GOAL, law=law, turn_first=0.3)
+        found = lost(run, GOAL)
+        assert set(found) == {"proportional on the way", "proportional at the goal"}
+        assert "bang-bang" in found["proportional at the goal"]
+
+    def test_creeps_while_it_aligns(self):
+        run = run_to(GOAL, creep=0.05)
+        found = lost(run, GOAL)
+        assert "motion.two_phases" in found
+        assert "commanded with up to 0.05 m/s" in found["motion.two_phases"]
+        assert "proportional on the way" not in found
+
+    def test_wrong_sign(self):
+        run = run_to(GOAL, law=lambda error: -1.5 * error, seconds=20)
+        found = lost(run, GOAL)
+        assert "motion.reaches" in found
+        assert "turns away from the error" in found["proportional on the way"]
+
+    def test_heading_left_as_it_is(self):
+        run = run_to(GOAL, align_law=lambda _: 0.0, seconds=20)
+        found = lost(run, GOAL)
+        assert "it has not turned since it arrived" in found["motion.reaches"]
+        assert "angular.z = 0" in found["proportional at the goal"]
+
+    @pytest.mark.parametrize(
+        ("goal", "words"),
+        [
+            ((GOAL[1], GOAL[0], GOAL[2]), "x and y are swapped"),
+            ((GOAL[0], -GOAL[1], GOAL[2]), "the sign of y changed"),
+            ((GOAL[0], GOAL[1], math.radians(GOAL[2])), "taken for degrees"),
+            ((GOAL[0], GOAL[1], wrap(math.degrees(GOAL[2]))), "converted to degrees"),
+            ((GOAL[0], GOAL[1], -GOAL[2]), "its sign changed"),
+            ((GOAL[0], GOAL[1], GOAL[2] + math.pi), "the opposite of the goal's heading"),
+            ((0.4, 0.2, 0.0), "came to rest at (0.3"),
+        ],
+    )
+    def test_somewhere_else(self, goal, words):
+        run = run_to((*goal[:2], wrap(goal[2])))
+        assert words in failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
+
+    def test_counted_from_the_start(self):
+        start = (0.4, -0.3, 1.0)
+        run = run_to((start[0] + GOAL[0], start[1] + GOAL[1], GOAL[2]), start)
+        said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
+        assert "counted from where the robot started" in said
+
+    def test_far_too_slow(self):
+        run = run_to(GOAL, linear=0.02, seconds=20)
+        assert (
+            "if it is on its way, it is too slow"
+            in failing("motion.reaches", run, goal=yaml(GOAL), **REACHES).lower()
+        )
+
+    def test_never_stops_turning(self):
+        run = run_to(GOAL, align_law=lambda _: 0.5, straight=0.0, seconds=30)
+        said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
+        assert "still turns at 0.5 rad/s" in said or "not at rest" in said
+        assert "still moves after 30 s" in failing("motion.settles", run, within="20 s")
+
+    def test_far_past_the_goal(self):
+        run = run_to(GOAL, constant=0.22, near=0.0, seconds=15)
+        found = lost(run, GOAL)
+        assert "motion.reaches" in found
+
+    def test_a_detour(self):
+        run = run_to((-0.8, 0.1, 0.0), angular=0.35, linear=1.0, seconds=60)
+        said = failing("motion.path_length", run, goal=yaml((-0.8, 0.1, 0.0)), most="20 %")
+        assert "longer" in said
+
+    def test_limits_missing(self):
+        run = run_to(BEHIND, top=9.0, spin=9.0, linear=2.0, angular=2.5)
+        assert "motion.within_limits" in lost(run, BEHIND)
+
+    def test_died_on_the_way(self):
+        run = run_to(GOAL, seconds=3)
+        run = simulated(
+            run.truth,
+            run.scene,
+            messages=run.messages,
+            processes=(died(1, 3.0),),
+            log=output(traceback("ZeroDivisionError: float division by zero")),
+        )
+        for check, parameters in (
+            ("motion.reaches", REACHES),
+            ("motion.two_phases", {"position": "0.1 m"}),
+        ):
+            assert "ZeroDivisionError" in failing(check, run, goal=yaml(GOAL), **parameters)
+
+    def test_leaving_at_the_goal_is_no_mistake_of_motion(self):
+        run = run_to(GOAL)
+        end_s = (run.truth[-1].time_ns - run.launched_ns) / 1e9
+        run = simulated(
+            run.truth, run.scene, messages=run.messages, processes=(died(0, end_s - 0.5),)
+        )
+        assert lost(run, GOAL) == {}
+
+    def test_too_slow_by_what_the_machine_took(self):
+        run = run_to(GOAL)
+        took_s = len(run.truth) / 100 - 1.0
+        run = simulated(
+            run.truth, run.scene, messages=run.messages, disturbance=taken(0, 3.0, waited_s=0.8)
+        )
+        finding = judge("motion.settles", run, within=f"{took_s - 0.5} s")
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        failing("motion.settles", run, within=f"{took_s - 2.0} s")
+
+
+def test_drive_plain_silence_says_why():
+    run = drive(lambda _: None, seconds=2)
+    for name, parameters in checks(GOAL).items():
+        if name.startswith("motion") and parameters:
+            assert "the robot never moved" in failing(name, run, **parameters)

@@ -1,0 +1,299 @@
+"""Driving ahead and stopping in front of an obstacle, on runs of the real simulator core."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.checks.finding import Status
+from grader.recording.model import Incident, Qos
+from tests.checks.builder import (
+    Senses,
+    at,
+    died,
+    drive,
+    endpoint,
+    failing,
+    judge,
+    messages,
+    on_scan,
+    output,
+    reader,
+    recording,
+    simulated,
+    taken,
+    traceback,
+    twist,
+)
+
+WALL = "{segments: [[1.0, -1, 1.0, 1]]}"
+BESIDE = "{boxes: [{centre: [0.6, 0.28], size: [20 cm, 20 cm]}]}"
+STOPS = {"distance": "0.2 m", "early": "3 cm", "late": "5 cm"}
+DRIVES = {"speed": "0.1 m/s", "until_distance": "0.3 m"}
+
+
+def good(ranges, speed=0.1, stop=0.2):
+    front = ranges[0]
+    blocked = math.isfinite(front) and 0.0 < front <= stop
+    return (0.0 if blocked else speed, 0.0)
+
+
+def by_front(speed=0.1, stop=0.2):
+    return on_scan(lambda ranges: good(ranges, speed, stop))
+
+
+def nearest_of_all(ranges):
+    return (0.0 if min(ranges) <= 0.2 else 0.1, 0.0)
+
+
+def passes(check, run, **parameters):
+    finding = judge(check, run, **parameters)
+    assert finding.status is Status.PASSED, finding
+    return finding
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    wall=st.floats(0.5, 2.0),
+    noise=st.sampled_from(["0 m", "5 mm"]),
+    empty=st.sampled_from(["inf", "zero"]),
+    layout=st.sampled_from(["0..2pi", "-pi..pi"]),
+)
+def test_a_good_controller_passes_every_check(wall, noise, empty, layout):
+    def law(ranges):
+        front = ranges[0 if layout == "0..2pi" else 180]
+        return good([front])
+
+    run = drive(
+        on_scan(law),
+        world=f"{{segments: [[{wall}, -1, {wall}, 1]]}}",
+        seconds=30,
+        options={"lidar": {"noise": noise, "no_return": empty, "layout": layout}},
+    )
+    passes("motion.drives", run, **DRIVES)
+    passes("motion.stops", run, **STOPS)
+    passes("motion.no_contact", run)
+    passes("motion.straight", run)
+    if noise == "0 m":
+        # With noise a robot at the threshold rightly sets off again now and then.
+        passes("motion.stays_at_rest", run, after="stop")
+    passes("motion.within_limits", run)
+    passes("motion.keeps_driving", run, distance=f"{wall - 0.3} m")
+
+
+def test_an_obstacle_that_appears_later_counts_from_then_on():
+    world = "{moving: [{circle: {radius: 0.1}, path: [{at: 0 s, pose: [0.7, 0]}], appears: 2 s}]}"
+    run = drive(by_front(), world=world, seconds=20)
+    finding = passes("motion.stops", run, **STOPS)
+    assert "`moving[0]`" in finding.observed
+
+
+def test_without_anything_ahead_it_must_not_stop():
+    run = drive(by_front(), world=BESIDE, seconds=8)
+    passes("motion.keeps_driving", run, distance="0.7 m")
+    passes("motion.drives", run, speed="0.1 m/s")
+
+
+class TestDrives:
+    def test_twice_as_fast(self):
+        run = drive(by_front(0.2), world=WALL, seconds=20)
+        assert "2 times the expected speed" in failing("motion.drives", run, **DRIVES)
+
+    def test_limited_by_the_robot(self):
+        run = drive(by_front(1.0), world=WALL, seconds=20)
+        said = failing("motion.drives", run, **DRIVES)
+        assert "1 m/s was commanded, and the robot can do no more than 0.22 m/s" in said
+
+    def test_backwards(self):
+        run = drive(by_front(-0.1), seconds=5)
+        assert "drives backwards" in failing("motion.drives", run, speed="0.1 m/s")
+
+    def test_on_and_off(self):
+        ticks = iter(range(10_000))
+        run = drive(on_scan(lambda _: (0.1 * (next(ticks) % 4 < 2), 0.0)), seconds=8)
+        assert "on and off" in failing("motion.drives", run, speed="0.1 m/s")
+
+    def test_turning_instead(self):
+        run = drive(on_scan(lambda _: (0.0, 0.1)), seconds=5)
+        assert "turns on the spot" in failing("motion.drives", run, speed="0.1 m/s")
+
+    def test_never_moved_for_nothing_was_published(self):
+        run = drive(lambda _: None, seconds=2)
+        assert "the robot never moved: " in failing("motion.drives", run, speed="0.1 m/s")
+
+    def test_never_moved_for_every_command_is_zero(self):
+        run = drive(on_scan(lambda _: (0.0, 0.0)), seconds=2)
+        assert "10 commands on `/cmd_vel` are zero" in failing(
+            "motion.drives", run, speed="0.1 m/s"
+        )
+
+    def test_not_a_number(self):
+        run = drive(on_scan(lambda _: (math.nan, 0.0)), seconds=2)
+        assert "9 commands on `/cmd_vel` were not finite (first: linear nan" in failing(
+            "motion.drives", run, speed="0.1 m/s"
+        )
+
+    def test_the_wrong_field(self):
+        run = drive(lambda _: None, seconds=2)
+        sent = messages([0.6, 0.8], twist((0, 0.1, 0), (0, 0, 0)))
+        run = simulated(run.truth, run.scene, messages=sent)
+        assert "the commands set `linear.y`" in failing("motion.drives", run, speed="0.1 m/s")
+
+    def test_qos_that_the_robot_refuses(self):
+        run = drive(lambda _: None, seconds=2)
+        weak = endpoint(qos=Qos(reliability="best_effort"))
+        run = simulated(
+            run.truth, run.scene, messages=messages([0.6, 0.8]), endpoints=(weak, reader())
+        )
+        said = failing("motion.drives", run, speed="0.1 m/s")
+        assert "reliability best_effort offered, reliable requested" in said
+
+    def test_the_process_died_before(self):
+        run = drive(lambda _: None, seconds=2)
+        run = simulated(
+            run.truth, run.scene, processes=(died(1),), log=output(traceback("ValueError: no"))
+        )
+        assert "ValueError: no" in failing("motion.drives", run, speed="0.1 m/s")
+
+    def test_a_scenario_without_a_world_is_our_mistake(self):
+        finding = judge("motion.drives", recording(), speed="0.1 m/s")
+        assert finding.status is Status.ERROR
+        assert "needs a `world`" in finding.observed
+
+
+class TestStops:
+    def test_the_nearest_of_all_beams(self):
+        world = "{segments: [[2, -1, 2, 1]], boxes: [{centre: [0.6, 0.28], size: [0.2, 0.2]}]}"
+        run = drive(on_scan(nearest_of_all), world=world, seconds=20)
+        said = failing("motion.stops", run, **STOPS)
+        assert "`boxes[0]` was then" in said and "min(ranges)" in said
+        run = drive(on_scan(nearest_of_all), world=BESIDE, seconds=20)
+        assert "on its left" in failing("motion.keeps_driving", run, distance="1 m")
+
+    def test_from_its_edge(self):
+        run = drive(by_front(stop=0.3), world=WALL, seconds=20)
+        assert "from the robot's edge" in failing("motion.stops", run, **STOPS)
+
+    def test_zero_taken_for_an_obstacle(self):
+        def law(ranges):
+            return (0.1 if ranges[0] > 0.2 else 0.0, 0.0)
+
+        run = drive(on_scan(law), seconds=5, options={"lidar": {"no_return": "zero"}})
+        assert "reported 0.0" in failing("motion.keeps_driving", run, distance="1 m")
+        assert "reported 0.0" in failing("motion.drives", run, speed="0.1 m/s")
+
+    def test_never_stops(self):
+        run = drive(lambda s: (0.1, 0.0) if s.new_scan else None, world=WALL, seconds=3)
+        said = failing("motion.stops", run, **STOPS)
+        assert "never stopped: it still drives at 0.1 m/s" in said
+        assert "`segments[0]` is still" in said
+
+    def test_drives_into_it(self):
+        run = drive(lambda s: (0.1, 0.0) if s.new_scan else None, world=WALL, seconds=12)
+        for check, parameters in (("motion.stops", STOPS), ("motion.no_contact", {})):
+            said = failing(check, run, **parameters)
+            assert "drove into `segments[0]` at 0.1 m/s" in said
+
+    def test_too_late(self):
+        late = iter(range(1000))
+
+        def law(senses: Senses):
+            if not senses.new_scan or senses.scan is None:
+                return None
+            return good(senses.scan.ranges_m) if next(late) % 3 == 0 else None
+
+        run = drive(law, world="{segments: [[0.8, -1, 0.8, 1]]}", seconds=20)
+        assert "stopped late" in failing("motion.stops", run, distance="0.2 m", late="1 cm")
+
+    def test_too_late_by_what_the_machine_took_is_no_fault_of_the_student(self):
+        run = drive(by_front(0.15, 0.17), world=WALL, seconds=20)
+        parameters = {"distance": "0.2 m", "late": "2 cm"}
+        failing("motion.stops", run, **parameters)
+        end_s = (run.truth[-1].time_ns - at(0)) / 1e9
+        run = simulated(
+            run.truth, run.scene, messages=run.messages, disturbance=taken(0, end_s, waited_s=0.9)
+        )
+        finding = judge("motion.stops", run, **parameters)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_late_steps_of_the_simulator_count_as_taken(self):
+        run = drive(by_front(0.15, 0.17), world=WALL, seconds=20)
+        stopped = next(s for s in run.truth[200:] if abs(s.linear_m_s) < 1e-3)
+        late = Incident(stopped.time_ns, "late", "80 steps done 800 ms late")
+        run = simulated(run.truth, run.scene, messages=run.messages, incidents=(late,))
+        finding = judge("motion.stops", run, distance="0.2 m", late="2 cm")
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_died_on_the_way(self):
+        run = drive(lambda s: (0.1, 0.0) if s.new_scan else None, world=WALL, seconds=12)
+        run = simulated(
+            run.truth,
+            run.scene,
+            messages=run.messages,
+            processes=(died(1, 5.0),),
+            log=output(traceback("KeyError: 'front'")),
+        )
+        for check, parameters in (("motion.stops", STOPS), ("motion.no_contact", {})):
+            assert "KeyError: 'front'" in failing(check, run, **parameters)
+
+
+class TestRest:
+    NEAR = "{segments: [[0.18, -1, 0.18, 1]]}"
+
+    def test_does_not_start_in_front_of_an_obstacle(self):
+        run = drive(by_front(), world=self.NEAR, seconds=2, rest_s=None)
+        passes("motion.stays_at_rest", run, after="start")
+        passes("motion.no_contact", run, moving=False)
+
+    def test_starts_before_the_first_scan(self):
+        def blind(senses: Senses):
+            return good([senses.scan.ranges_m[0]] if senses.scan else [math.inf])
+
+        run = drive(blind, world=self.NEAR, seconds=2, rest_s=None)
+        assert "before the first scan had come" in failing(
+            "motion.stays_at_rest", run, after="start"
+        )
+
+    def test_sets_off_again(self):
+        def forgetful(senses: Senses):
+            if not senses.new_scan or senses.scan is None:
+                return None
+            return (0.03, 0.0) if senses.time_s > 9.5 else good(senses.scan.ranges_m)
+
+        run = drive(forgetful, world=WALL, seconds=11, rest_s=None)
+        said = failing("motion.stays_at_rest", run, after="stop")
+        assert "set off again 10.1" in said and "`segments[0]`" in said
+
+    def test_a_robot_that_always_stands_did_not_stop(self):
+        run = drive(on_scan(lambda _: (0.0, 0.0)), world=WALL, seconds=2)
+        for check in ("motion.stays_at_rest", "motion.no_contact"):
+            assert "the robot never moved" in failing(check, run)
+
+    def test_something_that_runs_into_the_resting_robot_does_not_count(self):
+        world = (
+            "{segments: [[1, -1, 1, 1]], moving: [{circle: {radius: 0.1}, path: "
+            "[{at: 9 s, pose: [-1, 0]}, {at: 14 s, pose: [0.75, 0]}]}]}"
+        )
+        run = drive(by_front(), world=world, seconds=14, rest_s=None)
+        assert run.truth[-1].contact == "moving[0]"
+        passes("motion.no_contact", run)
+
+
+class TestStraight:
+    def test_a_curve(self):
+        run = drive(on_scan(lambda _: (0.1, 0.2)), seconds=4)
+        said = failing("motion.straight", run)
+        assert "angular.z = 0.2 rad/s was commanded" in said
+
+    def test_a_creeping_curve(self):
+        run = drive(on_scan(lambda _: (0.1, 0.009)), seconds=10)
+        assert "the heading changed by" in failing("motion.straight", run)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_a_command_beyond_the_limits(share):
+    run = drive(by_front(0.5), world=WALL, seconds=4)
+    said = failing("motion.within_limits", run, share=share)
+    assert "linear.x = 0.5 m/s" in said
+    assert "commands of at most 0.22 m/s" in judge("motion.within_limits", run).expected
