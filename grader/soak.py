@@ -96,13 +96,19 @@ def _grade_all(jobs: list[Job], runs: int, at_once: int) -> list[tuple[Job, Tria
             for number in range(runs)
             for job in jobs
         }
-        for future in as_completed(futures):
-            job, result = futures[future], future.result()
-            results.append((job, result))
-            for difference in result.verdict.differences:
-                print(f"{job.name}: {difference}", flush=True)
-            if len(results) % 50 == 0:
-                print(f"{len(results)} of {len(futures)} graded", file=sys.stderr, flush=True)
+        try:
+            for future in as_completed(futures):
+                job, result = futures[future], future.result()
+                results.append((job, result))
+                for difference in result.verdict.differences:
+                    print(f"{job.name}: {difference}", flush=True)
+                if len(results) % 50 == 0:
+                    print(f"{len(results)} of {len(futures)} graded", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:
+            # What is finished still counts.
+            pool.shutdown(wait=False, cancel_futures=True)
+            for job in jobs:
+                job.grading.abort()
     return results
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,6 +19,7 @@ from grader.recording.model import NS, Ending, Recording, Truth
 from sim.motion import Pose, wrap_angle
 
 _WEAVES = 4
+NO_SPEED_M_S = 1e-3
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Approach:
             commanded to the end or the robot was not near then.
         """
         index = len(self.truth)
-        while index and self.truth[index - 1].command_m_s == 0.0:
+        while index and abs(self.truth[index - 1].command_m_s) <= NO_SPEED_M_S:
             index -= 1
         if index == len(self.truth) or self.distance_m(self.truth[index]) > position_m:
             return None
@@ -243,8 +243,7 @@ def why_not_aligned(run: Approach, heading_rad: float) -> Cause | None:
         turns = abs(turned_rad(run.truth)) / math.tau
         more = f", {turns:.1f} turns in all" if turns >= 1.5 else ""
         return Cause(
-            f"{seen} and still turns at {turn(last.angular_rad_s)} when the observation ends"
-            f"{more}",
+            f"{seen} and still turns at {turn(last.angular_rad_s)} when the observation ends{more}",
             "Normalise the error to [-pi, pi] with atan2(sin(e), cos(e)), and make the gain "
             "smaller if it oscillates.",
             evidence,
@@ -287,12 +286,3 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
             "After the position is reached, turn on the spot by the error goal_theta - yaw.",
         )
     return "", "The error is goal_theta - yaw in radians; yaw comes from the quaternion."
-
-
-def headings(truth: Sequence[Truth]) -> list[float]:
-    """Heading of every step without jumps: full turns are counted."""
-    found: list[float] = []
-    for step in truth:
-        before = found[-1] if found else step.yaw_rad
-        found.append(before + wrap_angle(step.yaw_rad - before))
-    return found

@@ -1,4 +1,4 @@
-"""Checks of driving ahead: the speed, the way, the direction."""
+"""Checks of driving ahead: the speed and the way."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from statistics import median
 from pydantic import Field
 
 from grader.assignment.quantity import (
-    Angle,
-    AngularSpeed,
     PositiveLength,
     Ratio,
     Speed,
@@ -23,14 +21,12 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.ground import ahead, nearest
 from grader.checks.immobility import why_cut_short, why_not_moved
 from grader.checks.lateness import taken_s
-from grader.checks.measure import degrees, metres, speed, turn
+from grader.checks.measure import metres, speed
 from grader.checks.scan import misreading
 from grader.checks.track import (
     departure,
     final_rest,
-    over_time,
     speed_plot,
-    turned_rad,
     way_m,
 )
 from grader.checks.wording import percent
@@ -240,68 +236,3 @@ def _too_slow(recording: Recording, seen: str) -> Cause:
             disturbed=True,
         )
     return Cause(words, _SPEED_HINT, Evidence(plots=(speed_plot(recording),)))
-
-
-class Straight(Parameters):
-    """Parameters of motion.straight."""
-
-    tolerance: AngularSpeed = Field(
-        0.01, description="Largest angular.z that still counts as zero, either way."
-    )
-    heading: Angle = Field(
-        0.035, description="How far the heading may be off that of the start, either way."
-    )
-
-
-@check("motion.straight", Subject.RECORDING, Straight)
-def straight(recording: Recording, parameters: Straight) -> Finding:
-    """The robot drives straight ahead.
-
-    Judged by the commands in force and by the true heading: `angular.z` is zero all the time,
-    and the heading stays that of the start.
-
-    Explains a robot that never moved, an angular.z that is not zero (the first command), and
-    values that stand in the wrong field.
-    """
-    expected = f"drives straight: angular.z is zero (within {turn(parameters.tolerance)})"
-    cause = why_not_moved(recording)
-    if cause is not None:
-        return cause.finding(expected)
-    truth = recording.truth
-    evidence = Evidence(
-        plots=(
-            over_time(
-                recording,
-                "Commanded turn",
-                "angular.z (rad/s)",
-                lambda step: step.command_rad_s,
-                (-parameters.tolerance, parameters.tolerance),
-            ),
-        )
-    )
-    turning = [step for step in truth if abs(step.command_rad_s) > parameters.tolerance]
-    if turning:
-        first = turning[0]
-        worst = max(turning, key=lambda step: abs(step.command_rad_s))
-        when_s = recording.since_launch_s(first.time_ns)
-        still = all(step.command_m_s == 0.0 for step in turning)
-        words = f"angular.z = {turn(worst.command_rad_s)} was commanded"
-        words += ", and linear.x = 0 with it" if still else ""
-        return Finding.failed(
-            expected,
-            f"{words} (from {when_s:.2f} s after launch, {percent(len(turning) / len(truth))} of "
-            "the time)",
-            "The speed ahead is linear.x, the turn is angular.z: leave angular.z at 0.0.",
-            Evidence(moments=(Moment("first turn commanded", when_s),), plots=evidence.plots),
-        )
-    off_rad = max((turned_rad(truth[: end + 1]) for end in range(0, len(truth), 25)), key=abs)
-    off_rad = max(off_rad, turned_rad(truth), key=abs)
-    if abs(off_rad) > parameters.heading:
-        return Finding.failed(
-            expected,
-            f"the heading changed by {degrees(off_rad)}, through commands of less than "
-            f"{turn(parameters.tolerance)} that add up",
-            "Leave angular.z at exactly 0.0.",
-            evidence,
-        )
-    return Finding.passed(expected, f"heading within {degrees(off_rad)} of the start", evidence)

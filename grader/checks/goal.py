@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from pydantic import Field, model_validator
 
@@ -277,6 +278,9 @@ def _beyond_rad(run: Approach, position_m: float) -> float:
     if driven is None:
         return 0.0
     errors = [run.heading_error_rad(step) for step in run.truth[driven:]]
-    side = math.copysign(1.0, errors[0])
-    # A first error near half a turn may be worked off either way.
-    return max((-side * error for error in errors if abs(error) < math.pi / 2.0), default=0.0)
+    for index, (before, after) in enumerate(pairwise(errors), start=1):
+        # Through half a turn the sign changes as well.
+        if before * after < 0.0 and abs(before) < math.pi / 2.0:
+            side = math.copysign(1.0, before)
+            return max(-side * error for error in errors[index:])
+    return 0.0

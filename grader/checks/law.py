@@ -7,12 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-_LEAST_FIT = 5
+# A slow timer and a large gain leave few commands between the clamp and the goal.
+_LEAST_FIT = 3
+_FEW_TURNS = 5
 _ZERO_RAD_S = 1e-4
 # Near zero the command may pause, near half a turn both senses are right.
 _PAUSE_RAD = 0.15
 _EITHER_WAY_RAD = 0.3
+# An error that needs no turn, and one that leaves nothing to tell the law by.
 _SMALL_RAD = 0.1
+_TINY_RAD = 0.02
+_SLOW_RAD_S = 0.2
 _MOST_SIZES = 4
 _SAME = 1e-6
 _PLATEAU = 3
@@ -87,16 +92,19 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> V
         least_r2: What counts as a good fit.
     """
     turning = [item for item in samples if abs(item.command_rad_s) > _ZERO_RAD_S]
-    small = all(abs(item.error_rad) <= _SMALL_RAD for item in samples)
-    if samples and small and len(turning) < _LEAST_FIT:
+    largest_rad = max((abs(item.error_rad) for item in samples), default=math.inf)
+    fastest_rad_s = max((abs(item.command_rad_s) for item in samples), default=0.0)
+    if (largest_rad <= _SMALL_RAD and len(turning) < _FEW_TURNS) or (
+        largest_rad <= _TINY_RAD and fastest_rad_s <= _SLOW_RAD_S
+    ):
         return Verdict(Law.NOTHING_TO_DO, used=len(samples))
     if len(samples) < _LEAST_FIT:
         return Verdict(Law.TOO_FEW, used=len(samples))
     if not turning:
         return Verdict(Law.ZERO, used=len(samples))
-    sizes = sorted({round(abs(item.command_rad_s), 3) for item in turning})
-    if len(sizes) <= _MOST_SIZES and len(turning) > 2 * len(sizes):
-        return Verdict(Law.STEPS, used=len(turning), values=tuple(sizes))
+    steps = _steps(turning)
+    if steps:
+        return Verdict(Law.STEPS, used=len(turning), values=steps)
     telling = [
         _toward(item)
         for item in samples
@@ -107,6 +115,18 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> V
     if wrong <= _FEW_WRONG and best.r2 >= least_r2 and best.gain > 0.0:
         return best
     return _otherwise(telling, limit_rad_s, least_r2, wrong) or best
+
+
+def _steps(turning: Sequence[Sample]) -> tuple[float, ...]:
+    """The few sizes that all commands have, or nothing where they have many.
+
+    A clamp gives the largest size again and again; below it a line has every size once.
+    """
+    sizes = [float(f"{abs(item.command_rad_s):.3g}") for item in turning]
+    distinct = tuple(sorted(set(sizes)))
+    below = sum(size < distinct[-1] for size in sizes)
+    few = len(distinct) <= _MOST_SIZES and len(sizes) > 2 * len(distinct)
+    return distinct if few and (not below or below > 2 * (len(distinct) - 1)) else ()
 
 
 def _otherwise(

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
+from grader.assignment.model import TopicName
 from grader.assignment.quantity import Duration, format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
@@ -16,7 +17,7 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.node_absence import why_no_node, why_not_node
 from grader.checks.node_name import node_name
 from grader.checks.wording import code, codes, counted, listing
-from grader.recording.model import NS, Node, Process, Recording
+from grader.recording.model import NS, Kind, Node, Process, Recording
 
 NodeName = Annotated[str, AfterValidator(node_name)]
 
@@ -50,6 +51,9 @@ class Exists(Parameters):
     name: NodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
+    publishes: TopicName | None = Field(
+        None, description="Topic on which this node, and no other one of the student's, publishes."
+    )
 
 
 @check("node.exists", Subject.RECORDING, Exists)
@@ -61,10 +65,10 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
     Explains, deepest first: nothing could be launched; the process ended before it had a node
     (with its exception and the line in your file, its signal, or that main() returned); it
     runs but has no node (waits for input, loops or sleeps before rclpy.init); the node has
-    another name, namespace or case.
+    another name, namespace or case; another node publishes in its place.
     """
     expected = f"a node {code(parameters.name)}"
-    missing = why_not_node(recording, parameters.name)
+    missing = why_not_node(recording, parameters.name) or _other_publisher(recording, parameters)
     if missing is not None:
         return missing.finding(expected)
     node = next(item for item in recording.student_nodes if item.name == parameters.name)
@@ -73,6 +77,21 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
         expected,
         f"it appeared {when_s:.2f} s after launch",
         Evidence(moments=(Moment(f"node {node.name} appeared", when_s),)),
+    )
+
+
+def _other_publisher(recording: Recording, parameters: Exists) -> Cause | None:
+    """Another node publishes what this one should; a topic without a publisher is no matter."""
+    if parameters.publishes is None:
+        return None
+    publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.publishes)
+    others = sorted({item.node for item in publishers} - {parameters.name})
+    if not others:
+        return None
+    return Cause(
+        f"{code(parameters.name)} is there, but {codes(others)} publishes on "
+        f"{code(parameters.publishes)}",
+        "Create the publisher with self.create_publisher(...) in the node that is asked for.",
     )
 
 

@@ -137,9 +137,26 @@ def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
     cause = why_not_built(submission, package)
     if cause is None:
         cause = _why_no_executable(existing_package(submission, package), name)
+        # The deeper cause, unless the package's own entry point is the one to mend.
+        if cause is not None and name not in dict(
+            existing_package(submission, package).entry_points
+        ):
+            cause = _elsewhere(submission, package, name) or cause
     if cause is not None:
         return cause.finding(expected)
     return Finding.passed(expected, f"installed in lib/{package}")
+
+
+def _elsewhere(submission: SubmissionRecord, package: str, name: str) -> Cause | None:
+    """The executable is there, but another package of the submission has it."""
+    others = [p for p in submission.packages if p.name != package and name in p.executables]
+    if not others:
+        return None
+    return Cause(
+        f"it is in the package {code(others[0].name)}: `ros2 run {others[0].name} {name}`",
+        f"Move its entry of console_scripts, and the module behind it, to {code(package)}.",
+        Evidence(places=(SourceError(_beside(others[0], "setup.py"), None, "console_scripts"),)),
+    )
 
 
 def _why_no_executable(package: PackageRecord, name: str) -> Cause | None:

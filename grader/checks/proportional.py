@@ -10,7 +10,7 @@ from typing import Literal
 from pydantic import Field
 
 from grader.assignment.quantity import Frequency, PositiveLength, Ratio
-from grader.checks.approach import Approach, approach, why_not_there
+from grader.checks.approach import NO_SPEED_M_S, Approach, approach, why_not_there
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.command import ODOMETRY, TOPIC, commands, number
@@ -27,8 +27,9 @@ from grader.recording.model import NS, Message, Recording
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 _MOST_POINTS = 400
 _LEAST_SAMPLES = 8
-_NO_SPEED_M_S = 1e-3
 _MOST_BEHIND = 2
+# A command is in force from the step after it.
+_STEP_NS = 12_000_000
 _WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
 _FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
 
@@ -129,6 +130,9 @@ def _samples(run: Approach, parameters: Proportional, behind: int) -> list[Sampl
     recording, truth = run.recording, run.truth
     arrival = run.arrival(parameters.position)
     arrival_ns = math.inf if arrival is None else truth[arrival].time_ns
+    driven = run.driven(parameters.position)
+    # One that drives on while it turns is judged by what it does since it arrived.
+    aligns_ns = arrival_ns if driven is None else truth[driven].time_ns - _STEP_NS
     odometry = recording.on(ODOMETRY)
     found: list[Sample] = []
     driving: list[Sample] = []
@@ -142,11 +146,10 @@ def _samples(run: Approach, parameters: Proportional, behind: int) -> list[Sampl
             if seen_ns < arrival_ns:
                 error = run.bearing_error_rad(pose)
                 found.append(Sample(error, item.twist.angular_rad_s))
-        elif seen_ns >= arrival_ns:
+        elif item.time_ns >= aligns_ns:
             sample = Sample(run.heading_error_rad(pose), item.twist.angular_rad_s)
-            drives = abs(item.twist.linear_m_s) > _NO_SPEED_M_S
+            drives = abs(item.twist.linear_m_s) > NO_SPEED_M_S
             (driving if drives else found).append(sample)
-    # One that drives on while it turns is judged by what it does then.
     return found if len(found) >= _LEAST_SAMPLES else [*driving, *found]
 
 

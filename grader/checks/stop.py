@@ -21,7 +21,7 @@ from grader.checks.node_absence import why_no_node
 from grader.checks.scan import misreading
 from grader.checks.track import first_rest, over_time, speed_plot, way_m
 from grader.checks.wording import code
-from grader.recording.model import NS, Recording, Scene
+from grader.recording.model import NS, Recording, Scene, Truth
 
 _EARLY_HINT = "Which range made it stop? Log the value that the callback compares."
 _LATE_HINT = (
@@ -176,8 +176,8 @@ def _evidence(recording: Recording, scene: Scene, rest: int, parameters: Stops) 
 
 
 def _distance_plot(recording: Recording, scene: Scene, band: tuple[float, float]) -> Plot:
-    def distance_m(step: object) -> float | None:
-        sight = ahead(scene, step)  # type: ignore[arg-type]
+    def distance_m(step: Truth) -> float | None:
+        sight = ahead(scene, step)
         return None if sight is None else sight.distance_m
 
     return over_time(

@@ -6,7 +6,9 @@ from pydantic import Field
 
 from grader.assignment.model import TopicName
 from grader.assignment.quantity import Duration, Ratio, format_duration
+from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
+from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.period import (
     MOST_INTERVALS,
@@ -22,9 +24,11 @@ from grader.checks.silence import why_few
 from grader.checks.stamps import why_not_believed
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, counted
-from grader.recording.model import Message, Recording
+from grader.recording.model import NS, Message, Recording
 
 _MS = 1e3
+# One message may be late or left out; after so many periods they have stopped.
+_ENDED_PERIODS = 3.0
 
 
 class Period(Parameters):
@@ -68,13 +72,14 @@ def period(recording: Recording, parameters: Period) -> Finding:
     slow grader or network does not count. The median of the intervals must be the period
     within `tolerance`; an interval that differs from the median by more than `spread` is
     irregular, and only few may be (`outliers`). One late message makes an interval too long
-    and the next one too short: that counts once. What the machine took from the process is
+    and the next one too short: that counts once. Messages must go on until the end of the
+    observation. What the machine took from the process is
     measured, and never costs a point.
 
     Explains a period in milliseconds where seconds are meant (300 or 0.003 instead of 0.3),
     factors of ten, two timers or two publishers, sleeping instead of a timer (the work is
-    added to each period), callbacks that take longer than the period, messages left out, and
-    a publisher that is silent.
+    added to each period), callbacks that take longer than the period, messages left out,
+    messages that stop, and a publisher that is silent.
     """
     limits = parameters.limits
     expected = (
@@ -98,6 +103,9 @@ def period(recording: Recording, parameters: Period) -> Finding:
         )
     verdict = judge([item.seconds for item in measured], limits)
     if verdict.good:
+        ended = _why_ended(recording, messages, parameters)
+        if ended is not None:
+            return ended.finding(expected)
         return Finding.passed(
             expected, _figures(measured, verdict), _evidence(recording, parameters, measured)
         )
@@ -120,6 +128,31 @@ def period(recording: Recording, parameters: Period) -> Finding:
     observed += f": {explanation.words}" if explanation.words else ""
     return Finding.failed(
         expected, observed, explanation.hint, _evidence(recording, parameters, measured)
+    )
+
+
+def _why_ended(
+    recording: Recording, messages: tuple[Message, ...], parameters: Period
+) -> Cause | None:
+    """Why nothing was published any more, long before the observation ended."""
+    last_ns = messages[-1].stamp_ns
+    silent_s = (recording.stop_ns - last_ns) / NS
+    awake_s = silent_s - recording.taken_s(last_ns, recording.stop_ns)
+    # Of a flood only the beginning is looked at.
+    if awake_s <= _ENDED_PERIODS * parameters.period or len(messages) > MOST_INTERVALS:
+        return None
+    seen = (
+        f"{counted(len(messages), 'message')} at the right period, but none in the last "
+        f"{format_duration(silent_s)} of the observation"
+    )
+    dying = dead(recording)
+    if dying:
+        return cause_of_death(recording, dying[0]).after(seen)
+    return Cause(
+        seen,
+        "Publish in every call of the callback. Look for a counter or a condition that ends it, "
+        "for timer.cancel(), and for a callback that does not return.",
+        Evidence(moments=(Moment("last message", recording.since_launch_s(last_ns)),)),
     )
 
 

@@ -47,6 +47,15 @@ def turned_rad(truth: Sequence[Truth]) -> float:
     return sum(wrap_angle(b.yaw_rad - a.yaw_rad) for a, b in pairwise(truth))
 
 
+def headings(truth: Sequence[Truth]) -> list[float]:
+    """Heading of every step without jumps: full turns are counted."""
+    found: list[float] = []
+    for step in truth:
+        before = found[-1] if found else step.yaw_rad
+        found.append(before + wrap_angle(step.yaw_rad - before))
+    return found
+
+
 def departure(truth: Sequence[Truth]) -> int | None:
     """Index of the first step in which the robot moves, or None."""
     return next((index for index, step in enumerate(truth) if not is_at_rest(step)), None)

@@ -46,8 +46,8 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     """At the goal's position the robot only turns, it no longer drives.
 
     Judged by the commands in force and the true way. Within `position` of the goal the robot
-    may drive on towards it, as far as its own tolerance says; but once it has looked away from
-    the goal, or has turned without driving, it may not drive any more (2 cm are allowed for
+    may drive on towards it, as far as its own tolerance says; but while it turns away from the
+    goal, or once it has turned without driving, it may not drive any more (2 cm are allowed for
     braking and the delay of odometry).
 
     Explains why the position was not reached, a speed in the second phase, and driving and
@@ -95,7 +95,9 @@ def _stray(run: Approach, arrival: int, none_m_s: float) -> list[tuple[Truth, Tr
             turning |= after.time_ns - still_since >= _PAUSE_NS
             continue
         still_since = None
-        if turning or abs(run.bearing_error_rad(after)) > _OFF_RAD:
+        # In the first phase it turns towards the goal, also where it comes in by a curve.
+        error_rad = run.bearing_error_rad(after)
+        if turning or (abs(error_rad) > _OFF_RAD and error_rad * after.command_rad_s <= 0.0):
             found.append((before, after))
     return found
 

@@ -1,6 +1,8 @@
 """The catalogue: every check is there, documented, and never breaks on what a student sends."""
 
 import json
+import math
+from functools import cache
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -14,6 +16,7 @@ from grader.recording.model import (
     Declaration,
     Ending,
     Endpoint,
+    Incident,
     Kind,
     LogLine,
     Message,
@@ -22,9 +25,21 @@ from grader.recording.model import (
     Process,
     Qos,
     Recording,
+    Scene,
+    Truth,
 )
-from tests.checks.builder import LAUNCH_NS, TWIST, judge, recording, submission, twist
+from tests.checks.builder import (
+    LAUNCH_NS,
+    TWIST,
+    drive,
+    judge,
+    on_odometry,
+    recording,
+    submission,
+    twist,
+)
 
+GOAL = [1.0, 0.0, "0 deg"]
 PARAMETERS = {
     "package.found": {"package": "bot_publisher", "build_type": "ament_python"},
     "package.builds": {"package": "bot_publisher"},
@@ -44,12 +59,39 @@ PARAMETERS = {
     "messages.equal": {"topic": "/cmd_vel", "value": {"linear": {"x": 1.0}, "angular.z": 0.5}},
     "timing.period": {"topic": "/cmd_vel", "period": "300 ms"},
     "executor.responsive": {"within": "1 s"},
+    "motion.drives": {"speed": "0.22 m/s", "tolerance": "5 %"},
+    "motion.keeps_driving": {"distance": "0.5 m"},
+    "motion.straight": {},
+    "motion.stops": {"distance": "0.8 m"},
+    "motion.stays_at_rest": {"after": "stop"},
+    "motion.no_contact": {},
+    "motion.reaches": {"goal": GOAL, "position": "5 cm", "heading": "3 deg"},
+    "motion.settles": {"within": "10 s"},
+    "motion.path_length": {"goal": GOAL, "most": "10 %"},
+    "motion.overshoot": {"goal": GOAL, "most": "2 cm", "heading": "3 deg"},
+    "motion.two_phases": {"goal": GOAL, "position": "5 cm"},
+    "motion.short_way": {"goal": GOAL},
+    "motion.proportional": {"goal": GOAL, "phase": "align"},
+    "motion.within_limits": {},
+    "topic.untouched": {},
+    "log.follows": {"topic": "/cmd_vel", "fields": ["linear.x", "angular.z"]},
 }
-ABSENT = {"topic.subscribed", "qos.requested", "qos.offered"}
+ABSENT = {"topic.subscribed", "qos.requested", "qos.offered", "log.follows"}
 
 
 def subject_of(name):
+    if name.startswith("motion."):
+        return ahead_to_the_goal()
     return submission() if get(name).subject is Subject.SUBMISSION else recording()
+
+
+@cache
+def ahead_to_the_goal():
+    """A robot that drives straight to the goal and stops there, in front of a wall."""
+    return drive(
+        on_odometry(lambda pose: (0.22 if pose.x_m < 0.97 else 0.0, 0.0)),
+        world="{segments: [[1.8, -1, 1.8, 1]]}",
+    )
 
 
 def test_every_check_is_tried_here():
@@ -97,7 +139,7 @@ def test_the_nearest_name_is_offered():
 
 
 def test_without_a_near_name_all_are_listed():
-    with pytest.raises(ValueError, match=r"There are: executor\.responsive, messages\.count, "):
+    with pytest.raises(ValueError, match=r"There are: executor\.responsive, log\.follows, "):
         get("zzz")
 
 
@@ -164,6 +206,41 @@ MESSAGES = st.lists(
     ),
     max_size=14,
 ).map(lambda found: {"/cmd_vel": tuple(sorted(found, key=lambda m: m.stamp_ns))} if found else {})
+POINTS = st.floats(-3, 3)
+TRUTH = st.builds(
+    lambda steps, contact: tuple(
+        Truth(LAUNCH_NS + 10**7 * index, *step, contact if index == 1 else None)
+        for index, step in enumerate(steps)
+    ),
+    st.lists(st.tuples(*[POINTS] * 7), max_size=6),
+    st.sampled_from([None, "boxes[0]", "moving[0]"]),
+)
+SCENES = st.builds(
+    Scene,
+    radius_m=st.just(0.1),
+    max_linear_m_s=st.just(0.22),
+    max_angular_rad_s=st.just(2.84),
+    outlines=st.just(
+        {"boxes[0]": ((1.0, -1.0, 1.0, 1.0, 0.0),), "circles[0]": ((0, 1, 0, 1, 0.1),)}
+    ),
+    moving=st.just({"moving[0]": (0.1, (None, (0.5, 0.0, 0.0)))}),
+    began_ns=st.just(LAUNCH_NS),
+)
+SENSED = st.builds(
+    lambda topic, value, time: (topic, Message(topic, "x/msg/X", value, time, time, 1)),
+    st.sampled_from(["/odom", "/scan"]),
+    st.one_of(
+        st.dictionaries(st.sampled_from(["ranges", "angle_min", "header", "pose"]), JSON),
+        st.just({"ranges": [0.0, math.inf, math.nan], "angle_min": 0.0, "angle_increment": 2.1}),
+    ),
+    TIMES,
+)
+INCIDENTS = st.builds(
+    Incident,
+    TIMES,
+    st.sampled_from(["late", "command_rejected", "contact_began"]),
+    st.sampled_from(["3 steps done 25 ms late", "linear nan, angular 0.0", ""]),
+)
 LOG = st.builds(
     LogLine,
     TIMES,
@@ -193,7 +270,14 @@ RECORDINGS = st.builds(
     end_ns=TIMES,
     submission=st.just(submission()),
     matched_ns=MAYBE,
-    messages=MESSAGES,
+    messages=st.builds(
+        lambda sent, sensed: {**sent, **{topic: (item,) for topic, item in sensed}},
+        MESSAGES,
+        st.lists(SENSED, max_size=2),
+    ),
+    truth=TRUTH,
+    scene=st.one_of(st.none(), SCENES),
+    incidents=st.lists(INCIDENTS, max_size=2).map(tuple),
     nodes=st.lists(
         st.builds(Node, NAMES, st.sampled_from(list(Owner)), TIMES, MAYBE), max_size=3
     ).map(tuple),

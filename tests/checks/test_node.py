@@ -25,6 +25,7 @@ from tests.checks.builder import (
     nodeless,
     output,
     process,
+    reader,
     recording,
     submission,
     taken,
@@ -41,6 +42,18 @@ class TestExists:
     def test_a_name_that_ros_does_not_allow_is_the_authors_mistake(self):
         with pytest.raises(ValueError, match="'bot publisher' is not a node name"):
             judge("node.exists", recording(), name="bot publisher")
+
+    def test_another_node_that_publishes_in_its_place(self):
+        helper = "/pub"
+        run = recording(nodes=(node(), node(helper)), endpoints=(endpoint(node=helper), reader()))
+        assert judge("node.exists", run, name=NODE).status is Status.PASSED
+        found = failing("node.exists", run, name=NODE, publishes="/cmd_vel")
+        assert "`/bot_publisher` is there, but `/pub` publishes on `/cmd_vel`" in found
+
+    @pytest.mark.parametrize("topic", ["/cmd_vel", "/elsewhere"])
+    def test_it_publishes_itself_or_nobody_does(self, topic):
+        run = recording(endpoints=(endpoint(topic), reader()))
+        assert judge("node.exists", run, name=NODE, publishes="/cmd_vel").status is Status.PASSED
 
     def test_nothing_launched_names_what_is_installed(self):
         run = nodeless(ending=Ending.NOT_STARTED, processes=())

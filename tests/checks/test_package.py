@@ -92,6 +92,19 @@ class TestBuilds:
         assert str(CULPRIT) in finding.observed
         assert finding.evidence.places == (CULPRIT,)
 
+    def test_another_packages_error_is_not_its_own(self):
+        other = SourceError("src/notes/setup.py", 1, "RuntimeError: not finished")
+        finding = self.found(build=failed_build("notes", NAME, culprit=other))
+        assert finding.status is Status.FAILED
+        assert "notes" not in finding.observed
+        assert finding.evidence.log[-1] == "NameError: name 'x' is not defined"
+
+    def test_the_error_of_a_package_that_it_waits_for_is_told(self):
+        other = SourceError("src/notes/setup.py", 1, "RuntimeError: not finished")
+        log = "Starting >>> notes\nRuntimeError: not finished\nFailed   <<< notes\n"
+        finding = self.found(build=failed_build("notes", NAME, culprit=other, log=log))
+        assert "src/notes/setup.py:1: RuntimeError: not finished" in finding.observed
+
     def test_the_log_is_the_packages_own_without_colour_and_chatter(self):
         finding = self.found(build=failed_build(NAME))
         assert finding.evidence.log == (
@@ -215,6 +228,16 @@ class TestExecutable:
             "[develop] / script_dir=$base/lib/bot_publisher / "
             "[install] / install_scripts=$base/lib/bot_publisher"
         ) in found
+
+    def test_another_package_of_the_submission_has_it(self):
+        own = package(executables=(), entry_points=())
+        other = package("robot")
+        finding = judge(
+            "package.executable", submission(own, other), package=NAME, executable="bot_pub"
+        )
+        assert finding.status is Status.FAILED
+        assert finding.observed == "it is in the package `robot`: `ros2 run robot bot_pub`"
+        assert finding.evidence.places[0].file == "src/robot/setup.py"
 
     def test_a_misspelt_entry_point(self):
         found = self.found(entry_points=(("bot_publisher", "bot_publisher.node:main"),))

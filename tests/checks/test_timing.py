@@ -78,7 +78,8 @@ class TestGood:
 
     @given(st.lists(st.floats(-0.014, 0.014), min_size=5, max_size=40))
     def test_any_jitter_within_the_tolerance_passes_in_any_order(self, jitter):
-        run = recording(messages=messages(after([0.3 + j for j in jitter])), stop_s=20)
+        times = after([0.3 + j for j in jitter])
+        run = recording(messages=messages(times), stop_s=max(times) + 0.2)
         assert period(run).status is Status.PASSED
 
     @given(st.lists(st.floats(-0.014, 0.014), min_size=5, max_size=40), st.integers(0, 40))
@@ -87,8 +88,37 @@ class TestGood:
         index %= len(intervals) - 1
         intervals[index] += 0.12
         intervals[index + 1] -= 0.12
-        run = recording(messages=messages(after(intervals)), stop_s=20)
+        times = after(intervals)
+        run = recording(messages=messages(times), stop_s=max(times) + 0.2)
         assert period(run).status is Status.PASSED
+
+
+class TestEnds:
+    def test_messages_that_stop_long_before_the_end(self):
+        run = recording(messages=messages(every(0.3, 9)), stop_s=5.4)
+        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
+        assert "9 messages at the right period, but none in the last 2.3 s" in found
+        assert "timer.cancel()" in found
+
+    def test_one_message_that_is_still_missing(self):
+        run = recording(messages=messages(every(0.3, 9)), stop_s=3.9)
+        assert period(run).status is Status.PASSED
+
+    def test_what_the_machine_took_is_no_silence(self):
+        run = recording(
+            messages=messages(every(0.3, 9)), stop_s=5.4, disturbance=taken(3.2, 5.3, 2.0)
+        )
+        assert period(run).status is Status.PASSED
+
+    def test_a_death_is_the_deeper_cause(self):
+        run = recording(
+            messages=messages(every(0.3, 9)),
+            stop_s=5.4,
+            processes=(died(1, 3.2),),
+            log=output(traceback("KeyError: 'x'")),
+        )
+        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
+        assert "KeyError: 'x'" in found
 
 
 class TestProperties:
@@ -386,7 +416,8 @@ class TestParameters:
         ],
     )
     def test_a_tolerance_is_a_share_or_a_time(self, tolerance, median_s, status):
-        run = recording(messages=messages(every(median_s)), stop_s=6)
+        times = every(median_s)
+        run = recording(messages=messages(times), stop_s=max(times) + 0.2)
         assert period(run, tolerance=tolerance).status is status
 
     @pytest.mark.parametrize(
@@ -403,11 +434,12 @@ class TestParameters:
         intervals = [0.3] * 20
         for index in range(late):
             intervals[3 * index + 2] = 0.4
-        run = recording(messages=messages(after(intervals)), stop_s=9)
+        times = after(intervals)
+        run = recording(messages=messages(times), stop_s=max(times) + 0.2)
         assert period(run, outliers=outliers).status is status
 
     def test_intervals_needed(self):
-        run = recording(messages=messages(every(PERIOD_S, 6)))
+        run = recording(messages=messages(every(PERIOD_S, 6)), stop_s=2.4)
         assert period(run, at_least=5).status is Status.PASSED
         assert "6 messages on `/cmd_vel`" in period(run, at_least=6).observed
 

@@ -1,0 +1,220 @@
+"""What the checks of motion are made of: parameters, geometry, laws, and topics left alone."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel, ValidationError
+
+from grader.checks.finding import Status
+from grader.checks.ground import ahead, nearest
+from grader.checks.law import Law, Sample, examine
+from grader.checks.measure import degrees, metres, point, side, speed
+from grader.checks.reference import (
+    AngleOrName,
+    Goal,
+    GoalPose,
+    LengthOrName,
+    UnknownValue,
+    resolve,
+)
+from grader.recording.model import Scene, Truth
+from tests.checks.builder import (
+    at,
+    endpoint,
+    failing,
+    judge,
+    node,
+    nodeless,
+    recording,
+)
+
+
+class Form(BaseModel):
+    goal: GoalPose
+    far: LengthOrName = 0.0
+    turned: AngleOrName = 0.0
+
+
+def read(goal, **fields):
+    return Form.model_validate({"goal": goal, **fields})
+
+
+class TestReferences:
+    def test_numbers_with_and_without_units(self):
+        assert read([1.2, "30 cm", "90 deg"]).goal == Goal(1.2, 0.3, math.pi / 2)
+
+    def test_names(self):
+        form = read(["goal_x", 0, "goal_theta"], far="wall", turned="-5 deg")
+        pose = form.goal.pose({"goal_x": 0.5, "goal_theta": 4.0})
+        assert (pose.x_m, pose.y_m) == (0.5, 0.0)
+        assert math.isclose(pose.yaw_rad, 4.0 - math.tau)
+        assert resolve(form.far, {"wall": 1.5}) == 1.5
+        assert math.isclose(resolve(form.turned, {}), -math.pi / 36)
+
+    def test_an_unknown_name(self):
+        with pytest.raises(UnknownValue, match=r"no random value 'goal_z'\. Did you mean 'goal_x'"):
+            Goal("goal_z", 0.0, 0.0).pose({"goal_x": 1.0})
+        with pytest.raises(UnknownValue, match="It has none"):
+            Goal("goal_z", 0.0, 0.0).pose({})
+
+    @pytest.mark.parametrize(
+        ("goal", "message"),
+        [
+            ([1, 2], r"expected \[x, y, theta\]"),
+            ("goal", r"expected \[x, y, theta\]"),
+            ([1, 2, 1.5], "theta: .*has no unit"),
+            ([1, "2 s", "1 rad"], "y: .*unit of time"),
+            (["$goal_x", 0, 0], "x: .*write 'goal_x'"),
+        ],
+    )
+    def test_what_is_neither(self, goal, message):
+        with pytest.raises(ValidationError, match=message):
+            read(goal)
+
+    def test_written_as_it_is_read(self):
+        form = read(["goal_x", 0.25, "1 rad"], far="2 m", turned="turned")
+        assert Form.model_validate_json(form.model_dump_json()) == form
+
+    def test_described_to_an_editor(self):
+        properties = Form.model_json_schema()["properties"]
+        assert "names of random values" in properties["goal"]["x-words"]
+        assert "name of a random value" in properties["far"]["x-words"]
+
+
+def scene(outlines, moving=None):
+    return Scene(0.1, 0.22, 2.84, outlines, moving or {}, at(0))
+
+
+def standing(x=0.0, y=0.0, yaw=0.0, time_s=0.0):
+    return Truth(at(time_s), x, y, yaw, 0.0, 0.0, 0.0, 0.0)
+
+
+class TestGround:
+    @given(
+        distance=st.floats(0.2, 3.0),
+        yaw=st.floats(-math.pi, math.pi),
+        slant=st.floats(-1.0, 1.0),
+        x=st.floats(-5, 5),
+        y=st.floats(-5, 5),
+    )
+    def test_a_wall_in_any_direction(self, distance, yaw, slant, x, y):
+        fx, fy = x + distance * math.cos(yaw), y + distance * math.sin(yaw)
+        wx, wy = -math.sin(yaw + slant), math.cos(yaw + slant)
+        wall = (fx - wx, fy - wy, fx + wx, fy + wy, 0.0)
+        sight = ahead(scene({"wall": (wall,)}), standing(x, y, yaw))
+        assert sight is not None
+        assert math.isclose(sight.distance_m, distance, abs_tol=1e-9)
+
+    @given(distance=st.floats(0.5, 3.0), aside=st.floats(-0.4, 0.4))
+    def test_a_pillar(self, distance, aside):
+        sight = ahead(scene({"p": ((distance, aside, distance, aside, 0.2),)}), standing())
+        if abs(aside) > 0.2:
+            assert sight is None
+        else:
+            assert sight is not None
+            assert math.isclose(sight.distance_m, distance - math.sqrt(0.04 - aside**2))
+
+    def test_nothing_behind_counts(self):
+        world = scene({"wall": ((-1.0, -1.0, -1.0, 1.0, 0.0),)})
+        assert ahead(world, standing()) is None
+        near = nearest(world, standing())
+        assert near is not None and near.distance_m == 1.0
+        assert side(near.bearing_rad) == "behind it"
+
+    def test_what_moves_is_where_it_was_then(self):
+        places = (None, None, (1.0, 0.0, 0.0), (1.2, 0.0, 0.0))
+        world = scene({}, {"m": (0.1, places)})
+        assert ahead(world, standing(time_s=0.19)) is None
+        found = [ahead(world, standing(time_s=time)) for time in (0.2, 0.25, 0.3)]
+        assert [sight and round(sight.distance_m, 6) for sight in found] == [0.9, 1.0, 1.1]
+
+
+def law(commands, limit=2.84):
+    return examine([Sample(*item) for item in commands], limit, 0.9)
+
+
+ERRORS = [3.0 * 0.95**index for index in range(100)]
+
+
+class TestLaw:
+    @given(gain=st.floats(0.3, 4.0), clamp=st.floats(0.5, 2.84), pause=st.floats(0.0, 0.1))
+    def test_a_clamped_line_is_proportional(self, gain, clamp, pause):
+        pause = min(pause, 0.3 * clamp / gain)
+        verdict = law([(e, 0.0 if e < pause else min(clamp, gain * e)) for e in ERRORS])
+        assert verdict.law is Law.PROPORTIONAL
+        assert math.isclose(verdict.gain, gain, rel_tol=0.02)
+        assert verdict.r2 > 0.99
+
+    def test_a_least_speed_is_a_clamp_too(self):
+        verdict = law([(e, max(0.2, 1.5 * e)) for e in ERRORS])
+        assert verdict.law is Law.PROPORTIONAL and verdict.r2 > 0.9
+
+    def test_a_constant_far_from_the_goal_is_no_clamp(self):
+        verdict = law([(e, 0.5 if e > 0.1 else 1.5 * e) for e in ERRORS])
+        assert not (verdict.law is Law.PROPORTIONAL and verdict.r2 >= 0.9)
+
+    @pytest.mark.parametrize("sizes", [(0.5,), (0.3, 1.0), (0.2, 0.6, 1.2)])
+    def test_few_values_are_steps(self, sizes):
+        commands = [(e, sizes[min(int(e), len(sizes) - 1)]) for e in ERRORS]
+        verdict = law(commands)
+        assert verdict.law is Law.STEPS and verdict.values == sizes
+
+    def test_an_error_that_is_a_full_turn_off(self):
+        shown = [e - math.tau if e > math.pi else e for e in [5.0 * 0.97**i for i in range(120)]]
+        raw = [5.0 * 0.97**i for i in range(120)]
+        verdict = law([(e, 0.5 * r) for e, r in zip(shown, raw, strict=True)])
+        assert verdict.law is Law.NOT_NORMALISED
+        assert math.isclose(verdict.gain, 0.5, rel_tol=0.01)
+
+    def test_few_commands_below_the_clamp_are_enough(self):
+        commands = [(0.25 + 0.1 * n, 1.0) for n in range(20, 0, -1)]
+        verdict = law([*commands, (0.24, 0.96), (0.15, 0.6), (0.09, 0.36), (0.05, 0.0)])
+        assert verdict.law is Law.PROPORTIONAL and math.isclose(verdict.gain, 4.0)
+
+    def test_the_wrong_sign(self):
+        verdict = law([(e / 1.2, -0.8 * e / 1.2) for e in ERRORS])
+        assert verdict.law is Law.WRONG_SIGN
+
+    def test_either_sense_is_right_near_half_a_turn(self):
+        commands = [(-math.pi + 0.05, 1.5 * (math.pi + 0.05)), *[(e, 1.5 * e) for e in ERRORS]]
+        assert law(commands, limit=9.0).law is Law.PROPORTIONAL
+
+    def test_noise_is_not_a_law(self):
+        verdict = law([(e, math.sin(1000.0 * e)) for e in ERRORS])
+        assert not (verdict.law is Law.PROPORTIONAL and verdict.r2 >= 0.9)
+
+    def test_nothing_but_zeros(self):
+        assert law([(e, 0.0) for e in ERRORS]).law is Law.ZERO
+
+    def test_nothing_to_correct(self):
+        assert law([(0.01, 0.0)] * 20).law is Law.NOTHING_TO_DO
+
+
+class TestUntouched:
+    def test_a_publisher_on_a_topic_of_the_robot(self):
+        forger = endpoint("/odom", type="nav_msgs/msg/Odometry")
+        run = recording(endpoints=(*recording().endpoints, forger))
+        said = failing("topic.untouched", run)
+        assert "the node `/bot_publisher` publishes on `/odom`" in said
+        assert judge("topic.untouched", run, topics=["/scan"]).status is Status.PASSED
+
+    def test_the_name_of_the_probe(self):
+        run = recording(nodes=(node(), node("/a/rosgrade_probe")))
+        assert "`/a/rosgrade_probe`" in failing("topic.untouched", run)
+
+    def test_nobody_is_praised_for_being_absent(self):
+        failing("topic.untouched", nodeless())
+
+
+def test_measures_have_their_units():
+    assert [metres(x) for x in (1.234, 0.2, 0.032, 0.0004, 0.0)] == [
+        "1.23 m",
+        "0.2 m",
+        "3.2 cm",
+        "0.4 mm",
+        "0 m",
+    ]
+    assert (degrees(math.pi), degrees(0.05), speed(0.1)) == ("180°", "2.9°", "0.1 m/s")
+    assert point(-0.0, 1.5) == "(0.00, 1.50) m"
