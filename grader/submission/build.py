@@ -36,6 +36,7 @@ _PROGRESS = re.compile(r"(Starting >>>|Finished <<<) (\S+)")
 _STOPPED = "Exception in job execution"
 _UNSAID = "colcon could not build this package; the log says why"
 _COMPILE_S = 60.0
+_WHOLE_LOG = 60_000
 _LEAST_FREE_BYTES = 64 * MIB
 
 
@@ -233,6 +234,10 @@ class _Workshop:
             raise GraderFault(
                 f"colcon was killed by signal {-outcome.status}; perhaps memory ran out"
             )
+        if outcome.status is not None and _is_cut_off(outcome.output):
+            raise GraderFault(
+                f"colcon ended with status {outcome.status} in the middle of a build, without a word"
+            )
         if "No space left on device" in outcome.output:
             free = min(shutil.disk_usage(path).free for path in (scratch, install.parent))
             if free < _LEAST_FREE_BYTES:
@@ -283,6 +288,14 @@ class _Workshop:
         if folders:
             command = [str(self.ros.python), "-I", "-S", "-m", "compileall", "-qq", *folders]
             run_bounded(command, cwd=scratch, environment=environment, wall_s=_COMPILE_S)
+
+
+def _is_cut_off(output: str) -> bool:
+    """Whether colcon started a package and never said how that ended, nor why it stopped."""
+    started = set(re.findall(r"^Starting >>> (\S+)", output, re.MULTILINE))
+    ended = set(re.findall(r"^(?:Finished|Failed|Aborted) +<<< (\S+)", output, re.MULTILINE))
+    # Of a very long log only the beginning and the end are there.
+    return len(output) < _WHOLE_LOG and bool(started - ended) and _STOPPED not in output
 
 
 def _together(outcomes: Sequence[Outcome]) -> Outcome:
