@@ -286,9 +286,9 @@ class Cell:
         topics = {endpoint.topic for endpoint in self._graph.endpoints}
         for declaration in self._output.declarations:
             kind, data = declaration.kind, declaration.data
-            if kind == "node" and data.get("node") not in nodes:
+            if kind == "node" and str(data.get("node")) not in nodes:
                 return
-            if kind in ("publisher", "subscription") and data.get("topic") not in topics:
+            if kind in ("publisher", "subscription") and str(data.get("topic")) not in topics:
                 return
         for name in leaving[self._told :]:
             self._students.let_leave(name)

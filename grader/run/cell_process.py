@@ -13,7 +13,7 @@ from typing import Any
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.run.descendants import kill_tree
+from grader.run.descendants import kill_by_variable, kill_tree
 from grader.run.environment import cell_environment
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 
@@ -21,6 +21,8 @@ _ENDING_LIMIT_S = 10.0
 # Beyond every bounded wait of a cell, even stretched by a busy host: something of ours hangs.
 _HANGING_S = 600.0
 _SHOWN_ERROR = 4000
+SCRATCH = "scratch"
+"""Folder of the student's processes, their HOME, in the cell's."""
 
 
 class CellProcess:
@@ -74,6 +76,9 @@ class CellProcess:
         finally:
             watchdog.cancel()
             self._end()
+            if self._popen.returncode:
+                # Killed, perhaps by the student's process: nobody has cleaned up.
+                kill_by_variable("HOME", str(self.folder / SCRATCH))
         if self._popen.returncode or not self.recording.exists():
             told = self._errors.read_text(encoding="utf-8", errors="replace")
             raise GraderFault(

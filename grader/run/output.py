@@ -9,12 +9,14 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
 from grader.recording.model import Declaration, LogLine
 
 _READ_BYTES = 1 << 16
 _LONGEST_LINE = 8192
 _MOST_DECLARATIONS = 2000
+_LARGEST_NUMBER = 2**63
 
 
 @dataclass
@@ -170,12 +172,35 @@ class OutputReader:
         lines = [*stream.kept.head, *stream.kept.tail]
         stream.kept = _Kept(self._limit, [], deque())
         for line in lines:
-            try:
-                data = json.loads(line.text)
-            except (ValueError, RecursionError):
+            data = _declared(line.text)
+            if data is None:
                 continue
-            if not isinstance(data, dict) or "kind" not in data:
-                continue
-            kind = str(data.pop("kind"))
+            kind = data.pop("kind")
             if len(self._declarations) < _MOST_DECLARATIONS:
                 self._declarations.append(Declaration(line.time_ns, line.process, kind, data))
+
+
+def _declared(text: str) -> dict[str, Any] | None:
+    """What a line of a tracer says, or None if a tracer cannot have written it.
+
+    The student's process can write to the pipe too, so nothing in it may be large, deep or
+    unfit to be written down again.
+    """
+    try:
+        data = json.loads(text, parse_constant=lambda _: None)
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(data, dict) or not isinstance(data.get("kind"), str):
+        return None
+    inner = [value for value in data.values() if isinstance(value, dict)]
+    values = [value for item in (data, *inner) for value in item.values() if value not in inner]
+    keys = [key for item in (data, *inner) for key in item]
+    return data if all(map(_is_plain, (*values, *keys))) else None
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, str):
+        return not any("\ud800" <= char <= "\udfff" for char in value)
+    if isinstance(value, int | float):
+        return abs(value) < _LARGEST_NUMBER
+    return value is None

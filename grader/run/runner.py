@@ -16,7 +16,7 @@ from grader.errors import GraderFault
 from grader.recording.fact import to_json
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
-from grader.run.cell_process import CellProcess
+from grader.run.cell_process import SCRATCH, CellProcess
 from grader.run.environment import RMW, student_environment
 from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
 from grader.submission.record import SubmissionRecord
@@ -231,7 +231,7 @@ class Runner:
     ) -> CellOrder:
         from grader.assignment.drawing import draw_values
 
-        scratch = folder / "scratch"
+        scratch = folder / SCRATCH
         scratch.mkdir()
         values = draw_values(scenario, seed)
         every = [stimulus.every for stimulus in scenario.stimuli]

@@ -15,6 +15,8 @@ from grader.run.descendants import descendants, kill_descendants, reap
 from grader.run.output import OutputReader
 from grader.run.shared_memory import remove_orphaned_segments
 
+_AFTERMATH_S = 0.5
+
 
 @dataclass
 class _Running:
@@ -60,6 +62,7 @@ class StudentProcesses:
                 env={
                     **environment,
                     "ROSGRADE_TRACER_FD": str(tracer_write),
+                    "ROSGRADE_TRACER_PIPE": str(os.fstat(tracer_write).st_ino),
                     "ROSGRADE_SEEN_FD": str(seen_read),
                 },
                 stdin=subprocess.DEVNULL,
@@ -130,6 +133,10 @@ class StudentProcesses:
 
     def clean_up(self) -> None:
         """Kill whatever is left and remove what it left in shared memory."""
+        # Helpers such as multiprocessing's resource tracker end by themselves a moment later.
+        deadline = time.monotonic() + _AFTERMATH_S
+        while not self.poll() and descendants(os.getpid()) and time.monotonic() < deadline:
+            time.sleep(0.01)
         self._survivors = tuple(
             command
             for pid, command in kill_descendants(os.getpid()).items()

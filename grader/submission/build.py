@@ -235,9 +235,7 @@ class _Workshop:
                 f"colcon was killed by signal {-outcome.status}; perhaps memory ran out"
             )
         if outcome.status is not None and _is_cut_off(outcome.output):
-            raise GraderFault(
-                f"colcon ended with status {outcome.status} in the middle of a build, without a word"
-            )
+            raise GraderFault(f"colcon ended with status {outcome.status} in the middle of a build")
         if "No space left on device" in outcome.output:
             free = min(shutil.disk_usage(path).free for path in (scratch, install.parent))
             if free < _LEAST_FREE_BYTES:

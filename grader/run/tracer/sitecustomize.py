@@ -32,13 +32,23 @@ _OWN_TOPICS = ("/parameter_events", "/rosout")
 _LONGEST_LINE = 4000
 
 
+def _pipe(fd: int) -> tuple[int, int] | None:
+    """Identity of a pipe, None for anything else."""
+    try:
+        status = os.fstat(fd)
+    except OSError:
+        return None
+    return (status.st_dev, status.st_ino) if status.st_mode & 0o170000 == 0o010000 else None
+
+
 def _report(kind: str, **data: Any) -> None:
     """Send one line to the cell; without a listener nothing happens."""
     try:
         import json
 
         line = json.dumps({"kind": kind, "pid": os.getpid(), **data}) + "\n"
-        if len(line) <= _LONGEST_LINE:
+        # The program may have closed the pipe, and something else may have its number now.
+        if len(line) <= _LONGEST_LINE and _PIPE and _pipe(_FD) == _PIPE:
             os.write(_FD, line.encode())
     except Exception:
         pass
@@ -209,7 +219,19 @@ def _patch_executors(module: Any) -> None:
     executor_class.wait_for_ready_callbacks = first_wait
 
 
+def _patch_events_executor(module: Any) -> None:
+    make = module.EventsExecutor
+
+    def made(*args: Any, **kwargs: Any) -> Any:
+        # It is made in C++ and has no method to wrap; who makes one means to spin it.
+        _report("spin", executor="EventsExecutor", threads=1)
+        return make(*args, **kwargs)
+
+    module.EventsExecutor = made
+
+
 _PATCHES = {
+    "rclpy.experimental.events_executor": _patch_events_executor,
     "rclpy.node": _patch_node,
     "rclpy.context": _patch_context,
     "rclpy.executors": _patch_executors,
@@ -256,7 +278,9 @@ def _run_hidden_sitecustomize() -> None:
             return
 
 
-if _FD >= 0:
+_PIPE = _pipe(_FD)
+# A child that did not inherit the pipe has the variable, but not what it names.
+if _PIPE is not None and str(_PIPE[1]) == os.environ.get("ROSGRADE_TRACER_PIPE"):
     sys.meta_path.insert(0, _Finder)
     import atexit
 
