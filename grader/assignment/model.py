@@ -59,6 +59,12 @@ class RandomRange(Model):
     high: float
     unit: str = ""
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Any) -> dict[str, Any]:
+        """Describe it to an editor as it is written: [lowest, highest]."""
+        entry = {"type": ["number", "string"]}
+        return {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}
+
     @model_validator(mode="before")
     @classmethod
     def _read(cls, value: Any) -> Any:

@@ -132,10 +132,10 @@ class Grading:
         if not names:
             return
         with ThreadPoolExecutor(max_workers=1 if alone else len(names)) as pool:
-            futures = {
-                name: pool.submit(self._run, name, prepared, folder, alone) for name in names
-            }
             try:
+                futures = {
+                    name: pool.submit(self._run, name, prepared, folder, alone) for name in names
+                }
                 for name, future in futures.items():
                     faults.pop(name, None)
                     try:

@@ -158,9 +158,11 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
     for line in check.stderr:
         if "starting bot_publisher/bot_pub" in line:
             break
+    while not any(b"bot_pub" in line for line in _running(str(tmp_path))):
+        assert check.poll() is None
     check.send_signal(signal.SIGINT)
     _, told = check.communicate(timeout=60)
-    assert check.returncode == 130
+    assert check.returncode == 130, told
     assert "Traceback" not in told
     assert not (tmp_path / "rosgrade-report" / "result.json").exists()
     assert not list(tmp_path.glob("rosgrade-cell-*"))
