@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -34,6 +35,7 @@ class CellProcess:
 
     def __init__(self, ros: RosInstallation) -> None:
         """Start it; it joins the graph while the order is still being made."""
+        self._closing = threading.Lock()
         self._temporary = tempfile.TemporaryDirectory(prefix="rosgrade-cell-")
         self.folder = Path(self._temporary.name)
         self._errors = self.folder / "stderr.txt"
@@ -93,8 +95,10 @@ class CellProcess:
 
     def abandon(self) -> None:
         """Let it kill what it started and end; returns at once."""
-        if self._popen.stdin is not None:
-            self._popen.stdin.close()
+        # Called by whoever interrupts and by the thread that waits, perhaps at the same time.
+        with self._closing, contextlib.suppress(OSError):
+            if self._popen.stdin is not None and not self._popen.stdin.closed:
+                self._popen.stdin.close()
 
     def close(self) -> None:
         """End it and remove its folder."""
