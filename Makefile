@@ -1,7 +1,6 @@
 .PHONY: help setup demo test lint lock bench soak docs clean
 
 PYTHON ?= python3
-N ?= 100
 run := .venv/bin/python
 
 help: ## show this list
@@ -30,8 +29,8 @@ lock: setup ## regenerate requirements.lock; UPGRADE=1 to newer versions
 bench: setup ## measure rosgrade's own overhead
 	@$(run) -m grader.bench
 
-soak: setup ## grade the references N times (default 100) and look for a verdict that changes
-	@$(run) -m grader.soak --runs $(N)
+soak: setup ## grade a class of 200 under load (N=100: seven submissions N times) and look for a verdict that changes
+	@$(run) -m grader.soak $(if $(N),--runs $(N))
 
 docs: setup ## regenerate docs/
 	@$(run) -m grader.docs

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -26,18 +27,26 @@ from grader import ros
 from grader.assignment.load import load_assignment
 from grader.assignment.mutation import reference_of
 from grader.batch.files import write_graded
-from grader.batch.grading import RECORDINGS_FOLDER, Grading
+from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
+from grader.batch.regrading import find, regrade
 from grader.grade import grade
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import NS, Recording
-from grader.report.facts import Clock
+from grader.report.facts import Clock, RunFacts
 from grader.report.files import write_whole
+from grader.report.html import render_report
+from grader.report.overview import OverviewRow, render_overview
+from grader.report.result import make_result
+from grader.run.admission import Admission
 from grader.run.domain import lock_domain
+from grader.run.load import cpu_count
 from grader.run.runner import Runner
-from grader.submission.prepare import prepare
+from grader.submission.prepare import Prepared, prepare
 
 ASSIGNMENT = "timed_publisher"
+CLASS = 100
 ROBOT_ASSIGNMENTS = ("bot_controller", "p_controller")
+SUBMISSIONS = 500
 SEGMENTS = (10, 100, 1000)
 OUTPUT = Path("rosgrade-bench.json")
 T = TypeVar("T")
@@ -76,14 +85,17 @@ def main() -> int:
     options = parser.parse_args()
     samples = Samples()
     with tempfile.TemporaryDirectory(prefix="rosgrade-bench-") as name:
-        for _ in range(options.runs):
-            _parts(samples, Path(name))
-            _whole(samples, Path(name), "warm")
+        with Runner(ros.find()) as runner:
+            for _ in range(options.runs):
+                _parts(samples, Path(name), runner)
+                _whole(samples, Path(name), "warm")
         for _ in range(3):
             _whole(samples, Path(name), "cold")
+        _batch(samples, Path(name))
         _simulator(samples)
         for robot_assignment in ROBOT_ASSIGNMENTS:
             _robot(samples, robot_assignment, Path(name))
+        _class(samples, Path(name))
     summary = samples.summary()
     print(f"{'figure (s, or a ratio)':<56} {'min':>9} {'median':>9} {'max':>9}")
     for figure, row in summary.items():
@@ -93,19 +105,20 @@ def main() -> int:
     return 0
 
 
-def _parts(samples: Samples, folder: Path) -> None:
+def _parts(samples: Samples, folder: Path, runner: Runner) -> None:
     """The steps of one grade, in this process, with a build of its own."""
     loaded = load_assignment(ASSIGNMENT)
-    installation = ros.find()
     cache = folder / "cold-cache"
     shutil.rmtree(cache, ignore_errors=True)
     reference = reference_of(ASSIGNMENT)
-    samples.timed("build, cold", lambda: prepare(reference, installation, cache=cache))
-    prepared = samples.timed("build, cached", lambda: prepare(reference, installation, cache=cache))
-    grading = Grading(loaded, Runner(installation), cache)
+    samples.timed("build, cold", lambda: prepare(reference, runner.ros, cache=cache))
+    prepared = samples.timed("build, cached", lambda: prepare(reference, runner.ros, cache=cache))
+    grading = Grading(loaded, runner, cache)
+    before_s = runner.cpu_s
     graded = samples.timed(
         "run and judge", lambda: grading.grade_prepared(prepared, folder / "recordings")
     )
+    samples.add("run: CPU of the cell and the student in it", runner.cpu_s - before_s)
     for scenario, file in graded.files.items():
         recording = samples.timed("judge: read the recording", partial(read_recording, file))
         recordings = {scenario: recording}
@@ -115,6 +128,32 @@ def _parts(samples: Samples, folder: Path) -> None:
         samples.add("observe: first match to SIGINT", (recording.stop_ns - matched_ns) / NS)
         samples.add("stop: SIGINT to the end", (recording.end_ns - recording.stop_ns) / NS)
     samples.timed("report", lambda: write_graded(graded, folder / "report", Clock()))
+
+
+def _batch(samples: Samples, folder: Path) -> None:
+    """A class of one and the same submission, all at once and one after the other."""
+    loaded = load_assignment(ASSIGNMENT)
+    prepared = prepare(reference_of(ASSIGNMENT), ros.find(), cache=folder / "batch-cache")
+    for name, count, jobs in (("all at once", CLASS, None), ("one after the other", 10, 1)):
+        with Runner(ros.find(), Admission(cells=jobs)) as runner:
+            grading = Grading(loaded, runner, folder / "batch-cache")
+            work = partial(_grade_into, grading, prepared, folder / "class")
+            with ThreadPoolExecutor(max_workers=runner.admission.most) as pool:
+                work(0)
+                before_s, own_s = runner.cpu_s, time.process_time()
+                began_s = time.monotonic()
+                list(pool.map(work, range(count)))
+                wall_s = time.monotonic() - began_s
+            cpu_s = runner.cpu_s - before_s + time.process_time() - own_s
+        samples.add(f"batch, {name}: submissions per minute", 60 * count / wall_s)
+        samples.add(f"batch, {name}: CPU of each", cpu_s / count)
+        samples.add(f"batch, {name}: share of what the CPUs bound", cpu_s / cpu_count() / wall_s)
+
+
+def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int) -> None:
+    own = folder / str(number)
+    clock = Clock()
+    write_graded(grading.grade_prepared(prepared, own / RECORDINGS_FOLDER), own, clock)
 
 
 def _simulator(samples: Samples) -> None:
@@ -135,12 +174,37 @@ def _robot(samples: Samples, name: str, folder: Path) -> None:
     loaded = load_assignment(name)
     prepared = prepare(reference_of(name), ros.find(), cache=folder / "robot-cache")
     for _ in range(3):
-        grading = Grading(loaded, Runner(ros.find()), folder / "robot-cache")
-        began_s = time.monotonic()
-        graded = grading.grade_prepared(prepared, folder / name)
-        samples.add(f"{name}: wall, all scenarios at once", time.monotonic() - began_s)
+        with Runner(ros.find()) as runner:
+            grading = Grading(loaded, runner, folder / "robot-cache")
+            began_s = time.monotonic()
+            graded = grading.grade_prepared(prepared, folder / name)
+            samples.add(f"{name}: wall, all scenarios at once", time.monotonic() - began_s)
         least_s = max(_least_s(recording) for recording in graded.recordings.values())
         samples.add(f"{name}: least time of the longest scenario", least_s)
+        samples.timed(f"{name}: HTML report with replays", partial(_report, graded))
+
+
+def _class(samples: Samples, folder: Path) -> None:
+    """Render what a class gets, from recordings that are there already."""
+    loaded = load_assignment(ASSIGNMENT)
+    found = find(folder / RECORDINGS_FOLDER)
+    graded = regrade(loaded, found)
+    facts = RunFacts(Clock().started, 0.0)
+    result = make_result(graded.grade, graded.recordings, facts)
+    rows = [OverviewRow(f"student {i}", "", f"{i}/report.html", result) for i in range(SUBMISSIONS)]
+
+    def render() -> None:
+        for _ in rows:
+            _report(graded)
+        render_overview(rows)
+
+    samples.timed(f"HTML reports of {SUBMISSIONS} submissions, with the overview", render)
+    samples.timed(f"overview of {SUBMISSIONS} submissions", lambda: render_overview(rows))
+
+
+def _report(graded: Graded) -> str:
+    facts = RunFacts(Clock().started, 0.0)
+    return render_report(graded.grade, graded.recordings, facts, graded.references)
 
 
 def _least_s(recording: Recording) -> float:

@@ -13,7 +13,7 @@ from importlib import metadata
 from grader import ros
 from grader.assignment.quantity import format_duration
 from grader.errors import GraderFault
-from grader.run.admission import cpu_count
+from grader.run.load import cpu_count
 
 
 @dataclass(frozen=True)
@@ -89,23 +89,15 @@ def _program(name: str, command: str, purpose: str, package: str) -> Part:
 
 
 def _sandbox() -> Part:
-    path = shutil.which("bwrap")
-    if path is None:
-        return Part("sandbox", False, remedy="sudo apt install bubblewrap (for untrusted code)")
-    tried = subprocess.run(
-        [path, "--unshare-all", "--ro-bind", "/", "/", "true"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if tried.returncode == 0:
-        return Part("sandbox", True, f"bubblewrap works ({path}); this version does not use it yet")
-    reason = tried.stderr.strip().splitlines()[-1] if tried.stderr.strip() else "it failed"
+    from grader.sandbox.sandbox import LAYERS
+    from grader.sandbox.trial import try_sandbox
+
+    trial = try_sandbox()
     return Part(
         "sandbox",
-        False,
-        remedy=f"bubblewrap is there but may not make namespaces ({reason}): on Ubuntu 24.04 "
-        "sudo sysctl kernel.apparmor_restrict_unprivileged_userns=0",
+        not trial.problem,
+        f"bubblewrap works ({', '.join(LAYERS)})",
+        f"{trial.problem}; {trial.remedy}",
     )
 
 

@@ -17,7 +17,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from grader import resources
-from grader.assignment import model, mutant
+from grader.assignment import asking, model, mutant, stimulus
 from grader.assignment.quantity import UNITS, Dimension, format_duration
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
@@ -31,7 +31,15 @@ _ASSIGNMENT_SECTIONS: dict[str, type[BaseModel]] = {
     "scenarios": model.Scenario,
     "launch": model.Launch,
     "record": model.RecordedTopic,
-    "stimuli": model.ListParameters,
+    "stimuli: publish": stimulus.Publish,
+    "stimuli: join": stimulus.Join,
+    "stimuli: kill": stimulus.Kill,
+    "stimuli: restart": stimulus.Restart,
+    "stimuli: call": asking.CallService,
+    "stimuli: call list_parameters": asking.ListParameters,
+    "stimuli: read_parameters": asking.ReadParameters,
+    "stimuli: set_parameters": asking.SetParameters,
+    "stimuli: send_goal": asking.SendGoal,
     "until": model.Until,
     "checks": model.CheckSpec,
 }

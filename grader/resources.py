@@ -1,4 +1,4 @@
-"""Where the files that are not Python code lie: assignments, references, templates.
+"""Where the files that are not Python code lie: assignments, references, templates, the cache.
 
 In a checkout they stand beside the import package; a wheel carries them in
 ``grader/_data/``.
@@ -6,6 +6,7 @@ In a checkout they stand beside the import package; a wheel carries them in
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from grader.errors import GraderFault
@@ -44,3 +45,9 @@ def reference() -> Path:
 def templates() -> Path:
     """The folder with the Jinja2 templates."""
     return root() / "templates"
+
+
+def cache_folder() -> Path:
+    """Folder for builds that may be deleted at any time (XDG Base Directory)."""
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "rosgrade"

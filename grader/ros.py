@@ -29,6 +29,8 @@ class RosInstallation:
         python: Interpreter that imports rclpy.
         prefixes: ament prefixes, the first wins.
         inherited: Variables that a sourced installation needs, taken from the environment.
+        underlays: Install spaces of ours (merged layout) with packages that it lacks; see
+            :mod:`grader.submission.underlay`.
     """
 
     source: str
@@ -36,12 +38,13 @@ class RosInstallation:
     prefixes: tuple[Path, ...]
     inherited: tuple[tuple[str, str], ...] = ()
     distro: str = DISTRO
+    underlays: tuple[Path, ...] = ()
 
     @cached_property
     def packages(self) -> frozenset[str]:
         """Names of all packages in the ament index."""
         found: set[str] = set()
-        for prefix in self.prefixes:
+        for prefix in (*self.underlays, *self.prefixes):
             index = prefix / "share/ament_index/resource_index/packages"
             if index.is_dir():
                 found.update(entry.name for entry in index.iterdir())
@@ -60,7 +63,7 @@ class RosInstallation:
 
     def _site_packages(self) -> list[Path]:
         found: list[Path] = []
-        for prefix in self.prefixes:
+        for prefix in (*self.underlays, *self.prefixes):
             found.extend(sorted(prefix.glob("lib/python3.*/site-packages")))
         return found
 
@@ -77,6 +80,7 @@ class RosInstallation:
         result = {name: environ[name] for name in _KEPT if name in environ}
         result.update(self.inherited)
         result["PATH"] = os.pathsep.join([str(self.python.parent), "/usr/local/bin:/usr/bin:/bin"])
+        overlays = (*overlays, *self.underlays)
         result["ROS_DISTRO"] = self.distro
         result["ROS_VERSION"] = "2"
         result["ROS_PYTHON_VERSION"] = "3"

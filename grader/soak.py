@@ -1,45 +1,64 @@
 """``make soak``: grade the same submissions again and again on a loaded machine.
 
-Every CPU is kept busy by a process of its own; a verdict (the status of every check) that
-differs from the one that the submission must get is counted.
+Without ``N``, a class of 200, references and mutants in random order, while processes load
+every CPU in bursts: each verdict (the status of every check) is compared with the one that the
+same submission got alone on the machine before. With ``N``, both publisher references and five
+mutants ``N`` times each while every CPU is busy all the time: each verdict is compared with the
+one that the submission must get.
 """
 
 from __future__ import annotations
 
 import argparse
 import multiprocessing
+import random
 import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.mutation import reference_of
 from grader.batch.grading import Grading
-from grader.batch.selftest import REFERENCE, Trial, TrialResult, run_trial, trials
-from grader.cli.console import cache_folder
-from grader.run.admission import Admission, cpu_count
+from grader.batch.selftest import REFERENCE, Role, Trial, TrialResult, run_trial, trials
+from grader.checks.finding import Status
+from grader.resources import cache_folder
+from grader.run.admission import Admission
+from grader.run.load import cpu_count
 from grader.run.runner import Runner
+from grader.sandbox.choice import Choice
+from grader.sandbox.trial import choose
 
 SUBMISSIONS = {
     "simple_publisher": (REFERENCE, "publishes_twice", "topic_misspelt"),
     "timed_publisher": (REFERENCE, "period_30_ms", "sleeps_in_main", "best_effort"),
 }
 """Assignment -> what is graded: both references and five mutants."""
+DIFFERENT = 25
+"""Different submissions in a class; the others are copies of them."""
+_BURST_S = (0.3, 3.0)
+_PAUSE_S = (0.3, 3.0)
 
 
 @dataclass(frozen=True)
 class Job:
-    """One submission to grade over and over."""
+    """One submission to grade over and over.
+
+    Attributes:
+        alone: The verdict that it got alone on the machine, or None for the one it must get.
+    """
 
     loaded: LoadedAssignment
     grading: Grading
     trial: Trial
     reference: Path
+    alone: Mapping[str, Status] | None = None
 
     @property
     def name(self) -> str:
@@ -47,45 +66,89 @@ class Job:
         return f"{self.loaded.assignment.id}/{self.trial.id}"
 
 
-def _burn() -> None:
-    while True:
-        pass
-
-
-def _jobs(runner: Runner) -> list[Job]:
-    found = []
-    for name, wanted in SUBMISSIONS.items():
-        loaded = load_assignment(name)
-        grading = Grading(loaded, runner, cache_folder())
-        by_id = {trial.id: trial for trial in trials(loaded)}
-        found += [Job(loaded, grading, by_id[i], reference_of(name)) for i in wanted]
-    return found
-
-
 def main() -> int:
     """Run the soak; 0 if no verdict changed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=100, help="runs of each submission")
-    parser.add_argument("--jobs", type=int, default=2 * cpu_count(), help="submissions at once")
+    parser.add_argument("--runs", type=int, help="runs of each of seven submissions")
+    parser.add_argument("--students", type=int, default=200, help="size of the class")
+    parser.add_argument("--seed", type=int, default=1, help="of the class and of the bursts")
+    parser.add_argument("--sandbox", type=Choice, default=Choice.AUTO)
     parser.add_argument("--calm", action="store_true", help="do not load the CPUs")
     options = parser.parse_args()
-    burners = [
-        multiprocessing.Process(target=_burn, daemon=True)
-        for _ in range(0 if options.calm else cpu_count())
-    ]
-    jobs = _jobs(Runner(ros.find(), Admission(cells=options.jobs)))
-    for burner in burners:
-        burner.start()
-    began_s = time.monotonic()
-    try:
-        results = _grade_all(jobs, options.runs, options.jobs)
-    finally:
-        for burner in burners:
-            burner.kill()
+    sandbox, notice = choose(options.sandbox, cache_folder())
+    if notice:
+        print(notice, file=sys.stderr)
+    with Runner(ros.find(), Admission(), sandbox=sandbox) as runner:
+        if options.runs:
+            queue = _jobs(runner, SUBMISSIONS) * options.runs
+        else:
+            queue = _class(runner, options.students, options.seed)
+        bursts = None if options.runs else options.seed
+        began_s = time.monotonic()
+        with _load(0 if options.calm else cpu_count(), bursts):
+            results = _grade_all(queue, 8 * cpu_count())
     return _summary(results, time.monotonic() - began_s)
 
 
-def _grade_all(jobs: list[Job], runs: int, at_once: int) -> list[tuple[Job, TrialResult]]:
+def _jobs(runner: Runner, wanted: Mapping[str, Sequence[str]]) -> list[Job]:
+    found = []
+    for name, ids in wanted.items():
+        loaded = load_assignment(name)
+        grading = Grading(loaded, runner, cache_folder())
+        by_id = {trial.id: trial for trial in trials(loaded)}
+        found += [Job(loaded, grading, by_id[i], reference_of(name)) for i in ids]
+    return found
+
+
+def _class(runner: Runner, students: int, seed: int) -> list[Job]:
+    """A class in random order, each of it graded alone before."""
+    order = random.Random(seed)
+    wanted: dict[str, list[str]] = {}
+    for name in SUBMISSIONS:
+        wanted[name] = [REFERENCE]
+        wanted[name] += [t.id for t in trials(load_assignment(name)) if t.role is Role.MUTANT]
+    everything = [(name, i) for name, ids in wanted.items() for i in ids[1:]]
+    chosen = order.sample(everything, DIFFERENT - len(wanted))
+    picked = {name: [REFERENCE, *(i for n, i in chosen if n == name)] for name in wanted}
+    alone = []
+    for job in _jobs(runner, picked):
+        ((_, result),) = _grade_all([job], 1)
+        alone.append(replace(job, alone=_verdict(result)))
+        print(f"alone: {len(alone)} of {DIFFERENT}, {job.name}", file=sys.stderr, flush=True)
+    queue = [alone[number % len(alone)] for number in range(students)]
+    order.shuffle(queue)
+    return queue
+
+
+@contextmanager
+def _load(cpus: int, seed: int | None) -> Iterator[None]:
+    """Load CPUs, all the time or, with a seed, in bursts."""
+    burners = [
+        multiprocessing.get_context("spawn").Process(
+            target=_burn, args=(None if seed is None else seed + number,), daemon=True
+        )
+        for number in range(cpus)
+    ]
+    for burner in burners:
+        burner.start()
+    try:
+        yield
+    finally:
+        for burner in burners:
+            burner.kill()
+
+
+def _burn(seed: int | None) -> None:
+    order = random.Random(seed)
+    while True:
+        until_s = time.monotonic() + order.uniform(*_BURST_S)
+        while time.monotonic() < until_s:
+            pass
+        if seed is not None:
+            time.sleep(order.uniform(*_PAUSE_S))
+
+
+def _grade_all(queue: Sequence[Job], at_once: int) -> list[tuple[Job, TrialResult]]:
     results = []
     with (
         tempfile.TemporaryDirectory(prefix="rosgrade-soak-") as name,
@@ -93,27 +156,40 @@ def _grade_all(jobs: list[Job], runs: int, at_once: int) -> list[tuple[Job, Tria
     ):
         futures = {
             pool.submit(_grade_once, job, Path(name) / f"{job.trial.id}-{number}"): job
-            for number in range(runs)
-            for job in jobs
+            for number, job in enumerate(queue)
         }
         try:
             for future in as_completed(futures):
                 job, result = futures[future], future.result()
                 results.append((job, result))
-                for difference in result.verdict.differences:
+                for difference in _differences(job, result):
                     print(f"{job.name}: {difference}", flush=True)
                 if len(results) % 50 == 0:
                     print(f"{len(results)} of {len(futures)} graded", file=sys.stderr, flush=True)
         except KeyboardInterrupt:
             # What is finished still counts.
             pool.shutdown(wait=False, cancel_futures=True)
-            for job in jobs:
-                job.grading.abort()
+            for job in queue:
+                job.grading.close()
     return results
 
 
 def _grade_once(job: Job, folder: Path) -> TrialResult:
     return run_trial(job.trial, job.loaded, job.grading, job.reference, folder)
+
+
+def _verdict(result: TrialResult) -> dict[str, Status]:
+    return {check.id: check.status for check in result.graded.grade.results}
+
+
+def _differences(job: Job, result: TrialResult) -> list[str]:
+    if job.alone is None:
+        return [str(difference) for difference in result.verdict.differences]
+    return [
+        f"{check}: {job.alone[check].value} alone, {status.value} now"
+        for check, status in _verdict(result).items()
+        if status is not job.alone[check]
+    ]
 
 
 def _summary(results: list[tuple[Job, TrialResult]], wall_s: float) -> int:
@@ -123,7 +199,7 @@ def _summary(results: list[tuple[Job, TrialResult]], wall_s: float) -> int:
     again: Counter[str] = Counter()
     for job, result in results:
         runs[job.name] += 1
-        changed[job.name] += not result.verdict.right
+        changed[job.name] += bool(_differences(job, result))
         errors[job.name] += not result.graded.grade.graded
         again[job.name] += any(count > 1 for count in result.graded.runs.values())
     print(f"{'submission':<40} {'runs':>5} {'changed':>8} {'errors':>7} {'run again':>10}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from grader.errors import RosgradeError, UsageError
@@ -30,7 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     given = parser.parse_args(arguments)
     try:
-        values = dict(_pair(text) for text in given.set)
+        values = read_values(given.set)
         # Reading the command line needs no ROS, so that --help works without.
         from sim.live import run
 
@@ -50,11 +51,19 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _pair(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise UsageError(f"--set {text}: write NAME=VALUE")
-    return name, value
+def read_values(texts: Iterable[str]) -> dict[str, str]:
+    """Values of the world from a command line.
+
+    Raises:
+        UsageError: One of them is not of the form ``NAME=VALUE``.
+    """
+    values = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise UsageError(f"--set {text}: write NAME=VALUE")
+        values[name] = value
+    return values
 
 
 if __name__ == "__main__":

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, core_schema
 
-from grader.assignment.quantity import Dimension, parse_quantity
+from grader.assignment.quantity import Dimension, parse_quantity, refusal, written_as_read
 from sim.motion import Pose
 
 MAX_COORDINATE_M = 10_000.0
@@ -69,9 +69,9 @@ class Metres:
             try:
                 number = metres(value)
             except ValueError as error:
-                raise _wrong(str(error)) from None
+                raise refusal(str(error)) from None
             if self.positive and number < MIN_SIZE_M:
-                raise _wrong(_too_small(value, number))
+                raise refusal(_too_small(value, number))
             return number
 
         return core_schema.no_info_plain_validator_function(read)
@@ -103,12 +103,7 @@ class Entries:
         self, source: type[Any], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Validate entry by entry; written as it is read."""
-        return core_schema.no_info_plain_validator_function(
-            self._read,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                self._write, when_used="json-unless-none"
-            ),
-        )
+        return written_as_read(self._read, self._write)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -128,11 +123,11 @@ class Entries:
 
     def _read(self, value: Any) -> Any:
         if not isinstance(value, list | tuple):
-            raise _wrong(f"expected {self._form}, not {value!r}")
+            raise refusal(f"expected {self._form}, not {value!r}")
         least = len(self.names) - self.optional
         if not least <= len(value) <= len(self.names):
             needed = f"{least} to {len(self.names)}" if self.optional else f"{least}"
-            raise _wrong(f"expected {self._form}: {needed} entries, not {len(value)}")
+            raise refusal(f"expected {self._form}: {needed} entries, not {len(value)}")
         numbers = [self._entry(name, item) for name, item in zip(self.names, value, strict=False)]
         return self.make(*numbers, *[0.0] * (len(self.names) - len(numbers)))
 
@@ -147,9 +142,9 @@ class Entries:
                 return _angle(item)
             number = metres(item)
         except ValueError as error:
-            raise _wrong(f"{name}: {error}") from None
+            raise refusal(f"{name}: {error}") from None
         if self.positive and number < MIN_SIZE_M:
-            raise _wrong(f"{name}: {_too_small(item, number)}")
+            raise refusal(f"{name}: {_too_small(item, number)}")
         return number
 
 
@@ -162,10 +157,6 @@ def _angle(item: Any) -> float:
     if isinstance(item, int | float) and not isinstance(item, bool) and item:
         raise ValueError(f"{item!r} has no unit: write '{item} deg' or '{item} rad'")
     return parse_quantity(item, Dimension.ANGLE)
-
-
-def _wrong(text: str) -> PydanticCustomError:
-    return PydanticCustomError("quantity", "{text}", {"text": text})
 
 
 def _tuple(*numbers: float) -> tuple[float, ...]:

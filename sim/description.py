@@ -22,12 +22,14 @@ from pydantic import AfterValidator, Field, model_validator
 
 from grader.assignment.name import topic_name
 from grader.assignment.quantity import (
+    AngularSpeed,
     Dimension,
     Duration,
     DurationOrZero,
     Frequency,
     QuantityOf,
     Ratio,
+    Speed,
 )
 from grader.assignment.source import Model, read_source
 from sim.coordinates import PoseInPlane, PositiveMetres
@@ -70,6 +72,19 @@ class OdometryOrigin(str, Enum):
     """Where the robot started (the DiffDrive system of Gazebo Sim)."""
 
 
+class Drive(Model):
+    """A velocity command that the robot gets without anybody publishing it.
+
+    For scenarios in which the student's node only listens to a robot that moves.
+    """
+
+    at: DurationOrZero = Field(description="Simulated time at which it acts.")
+    linear: Speed = Field(0.0, description="Speed ahead.", validate_default=False)
+    angular: AngularSpeed = Field(
+        0.0, description="Turn, counter-clockwise.", validate_default=False
+    )
+
+
 class RobotOptions(Model):
     """The robot and where it starts."""
 
@@ -92,6 +107,9 @@ class RobotOptions(Model):
         None,
         description="The robot stops when no command came for so long. If left out, the last "
         "command holds for ever, as in Gazebo.",
+    )
+    drives: tuple[Drive, ...] = Field(
+        (), description="Commands that it obeys besides those on its topic; the newest counts."
     )
 
 

@@ -121,6 +121,7 @@ class RosSimulator:
             callback_group=PolledGroup(),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
+        self._command_topic, self._command_type = topics.command.topic, topics.command.type
         self._most_commands = topics.command.depth
         self._pacer: Pacer | None = None
         self._pending: deque[tuple[int, Twist]] = deque()
@@ -179,6 +180,12 @@ class RosSimulator:
                 if self._node.context.ok():
                     raise
                 return  # the context was shut down within the step
+
+    @property
+    def unheard(self) -> tuple[str, ...]:
+        """Other types that somebody publishes on the topic of the commands."""
+        found = self._node.get_publishers_info_by_topic(self._command_topic)
+        return tuple(sorted({item.topic_type for item in found} - {self._command_type}))
 
     def destroy(self) -> None:
         """Take the publishers and the subscription out of the node."""

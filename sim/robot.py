@@ -72,11 +72,13 @@ class Robot:
         model: Its limits and measures.
         start: Where it starts, at rest, in the world's frame.
         command_timeout_ns: It stops when no command came for so long, or None.
+        drives: Commands that it gets by itself, with the simulated time of each, in order.
     """
 
     model: RobotModel
     start: Pose
     command_timeout_ns: int | None = None
+    drives: tuple[tuple[int, Twist], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +152,13 @@ def make_robot(options: RobotOptions, start: Pose) -> Robot:
     )
     model = replace(model, limits=limits, radius_m=options.radius or model.radius_m)
     timeout_s = options.command_timeout
-    return Robot(model, start, None if timeout_s is None else round(timeout_s * NS))
+    drives = ((round(one.at * NS), Twist(one.linear, one.angular)) for one in options.drives)
+    return Robot(
+        model,
+        start,
+        None if timeout_s is None else round(timeout_s * NS),
+        tuple(sorted(drives, key=lambda drive: drive[0])),
+    )
 
 
 def _approach(now: float, wanted: float, limit: float, change: float) -> float:

@@ -92,7 +92,7 @@ class Screen:
             text += f"  CONTACT with {step.contact}"
         if self._late_steps:
             text += f"  {self._late_steps} steps late"
-        return text
+        return "  ".join([text, *self._complaints()])
 
     def picture(self, console: Console) -> Text:
         """The live view."""
@@ -149,16 +149,26 @@ class Screen:
         publishers = simulator.command.get_publisher_count()
         odometry = simulator.odometry.publisher.get_subscription_count()
         scan = simulator.scan.publisher.get_subscription_count()
-        rejected = (f"{self.rejected} of them not finite",) if self.rejected else ()
         command = f"{topics.command.topic} ({publishers} publishers)"
         return [
-            ("from", command, f"{simulator.commands} commands", *rejected),
+            ("from", command, f"{simulator.commands} commands", *self._complaints()),
             (
                 "to",
                 f"{topics.odometry.topic} ({odometry} subscriptions)",
                 f"{topics.scan.topic} ({scan} subscriptions)",
             ),
         ]
+
+    def _complaints(self) -> list[str]:
+        """What is wrong with the commands."""
+        found = []
+        if self.rejected:
+            found.append(f"{self.rejected} commands not finite: the robot stops instead")
+        unheard = self.simulator.unheard if self.simulator is not None else ()
+        if unheard:
+            wanted = self._options.topics.command.type
+            found.append(f"{', '.join(unheard)} is not heard: the robot takes {wanted}")
+        return found
 
     def _range(self, direction_rad: float) -> str:
         if self._scan is None:

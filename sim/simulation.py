@@ -5,6 +5,7 @@ The same world, options, seed and commands give the same steps, bit by bit.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -109,6 +110,7 @@ class Simulation:
         self._contacts = ContactFinder(world, robot.model.radius_m)
         self._scans = _schedule(sensors.lidar)
         self._samples = _schedule(sensors.odometry)
+        self._drives = deque(robot.drives)
         self._index = 0
         self._state = State(robot.start)
         self._command = REST
@@ -147,6 +149,9 @@ class Simulation:
             The truth at the end of the step, with the sensors' data that are due.
         """
         events: list[Event] = []
+        if self._drives and self._drives[0][0] <= self.time_ns:
+            command = command or self._drives[0][1]
+            self._drives.popleft()
         if command is not None or self._command is not REST:
             self._obey(command, events)
         self._index += 1

@@ -39,7 +39,7 @@ from sim.script import MovingObstacle
 from sim.shapes import Shape, box, circle, polygon, wall
 from sim.world_model import WorldModel
 
-MAX_SEGMENTS = 5_000
+MAX_SEGMENTS = 3_000
 MAX_MOVING = 100
 
 Values = Mapping[str, int | float | str]

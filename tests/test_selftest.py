@@ -1,7 +1,8 @@
 """Every assignment of ours tells right from wrong: mutation score 100 %, with real nodes.
 
-The robot assignments have many scenarios for each of many mutants; here every eighth trial is
-graded, so that the tests stay short. `rosgrade selftest` grades them all.
+Some assignments have many scenarios for each of many mutants, and the examples of the
+documentation are many: of those every eighth or every fourth trial is graded here, so that the
+tests stay short. `rosgrade selftest` grades them all.
 """
 
 from __future__ import annotations
@@ -10,31 +11,39 @@ from pathlib import Path
 
 import pytest
 
-from grader import ros
+from grader import resources, ros
 from grader.assignment.load import list_assignments, load_assignment
 from grader.batch.grading import Grading
 from grader.batch.selftest import Role, mutation_score, selftest, trials
-from grader.run.admission import cpu_count
+from grader.run.load import cpu_count
 from grader.run.runner import Runner
 
 LEAST_MUTANTS = 12
 EVERY = 8
+EVERY_OF_EXAMPLE = 4
+MOST_RUNS = 95
+EXAMPLES = resources.root() / "docs" / "examples"
 
 
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize("name", list_assignments())
+@pytest.mark.parametrize("name", [*list_assignments(), *list_assignments(EXAMPLES)])
 def test_the_mutation_score_is_perfect(name: str, tmp_path: Path) -> None:
-    loaded = load_assignment(name)
-    grading = Grading(loaded, Runner(ros.find()), tmp_path / "cache")
+    is_example = name in list_assignments(EXAMPLES)
+    loaded = load_assignment(EXAMPLES / name if is_example else name)
     every = trials(loaded)
     assert sum(trial.role is Role.MUTANT for trial in every) >= LEAST_MUTANTS
-    robot = any(scenario.world for scenario in loaded.assignment.scenarios)
-    kept = {trial.id for trial in (every[::EVERY] if robot else every)}
-    results = list(
-        selftest(loaded, grading, jobs=2 * cpu_count(), chosen=lambda trial: trial.id in kept)
-    )
+    scenarios = loaded.assignment.scenarios
+    robot = any(scenario.world for scenario in scenarios)
+    many = robot or len(every) * len(scenarios) > MOST_RUNS
+    step = EVERY if many else EVERY_OF_EXAMPLE if is_example else 1
+    kept = {trial.id for trial in every[::step]}
+    with Runner(ros.find()) as runner:
+        grading = Grading(loaded, runner, tmp_path / "cache")
+        results = list(
+            selftest(loaded, grading, jobs=2 * cpu_count(), chosen=lambda trial: trial.id in kept)
+        )
     wrong = {
         result.trial.id: [str(difference) for difference in result.verdict.differences]
         for result in results

@@ -9,11 +9,12 @@ from hashlib import sha256
 from pathlib import Path
 
 from grader import resources
-from grader.assignment import rules, simulation
+from grader.assignment import rules, simulation, stimulation
 from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.draft import Draft
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.source import Source, read_source
+from grader.assignment.withheld import Withheld
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, Problem, UsageError
@@ -41,12 +42,14 @@ class LoadedAssignment:
         file: Its YAML file.
         sha256: Hash over the paths and contents of the files in its folder, as hex.
         checks: One per entry of ``checks``, in the author's order.
+        withheld: What was left out because a student does not get to see it yet.
     """
 
     assignment: Assignment
     file: Path
     sha256: str
     checks: tuple[BoundCheck, ...]
+    withheld: Withheld = Withheld()
 
     @property
     def folder(self) -> Path:
@@ -118,6 +121,7 @@ def load_assignment(
     found += [problem for problem in more if problem not in found]
     if assignment is not None and not found:
         found += simulation.problems(source, assignment)
+        found += stimulation.problems(source, assignment)
     if assignment is None or found:
         raise AssignmentError(file, sorted(found, key=lambda problem: problem.line or 0))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)

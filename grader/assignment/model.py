@@ -7,47 +7,45 @@ renders them.
 from __future__ import annotations
 
 from enum import Enum
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
+from grader.assignment.limits import LimitOptions
 from grader.assignment.name import (
-    ID,
-    INTERFACE,
-    NODE,
-    TOPIC,
-    check_id,
-    interface_name,
-    namespace,
-    node_name,
-    package_name,
-    topic_name,
+    Durability,
+    Id,
+    InterfaceName,
+    Namespace,
+    NodeName,
+    PackageName,
+    Reliability,
+    TopicName,
 )
 from grader.assignment.quantity import Duration, DurationOrZero, PositiveLength, parse_any
 from grader.assignment.source import Model
+from grader.assignment.stimulus import Stimulus
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
 
-
-def _form(pattern: str, words: str) -> WithJsonSchema:
-    """The rule for a name, for editors and for the documentation."""
-    return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$", "x-words": words})
-
-
-Id = Annotated[str, AfterValidator(check_id), _form(ID, "id, such as `period_2`")]
-PackageName = Annotated[str, AfterValidator(package_name), _form(ID, "package name")]
-NodeName = Annotated[str, AfterValidator(node_name), _form(NODE, "node name")]
-Namespace = Annotated[
-    str, AfterValidator(namespace), _form(rf"(/|{TOPIC})", "namespace, such as `/robot`")
+__all__ = [
+    "Assignment",
+    "CheckSpec",
+    "Durability",
+    "Id",
+    "InterfaceName",
+    "Launch",
+    "Namespace",
+    "NodeName",
+    "Package",
+    "PackageName",
+    "RandomRange",
+    "RecordedTopic",
+    "Reliability",
+    "Scenario",
+    "TopicName",
+    "Until",
+    "Visibility",
 ]
-TopicName = Annotated[str, AfterValidator(topic_name), _form(TOPIC, "topic, such as `/cmd_vel`")]
-InterfaceName = Annotated[
-    str,
-    AfterValidator(interface_name),
-    _form(INTERFACE, "interface, such as `geometry_msgs/msg/Twist`"),
-]
-
-Reliability = Literal["reliable", "best_effort"]
-Durability = Literal["volatile", "transient_local"]
 
 
 class RandomRange(Model):
@@ -109,9 +107,17 @@ class Package(Model):
 
 
 class Launch(Model):
-    """A process to start, as `ros2 run` would."""
+    """A process to start, as `ros2 run` would; or a launch file, as `ros2 launch` would.
 
-    executable: str = Field(description="Name of the executable (entry point).")
+    A launch file needs a sourced ROS 2: the wheels have no `ros2 launch`.
+    """
+
+    executable: str | None = Field(None, description="Name of the executable (entry point).")
+    file: str | None = Field(
+        None,
+        pattern=r"^[A-Za-z0-9_.-]+\.(py|xml|yaml|yml)$",
+        description="Name of a launch file that the package installs, in place of an executable.",
+    )
     package: PackageName | None = Field(
         None, description="Its package; may be left out where the assignment has only one."
     )
@@ -125,14 +131,39 @@ class Launch(Model):
     remap: dict[str, str] = Field(
         default_factory=dict, description="Remapping rules (`--ros-args -r from:=to`)."
     )
-    arguments: tuple[str, ...] = Field((), description="Arguments of the program itself.")
+    arguments: tuple[str, ...] = Field(
+        (), description="Arguments of the program itself; of a launch file `name:=value`."
+    )
+
+    @model_validator(mode="after")
+    def _one_thing(self) -> Launch:
+        if (self.executable is None) == (self.file is None):
+            raise ValueError("name either an 'executable' or a launch 'file'")
+        if self.file is not None:
+            given = {"name", "namespace", "parameters", "remap"} & self.model_fields_set
+            if given:
+                listed = ", ".join(sorted(given))
+                raise ValueError(
+                    f"a launch file says itself how its nodes start: leave out {listed}, and give "
+                    "its 'arguments'"
+                )
+        return self
+
+    @property
+    def program(self) -> str:
+        """The executable or the launch file."""
+        return self.executable or self.file or ""
 
 
 class RecordedTopic(Model):
     """A topic that the probe subscribes to, with the QoS that the probe requests."""
 
     topic: TopicName = Field(description="Fully qualified topic name.")
-    type: InterfaceName = Field(description="Interface, such as geometry_msgs/msg/Twist.")
+    type: InterfaceName = Field(
+        description="Interface, such as geometry_msgs/msg/Twist. Where the student writes the "
+        "package that it is of, our own copy of that package is in the folder `interfaces` beside "
+        "assignment.yaml."
+    )
     reliability: Reliability = Field(
         "reliable",
         description="Requested reliability. A publisher that does not match it is still "
@@ -140,17 +171,6 @@ class RecordedTopic(Model):
     )
     durability: Durability = Field("volatile", description="Requested durability.")
     depth: int = Field(100, ge=1, le=10_000, description="Queue depth of the probe.")
-
-
-class ListParameters(Model):
-    """Call the parameter service `list_parameters` of every node of the student.
-
-    It answers only while the node's executor spins, and so shows from outside whether a
-    callback blocks the executor.
-    """
-
-    call: Literal["list_parameters"] = Field(description="Always `list_parameters`.")
-    every: Duration = Field(description="Time between two calls to one node.")
 
 
 class Until(Model):
@@ -175,6 +195,11 @@ class Until(Model):
     travelled: PositiveLength | None = Field(
         None, description="The simulated robot has gone so far, along its path."
     )
+    stimuli: Literal["done"] | None = Field(
+        None,
+        description="`done`: every stimulus that has an end was played, and each answer that it "
+        "asks for is there or was waited for.",
+    )
     any: tuple[Until, ...] = Field((), description="One of these holds.")
 
 
@@ -185,7 +210,7 @@ class Scenario(Model):
     title: str = Field("", description="What happens in it, for the report.")
     launch: tuple[Launch, ...] = Field(min_length=1, description="Processes of the student.")
     record: tuple[RecordedTopic, ...] = Field((), description="Topics to record.")
-    stimuli: tuple[ListParameters, ...] = Field((), description="What the probe does meanwhile.")
+    stimuli: tuple[Stimulus, ...] = Field((), description="What the probe does meanwhile.")
     world: str | None = Field(
         None,
         description="World file, relative to the assignment's folder. With a world there is a "
@@ -216,6 +241,9 @@ class Scenario(Model):
         2.0,
         description="How long the node may take to end after SIGINT before it gets SIGTERM.",
         validate_default=False,
+    )
+    limits: LimitOptions | None = Field(
+        None, description="What the student may take; by default the assignment's."
     )
 
     @property
@@ -265,5 +293,11 @@ class Assignment(Model):
     id: Id = Field(description="Name of the assignment and of its folder.")
     title: str = Field(description="One line for people.")
     packages: tuple[Package, ...] = Field(min_length=1, description="What is handed in.")
+    limits: LimitOptions = Field(
+        default_factory=LimitOptions, description="What the student's processes may take."
+    )
     scenarios: tuple[Scenario, ...] = Field((), description="The runs.")
     checks: tuple[CheckSpec, ...] = Field(min_length=1, description="What is judged.")
+    points: float | None = Field(
+        None, ge=0, description="Sum of all points, where you want it to be checked."
+    )

@@ -15,6 +15,8 @@ from grader.errors import AssignmentError, Problem, UsageError
 from grader.nearest import did_you_mean
 
 MUTANTS_FILE = "mutants.yaml"
+REFERENCE_FOLDER = "reference"
+"""Beside assignment.yaml, where the assignment is not one of rosgrade's own."""
 
 _LEFT_OUT = {"__pycache__", "build", "install", "log"}
 
@@ -36,16 +38,24 @@ class Mutants:
     variants: tuple[Variant, ...]
 
 
-def reference_of(assignment: str) -> Path:
+def reference_of(assignment: str, folder: Path | None = None) -> Path:
     """The folder of an assignment's reference solution.
+
+    Args:
+        assignment: Its id.
+        folder: The assignment's own, which may hold a folder ``reference``.
 
     Raises:
         UsageError: It has none.
     """
-    folder = resources.reference() / assignment
-    if not folder.is_dir():
-        raise UsageError(f"the assignment {assignment!r} has no reference solution: {folder}")
-    return folder
+    beside = folder / REFERENCE_FOLDER if folder is not None else None
+    if beside is not None and beside.is_dir():
+        return beside
+    own = resources.reference() / assignment
+    if not own.is_dir():
+        places = f"{beside} or {own}" if beside else f"{own}"
+        raise UsageError(f"the assignment {assignment!r} has no reference solution: {places}")
+    return own
 
 
 def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = None) -> Mutants:
@@ -54,14 +64,15 @@ def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = 
     Args:
         assignment: Whose checks they name.
         folder: The assignment's folder.
-        reference: Folder of the reference solution, by default rosgrade's own.
+        reference: Folder of the reference solution, by default the one in the assignment's
+            folder or rosgrade's own.
 
     Raises:
         UsageError: There is no such file, or no reference.
         AssignmentError: With every mistake: an id twice, an unknown check, an edit that does
             not apply to the reference.
     """
-    reference = reference_of(assignment.id) if reference is None else reference
+    reference = reference_of(assignment.id, folder) if reference is None else reference
     source = read_source(folder / MUTANTS_FILE)
     content = source.read(MutantFile)
     files = _read(reference)

@@ -7,6 +7,9 @@ https://design.ros2.org/articles/topic_and_service_names.html
 from __future__ import annotations
 
 import re
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, WithJsonSchema
 
 ID = r"[a-z][a-z0-9_]*"
 TOPIC = r"(/[A-Za-z_][A-Za-z0-9_]*)+"
@@ -86,3 +89,25 @@ def interface_name(name: str) -> str:
         remedy = f" Did you mean '{short[1]}/msg/{short[2]}'?" if short else ""
         raise ValueError(f"{name!r} is not an interface name (package/msg/Type).{remedy}")
     return name
+
+
+def _form(pattern: str, words: str) -> WithJsonSchema:
+    """The rule for a name, for editors and for the documentation."""
+    return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$", "x-words": words})
+
+
+Id = Annotated[str, AfterValidator(check_id), _form(ID, "id, such as `period_2`")]
+PackageName = Annotated[str, AfterValidator(package_name), _form(ID, "package name")]
+NodeName = Annotated[str, AfterValidator(node_name), _form(NODE, "node name")]
+Namespace = Annotated[
+    str, AfterValidator(namespace), _form(rf"(/|{TOPIC})", "namespace, such as `/robot`")
+]
+TopicName = Annotated[str, AfterValidator(topic_name), _form(TOPIC, "topic, such as `/cmd_vel`")]
+InterfaceName = Annotated[
+    str,
+    AfterValidator(interface_name),
+    _form(INTERFACE, "interface, such as `geometry_msgs/msg/Twist`"),
+]
+
+Reliability = Literal["reliable", "best_effort"]
+Durability = Literal["volatile", "transient_local"]

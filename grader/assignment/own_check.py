@@ -45,6 +45,20 @@ def load_own_check(text: str, folder: Path) -> Check:
         ValueError: With a message for the author, when the text has another form, the file
             is missing or fails, or the function is missing or takes other arguments.
     """
+    return _check(text, load_function(text, folder))
+
+
+def load_function(text: str, folder: Path) -> Callable[..., Any]:
+    """Load a function of the author's, without looking at its arguments.
+
+    Args:
+        text: ``file.py:function``.
+        folder: The assignment's folder.
+
+    Raises:
+        ValueError: With a message for the author, when the text has another form, the file
+            is missing or fails, or the function is missing.
+    """
     match = _FORM.fullmatch(text)
     if not match:
         raise ValueError(
@@ -64,7 +78,7 @@ def load_own_check(text: str, folder: Path) -> Check:
         raise ValueError(f"{file.name} has no {name!r}." + (did_you_mean(name, own) or listed))
     if not inspect.isfunction(function):
         raise ValueError(f"{name!r} in {file.name} is not a function")
-    return _check(text, function)
+    return function
 
 
 def _module(file: Path) -> ModuleType:

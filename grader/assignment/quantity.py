@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any
@@ -174,6 +175,26 @@ def format_duration(seconds: float) -> str:
     return f"{seconds * 1e9:.3g} ns" if size else "0 s"
 
 
+def refusal(text: str) -> PydanticCustomError:
+    """What a validator raises, with a text for the author of the YAML."""
+    return PydanticCustomError("quantity", "{text}", {"text": text})
+
+
+def written_as_read(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> CoreSchema:
+    """A schema for a value with a form of its own in YAML.
+
+    Args:
+        read: Makes the value from what the YAML has; raises a :func:`refusal`.
+        write: Makes of the value what ``read`` reads again.
+    """
+    return core_schema.no_info_plain_validator_function(
+        read,
+        serialization=core_schema.plain_serializer_function_ser_schema(
+            write, when_used="json-unless-none"
+        ),
+    )
+
+
 @dataclass(frozen=True)
 class QuantityOf:
     """Pydantic annotation: a quantity of one dimension, held as a float in SI units."""
@@ -191,25 +212,15 @@ class QuantityOf:
             try:
                 number = parse_quantity(value, self.dimension)
             except ValueError as error:
-                raise PydanticCustomError("quantity", "{text}", {"text": str(error)}) from None
+                raise refusal(str(error)) from None
             if self.minimum is not None and (
                 number < self.minimum or (self.exclusive and number == self.minimum)
             ):
                 word = "more than" if self.exclusive else "at least"
-                raise PydanticCustomError(
-                    "quantity",
-                    "{value} is too small: it must be {word} {minimum}",
-                    {"value": repr(value), "word": word, "minimum": f"{self.minimum:g}"},
-                )
+                raise refusal(f"{value!r} is too small: it must be {word} {self.minimum:g}")
             return number
 
-        # Written as it is read: with its unit.
-        return core_schema.no_info_plain_validator_function(
-            read,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda value: write_quantity(value, self.dimension), when_used="json-unless-none"
-            ),
-        )
+        return written_as_read(read, lambda value: write_quantity(value, self.dimension))
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

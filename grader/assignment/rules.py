@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from grader.assignment.asking_rules import asking_problems
 from grader.assignment.binding import BoundCheck
 from grader.assignment.document import Place
 from grader.assignment.draft import Draft
 from grader.assignment.model import Launch, Package, Scenario
 from grader.assignment.quantity import format_duration
+from grader.assignment.stimulus import Join, Publish
+from grader.assignment.withheld import SHOWN_FROM
 from grader.checks.check import Subject
 from grader.errors import Problem
 from grader.nearest import did_you_mean
 
-_MESSAGE_FAMILIES = ("messages", "timing")
+_MESSAGE_FAMILIES = ("messages", "timing", "parameter")
 """Families that judge received messages: what is not recorded looks like silence to them."""
 
 
@@ -82,7 +85,9 @@ def _launch(draft: Draft, place: Place, launch: Launch) -> Iterator[Problem]:
     package = _package(draft, launch.package or names[0])
     if launch.package is not None and launch.package not in names:
         yield draft.source.problem((*place, "package"), _no_package(launch.package, names))
-    elif package is not None and launch.executable not in package.executables:
+    elif package is None or launch.executable is None:
+        return
+    elif launch.executable not in package.executables:
         yield draft.source.problem(
             (*place, "executable"), _no_executable(launch.executable, package)
         )
@@ -115,6 +120,23 @@ def _requirements(draft: Draft) -> Iterator[Problem]:
                 listed = f" The checks are: {', '.join(known)}."
                 advice = did_you_mean(required, known) or listed
                 yield draft.source.problem(place, f"there is no check {required!r}.{advice}")
+    yield from _shown_too_late(draft)
+
+
+def _shown_too_late(draft: Draft) -> Iterator[Problem]:
+    """What a check waits for is shown no later than the check, or a skip could not be told."""
+    shown = {spec.id: spec.visibility for spec in draft.checks if spec is not None}
+    for index, spec in enumerate(draft.checks):
+        for number, required in enumerate(spec.requires if spec else ()):
+            if spec is None or required not in shown:
+                continue
+            mine, other = spec.visibility, shown[required]
+            if SHOWN_FROM.index(other) > SHOWN_FROM.index(mine):
+                text = (
+                    f"{required!r} is {other.value!r}, so {spec.id!r} cannot be {mine.value!r}: "
+                    "a student would lose its points for a reason that is not shown"
+                )
+                yield draft.source.problem(("checks", index, "requires", number), text)
 
 
 def _circles(draft: Draft) -> Iterator[Problem]:
@@ -149,6 +171,15 @@ def _circle(waiting: dict[str, set[str]]) -> list[str]:
 def _points(draft: Draft) -> Iterator[Problem]:
     if draft.checks and all(spec is not None and spec.points == 0.0 for spec in draft.checks):
         yield draft.source.problem(("checks",), "the points of all checks add up to 0")
+    stated = draft.source.data.get("points")
+    if isinstance(stated, bool) or not isinstance(stated, int | float):
+        return
+    if all(spec is not None for spec in draft.checks):
+        # The small amount is float noise of the sum.
+        found = sum(spec.points for spec in draft.checks if spec is not None)
+        if abs(found - stated) > 1e-9:
+            text = f"the points of all checks add up to {found:g}, not to {stated:g}"
+            yield draft.source.problem(("points",), text)
 
 
 def _check(draft: Draft, index: int, bound: BoundCheck) -> Iterator[Problem]:
@@ -170,6 +201,8 @@ def _check(draft: Draft, index: int, bound: BoundCheck) -> Iterator[Problem]:
                 listed = f" The scenarios are: {', '.join(known)}."
                 yield problem((*place, "scenarios", number), text + (advice or listed))
         yield from _topic(draft, place, bound)
+        yield from _stimulus(draft, place, bound)
+    yield from asking_problems(draft, place, bound)
     yield from _package_of(draft, place, bound)
 
 
@@ -193,6 +226,24 @@ def _topic(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
         elif interface is not None and interface != recorded[topic]:
             text = f"the scenario {scenario.id!r} records {topic!r} as {recorded[topic]!r}"
             yield draft.source.problem((*place, "with", "type"), text)
+
+
+def _stimulus(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
+    """A check of what a stimulus does needs it in each of its scenarios."""
+    for key, kind, does in (("stimulus", Publish, "publish on"), ("joiner", Join, "have a join")):
+        wanted = getattr(bound.parameters, key, None)
+        if not isinstance(wanted, str):
+            continue
+        for scenario in draft.scenarios_of(bound.spec) or ():
+            names = [
+                one.publish if isinstance(one, Publish) else one.name
+                for one in scenario.stimuli
+                if isinstance(one, Publish | Join) and isinstance(one, kind)
+            ]
+            if wanted not in names:
+                advice = did_you_mean(wanted, names) or f" There are: {', '.join(names) or 'none'}."
+                text = f"the stimuli of the scenario {scenario.id!r} do not {does} {wanted!r}."
+                yield draft.source.problem((*place, "with", key), text + advice)
 
 
 def _package_of(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Scenario
+from grader.assignment.model import Scenario, Visibility
+from grader.assignment.withheld import Withheld
 from grader.checks.check import Subject
 from grader.errors import UsageError
 from grader.nearest import did_you_mean
@@ -59,6 +61,33 @@ def select(
         }
     )
     return dataclasses.replace(loaded, assignment=assignment, checks=tuple(kept))
+
+
+def visible_part(loaded: LoadedAssignment) -> LoadedAssignment:
+    """What a student may see before grading: the visible checks, and the scenarios that they need.
+
+    Nothing of the other checks is left but their number and points, so whatever is made from
+    the part (recordings, grade, reports) cannot tell more.
+
+    Args:
+        loaded: The whole assignment; no visible check requires one that is not.
+
+    Raises:
+        UsageError: No check is visible.
+    """
+    specs = [bound.spec for bound in loaded.checks]
+    visible = [spec for spec in specs if spec.visibility is Visibility.VISIBLE]
+    hidden = [spec for spec in specs if spec.visibility is not Visibility.VISIBLE]
+    if not hidden:
+        return loaded
+    if not visible:
+        raise UsageError(
+            f"assignment {loaded.assignment.id!r} has no visible check: everything is judged at "
+            "grading, with --hidden"
+        )
+    withheld = Withheld(len(hidden), math.fsum(spec.points for spec in hidden))
+    part = select(loaded, tuple(spec.id for spec in visible))
+    return dataclasses.replace(part, withheld=loaded.withheld + withheld)
 
 
 def _closure(loaded: LoadedAssignment, checks: tuple[str, ...]) -> set[str]:

@@ -3,20 +3,41 @@
 from __future__ import annotations
 
 import os
+import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 from grader import __version__
-from grader.batch.grading import Graded
+from grader.batch.grading import RECORDINGS_FOLDER, Graded
+from grader.errors import UsageError
 from grader.report.facts import Clock, RunFacts
 from grader.report.files import write_whole
+from grader.report.foxglove import LAYOUT_FILE, render_layout
 from grader.report.html import render_report
 from grader.report.result import write_result
+from grader.report.result_model import Result
 
 REPORT_FILE = "report.html"
 RESULT_FILE = "result.json"
+INSTALL_FOLDER = "install"
 
 
-def write_graded(graded: Graded, folder: Path, clock: Clock, json_file: Path | None = None) -> Path:
+@dataclass(frozen=True)
+class Written:
+    """What was written of a grade.
+
+    Attributes:
+        report: The HTML report.
+        result: What ``result.json`` says.
+    """
+
+    report: Path
+    result: Result
+
+
+def write_graded(
+    graded: Graded, folder: Path, clock: Clock, json_file: Path | None = None
+) -> Written:
     """Write report and result of a submission.
 
     Args:
@@ -24,9 +45,6 @@ def write_graded(graded: Graded, folder: Path, clock: Clock, json_file: Path | N
         folder: For ``report.html`` and ``result.json``.
         clock: Started when grading began.
         json_file: One more place for the result, or None.
-
-    Returns:
-        The report.
     """
     first = next(iter(graded.recordings.values()), None)
     facts = RunFacts(
@@ -36,9 +54,54 @@ def write_graded(graded: Graded, folder: Path, clock: Clock, json_file: Path | N
         rosgrade_version=__version__,
         recordings={name: os.path.relpath(file, folder) for name, file in graded.files.items()},
     )
-    for target in (folder / RESULT_FILE, json_file):
-        if target is not None:
-            write_result(graded.grade, graded.recordings, facts, target)
+    result = write_result(graded.grade, graded.recordings, facts, folder / RESULT_FILE)
+    if json_file is not None:
+        write_result(graded.grade, graded.recordings, facts, json_file)
+    return Written(write_report(graded, folder, facts), result)
+
+
+def write_report(graded: Graded, folder: Path, facts: RunFacts) -> Path:
+    """Write ``report.html``, and a Foxglove layout beside the recordings.
+
+    Args:
+        graded: What was graded.
+        folder: Of the report.
+        facts: How the grade came about.
+
+    Returns:
+        The report.
+    """
+    if graded.recordings and (folder / RECORDINGS_FOLDER).is_dir():
+        layout = render_layout(graded.recordings.values())
+        write_whole(folder / RECORDINGS_FOLDER / LAYOUT_FILE, layout)
     report = folder / REPORT_FILE
-    write_whole(report, render_report(graded.grade, graded.recordings, facts))
+    write_whole(report, render_report(graded.grade, graded.recordings, facts, graded.references))
     return report
+
+
+def keep_install(graded: Graded, folder: Path) -> Path | None:
+    """Copy what colcon installed, so that it can be looked at and sourced.
+
+    Args:
+        graded: What was graded.
+        folder: Of the report.
+
+    Returns:
+        The copy, or None where nothing was built.
+
+    Raises:
+        UsageError: It cannot be written there.
+    """
+    install = graded.prepared.install
+    if install is None:
+        return None
+    target = folder / INSTALL_FOLDER
+    try:
+        shutil.rmtree(target, ignore_errors=True)
+        shutil.copytree(install, target, symlinks=True, copy_function=shutil.copyfile)
+        for file in (target, *target.rglob("*")):
+            if not file.is_symlink():
+                file.chmod((install / file.relative_to(target)).stat().st_mode | 0o200)
+    except OSError as error:
+        raise UsageError(f"{target} cannot be written: {error.strerror or error}") from error
+    return target

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
+from grader.batch.reference_run import read_references
+from grader.batch.type_support import TypeSupport
 from grader.errors import GraderFault
 from grader.grade import Grade, grade
 from grader.recording.fact import to_json
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
 from grader.report.files import write_whole
+from grader.report.replay import Replay
+from grader.run.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.submission.prepare import Prepared, prepare
 
@@ -34,6 +39,7 @@ class Graded:
         files: Recording files by scenario.
         runs: How often each scenario was run.
         faults: Why a scenario has no recording, by scenario; ours or the machine's.
+        references: Replays of the reference solution by scenario, for the report.
     """
 
     grade: Grade
@@ -42,6 +48,7 @@ class Graded:
     files: Mapping[str, Path]
     runs: Mapping[str, int]
     faults: Mapping[str, str]
+    references: Mapping[str, Replay] = field(default_factory=dict)
 
 
 class Grading:
@@ -67,10 +74,17 @@ class Grading:
         self._runner = runner
         self._cache = cache
         self._seed = seed
+        self._type_support = TypeSupport(loaded, runner.ros, cache)
         self._scenarios = loaded.assignment.scenarios
+        self._builds = threading.BoundedSemaphore(cpu_count())
+        self._stop = threading.Event()
 
     def grade(
-        self, path: Path, folder: Path, on_build: Callable[[str], None] = lambda _: None
+        self,
+        path: Path,
+        folder: Path,
+        on_build: Callable[[str], None] = lambda _: None,
+        name: str | None = None,
     ) -> Graded:
         """Grade one submission.
 
@@ -78,17 +92,31 @@ class Grading:
             path: What was handed in.
             folder: Where the recordings go, ``<scenario>.mcap``.
             on_build: Told the progress of the build.
+            name: What to call the submission; by default after its folder or archive.
 
         Raises:
             UsageError: There is nothing at ``path``.
             GraderFault: The build could not be tried.
         """
-        prepared = prepare(path, self._runner.ros, cache=self._cache, on_progress=on_build)
+        self._type_support.prefixes(on_build)
+        # Each of them takes a CPU or more; beyond that they would only hold up each other.
+        with self._builds:
+            prepared = prepare(
+                path,
+                self._runner.ros,
+                cache=self._cache,
+                on_progress=on_build,
+                sandbox=self._runner.sandbox,
+                stop=self._stop,
+            )
+        if name is not None:
+            prepared = replace(prepared, record=replace(prepared.record, id=name))
         return self.grade_prepared(prepared, folder)
 
-    def abort(self) -> None:
-        """End every cell that runs; what is being graded ends as interrupted."""
-        self._runner.abort()
+    def close(self) -> None:
+        """End every build and cell that runs; what is being graded ends as interrupted."""
+        self._stop.set()
+        self._runner.close()
 
     def grade_prepared(self, prepared: Prepared, folder: Path) -> Graded:
         """Run and judge a submission that is built already.
@@ -117,7 +145,9 @@ class Grading:
             if not again:
                 break
         files = {name: folder / f"{name}.mcap" for name in recordings}
-        return Graded(result, prepared, recordings, files, runs, faults)
+        return Graded(
+            result, prepared, recordings, files, runs, faults, read_references(self._loaded)
+        )
 
     def _run_all(
         self,
@@ -143,7 +173,7 @@ class Grading:
                     except GraderFault as fault:
                         faults[name] = str(fault)
             except BaseException:
-                self._runner.abort()
+                self._runner.close()
                 raise
 
     def _run(self, name: str, prepared: Prepared, folder: Path, alone: bool) -> Recording:
@@ -159,6 +189,8 @@ class Grading:
             file,
             seed=scenario_seed(assignment.id, name, prepared.record.sha256, self._seed),
             worlds=self._loaded.folder,
+            underlays=prepared.underlays,
+            type_support=self._type_support.prefixes(),
             alone=alone,
         )
         return read_recording(file)

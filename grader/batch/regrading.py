@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
+from grader.assignment.selection import visible_part
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
+from grader.batch.reference_run import read_references
 from grader.errors import UsageError
 from grader.grade import Grade, grade
 from grader.recording.mcap_reader import read_recording
@@ -86,7 +88,12 @@ def find(path: Path) -> Found:
 
 
 def regrade(loaded: LoadedAssignment, found: Found) -> Graded:
-    """Judge what was recorded with an assignment as it is now."""
+    """Judge what was recorded with an assignment as it is now.
+
+    A result that was made for a student is judged again as far as the student may see it.
+    """
+    if found.result is not None and found.result.withheld.checks:
+        loaded = visible_part(loaded)
     return Graded(
         grade=grade(loaded, found.submission, found.recordings),
         prepared=Prepared(record=found.submission, install=None),
@@ -94,6 +101,7 @@ def regrade(loaded: LoadedAssignment, found: Found) -> Graded:
         files=found.files,
         runs={},
         faults={},
+        references=read_references(loaded),
     )
 
 

@@ -161,7 +161,7 @@ def selftest(
             except BaseException:
                 for future in futures:
                     future.cancel()
-                grading.abort()
+                grading.close()
                 raise
 
 

@@ -1,4 +1,4 @@
-"""Velocity commands as the student published them."""
+"""Velocity commands as the student published them, and what the robot told."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from grader.recording.model import Recording
+from grader.recording.model import Message, Recording
 from sim.motion import Twist
 
-TOPIC = "/cmd_vel"
-ODOMETRY = "/odom"
-SCAN = "/scan"
+_TOPIC = "/cmd_vel"
 
 
 @dataclass(frozen=True)
@@ -30,10 +28,25 @@ class Command:
     stray: tuple[str, ...] = ()
 
 
+def command_topic(recording: Recording) -> str:
+    """Name of the topic that the robot obeys."""
+    return _TOPIC if recording.scene is None else recording.scene.command_topic
+
+
+def odometry(recording: Recording) -> tuple[Message, ...]:
+    """What the robot told of its odometry, oldest first."""
+    return () if recording.scene is None else recording.on(recording.scene.odometry_topic)
+
+
+def scans(recording: Recording) -> tuple[Message, ...]:
+    """What the robot told of its scans, oldest first."""
+    return () if recording.scene is None else recording.on(recording.scene.scan_topic)
+
+
 def commands(recording: Recording) -> tuple[Command, ...]:
     """Every readable command, oldest first; a TwistStamped counts like a Twist."""
     found = []
-    for message in recording.on(TOPIC):
+    for message in recording.on(command_topic(recording)):
         value = message.value.get("twist", message.value)
         linear, angular = number(value, "linear", "x"), number(value, "angular", "z")
         if linear is not None and angular is not None:

@@ -5,7 +5,10 @@ https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Quality-of-Service-Set
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from grader.assignment.quantity import format_duration
+from grader.checks.finding import Table
 from grader.recording.model import Qos
 
 # Weaker first: an offer must not be weaker than the request.
@@ -14,6 +17,55 @@ STRENGTH = {
     "durability": ("volatile", "transient_local"),
     "liveliness": ("automatic", "manual_by_topic"),
 }
+_DURATIONS = {"deadline": "deadline_s", "liveliness lease": "liveliness_lease_s"}
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One policy of a publisher and a subscription.
+
+    Attributes:
+        policy: Its name.
+        offered: By the publisher, in words.
+        requested: By the subscription, in words.
+        compatible: Whether this policy lets them match; None where it is not known.
+        rule: What must hold.
+    """
+
+    policy: str
+    offered: str
+    requested: str
+    compatible: bool | None
+    rule: str
+
+
+def comparisons(offered: Qos, requested: Qos) -> tuple[Comparison, ...]:
+    """Compare every policy that decides whether two endpoints match."""
+    found = []
+    for policy, words in STRENGTH.items():
+        offer, request = getattr(offered, policy), getattr(requested, policy)
+        known = offer in words and request in words
+        found.append(
+            Comparison(
+                policy,
+                offer,
+                request,
+                words.index(offer) >= words.index(request) if known else None,
+                f"who requests {words[1]} needs an offer of {words[1]}",
+            )
+        )
+    for policy, attribute in _DURATIONS.items():
+        offer_s, request_s = getattr(offered, attribute), getattr(requested, attribute)
+        found.append(
+            Comparison(
+                policy,
+                duration_words(offer_s),
+                duration_words(request_s),
+                request_s is None or (offer_s is not None and offer_s <= request_s),
+                "the offer must not be longer than the request",
+            )
+        )
+    return tuple(found)
 
 
 def refusals(offered: Qos, requested: Qos) -> tuple[str, ...]:
@@ -21,20 +73,24 @@ def refusals(offered: Qos, requested: Qos) -> tuple[str, ...]:
 
     A policy that is unknown on either side refuses nothing.
     """
-    found = []
-    for policy, words in STRENGTH.items():
-        offer, request = getattr(offered, policy), getattr(requested, policy)
-        if offer in words and request in words and words.index(offer) < words.index(request):
-            found.append(f"{policy} {offer} offered, {request} requested")
-    for policy, offer_s, request_s in (
-        ("deadline", offered.deadline_s, requested.deadline_s),
-        ("liveliness lease", offered.liveliness_lease_s, requested.liveliness_lease_s),
-    ):
-        if request_s is not None and (offer_s is None or offer_s > request_s):
-            found.append(
-                f"{policy} {duration_words(offer_s)} offered, {duration_words(request_s)} requested"
-            )
-    return tuple(found)
+    return tuple(
+        f"{item.policy} {item.offered} offered, {item.requested} requested"
+        for item in comparisons(offered, requested)
+        if item.compatible is False
+    )
+
+
+def compatibility_table(offered: Qos, requested: Qos) -> Table:
+    """The rule "requested against offered", policy by policy."""
+    words = {True: "yes", False: "no", None: "unknown"}
+    return Table(
+        "Requested against offered",
+        ("policy", "offered", "requested", "compatible", "rule"),
+        tuple(
+            (item.policy, item.offered, item.requested, words[item.compatible], item.rule)
+            for item in comparisons(offered, requested)
+        ),
+    )
 
 
 def duration_words(seconds: float | None) -> str:

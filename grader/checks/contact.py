@@ -73,10 +73,17 @@ def why_touched(recording: Recording) -> Cause | None:
         way = "backwards " if before.linear_m_s < 0.0 else ""
         motion = f"{way}at {speed(abs(before.linear_m_s))}"
     return Cause(
-        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch",
+        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {_told(before)}",
         _HINT,
         Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
     )
+
+
+def _told(step: Truth) -> str:
+    """What the robot was told to do then."""
+    if step.command_m_s or step.command_rad_s:
+        return f"with linear.x = {speed(step.command_m_s)} as the last command"
+    return "although it had been told to stop: too late"
 
 
 def _touch(recording: Recording) -> int | None:

@@ -33,6 +33,12 @@ _SIGNAL_HINTS = {
     signal.SIGTERM: "Look for os.kill, os.killpg or subprocess calls that end their own group.",
 }
 
+_BREACH_HINTS = {
+    "memory": "Look for a list, a queue or an image that grows without end.",
+    "sessions": "Look for a loop that starts processes with start_new_session=True or setsid.",
+    "output": "Look for a print() or a log call in a loop that nothing slows down.",
+}
+
 _HINTS = {
     "ModuleNotFoundError": "Python does not find this module: check its spelling, that it lies in "
     "the package's folder, that setup.py installs it (packages=[...]), and that package.xml "
@@ -56,10 +62,22 @@ _HINTS = {
 
 
 def ended_early(recording: Recording, process: Process) -> bool:
-    """Whether a process ended by itself before the end of the observation."""
-    if process.stopped_by != "itself" or process.exited_ns is None:
+    """Whether a process ended by itself before the end of the observation.
+
+    One that was already on its way out when SIGINT came did, too: how long that takes is a
+    matter of the machine.
+    """
+    if process.exited_ns is None:
         return False
+    if process.stopped_by != "itself":
+        return process.exited_ns >= recording.stop_ns and _was_leaving(recording, process)
     return recording.ending is Ending.EXITED or process.exited_ns < recording.stop_ns
+
+
+def _was_leaving(recording: Recording, process: Process) -> bool:
+    """Whether it said that it ends before it was asked to."""
+    exiting_ns = testimony.exiting_ns(recording, process.name)
+    return exiting_ns is not None and exiting_ns < recording.stop_ns
 
 
 def dead(recording: Recording) -> tuple[Process, ...]:
@@ -97,14 +115,19 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
         recording: Where it ran.
         process: One that :func:`ended_early`.
     """
-    when_s = recording.since_launch_s(process.exited_ns or recording.stop_ns)
+    left = process.stopped_by != "itself"
+    exited_ns = testimony.exiting_ns(recording, process.name) if left else process.exited_ns
+    when_s = recording.since_launch_s(exited_ns or recording.stop_ns)
     ended = f"the process {code(process.name)} ended {when_s:.2f} s after launch"
     evidence = Evidence(
         moments=(Moment(f"{process.name} ended", when_s),), log=_last_lines(recording, process)
     )
-    if process.exit_code == 0:
+    if process.exit_code == 0 or (left and fatal_failure(recording, process.name) is None):
         return _returned(recording, process, ended, evidence)
     killed = process.exit_code is not None and signal_of(process.exit_code)
+    breach = next((item for item in recording.breaches if item.ended), None)
+    if killed is signal.SIGKILL and breach is not None:
+        return Cause(f"{ended}: {breach}", _BREACH_HINTS[breach.what], evidence)
     failure = None if killed else fatal_failure(recording, process.name)
     if failure is None:
         hint = _SIGNAL_HINTS.get(killed, "") if killed else ""
@@ -122,6 +145,14 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
 
 
 def _returned(recording: Recording, process: Process, ended: str, evidence: Evidence) -> Cause:
+    if testimony.broke_off(recording, process.name):
+        return Cause(
+            f"{ended} with exit code 0, but main() did not return: Python was broken off, as "
+            "os._exit() does",
+            "Look for os._exit() or os.exec...(): they end the program wherever it is. A node "
+            "runs until rclpy.spin(node) returns, at Ctrl-C.",
+            evidence,
+        )
     if testimony.traced(recording, process.name) and not testimony.said(
         recording, "node", process.name
     ):
@@ -139,7 +170,7 @@ def _returned(recording: Recording, process: Process, ended: str, evidence: Evid
             evidence,
         )
     return Cause(
-        f"{ended} with exit code 0: main() returned",
+        f"{ended} with exit code 0: main() returned, or something called sys.exit()",
         "rclpy.spin(node) keeps a node alive until Ctrl-C. Look for what ends it: spin_once() "
         "handles one round only, rclpy.shutdown() and sys.exit() end everything.",
         evidence,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from grader.checks import compatibility
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
-from grader.checks.finding import Evidence, Table
+from grader.checks.finding import Evidence
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.type_confusion import explain
 from grader.checks.wording import code, codes
@@ -33,7 +33,7 @@ def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
     )
     if cause is not None:
         return cause
-    if recording.on(topic):
+    if recording.carried(topic):
         return _gone(recording, topic, subscriptions)
     ended = dead(recording)
     if ended:
@@ -43,6 +43,44 @@ def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
         ours=True,
         disturbed=True,
     )
+
+
+def why_no_history(recording: Recording, topic: str, seen: str) -> Cause | None:
+    """Why the student does not get what the probe published before the launch.
+
+    Args:
+        recording: A run in which the probe's publisher keeps messages for late joiners.
+        topic: Fully qualified topic name.
+        seen: What is missing, in words.
+
+    Returns:
+        The policy that stands against it, or None if there is none.
+    """
+    for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic):
+        for policy, needed in (("durability", "transient_local"), ("reliability", "reliable")):
+            found = getattr(item.qos, policy)
+            if found in (needed, "unknown"):
+                continue
+            offered = [
+                one.qos
+                for one in recording.endpoints
+                if one.owner is Owner.PROBE and one.kind is Kind.PUBLISHER and one.topic == topic
+            ]
+            return Cause(
+                f"{seen}: the messages were published before the subscription was there, and it "
+                f"requests {policy} {found}. It matches the publisher, but gets only what is "
+                "published from then on",
+                "A late joiner gets what a transient_local publisher has kept only if it asks for "
+                "it: give create_subscription a QoSProfile with "
+                "durability=DurabilityPolicy.TRANSIENT_LOCAL and "
+                "reliability=ReliabilityPolicy.RELIABLE.",
+                Evidence(
+                    tables=tuple(
+                        compatibility.compatibility_table(qos, item.qos) for qos in offered[:1]
+                    )
+                ),
+            )
+    return None
 
 
 def _other_type(
@@ -73,20 +111,25 @@ def _refused(
     ]
     if not reasons or not all(reasons):
         return None
-    rows = tuple((reason.partition(" ")[0], reason.partition(" ")[2]) for reason in reasons[0])
     return Cause(
         f"its callback is never called: the subscription's QoS does not match the publisher on "
         f"{code(topic)} ({', '.join(reasons[0])})",
         "A subscription receives nothing from a publisher that offers less than it requests. A "
         "number as QoS, such as 10, matches every publisher that is reliable; "
         "qos_profile_sensor_data matches every one.",
-        Evidence(tables=(Table("Requested against offered", ("policy", "why"), rows),)),
+        Evidence(
+            tables=(
+                compatibility.compatibility_table(
+                    offered=publishers[0].qos, requested=subscriptions[0].qos
+                ),
+            )
+        ),
     )
 
 
 def _gone(recording: Recording, topic: str, subscriptions: tuple[Endpoint, ...]) -> Cause | None:
     """Every subscription vanished before the first message was sent."""
-    first_ns = recording.on(topic)[0].stamp_ns
+    first_ns = recording.carried(topic)[0].stamp_ns
     ends = [item.vanished_ns for item in subscriptions]
     if any(end is None or end > first_ns for end in ends):
         return None

@@ -26,6 +26,7 @@ from grader.checks.scan import misreading
 from grader.checks.track import (
     departure,
     final_rest,
+    gone_ahead_m,
     speed_plot,
     way_m,
 )
@@ -38,6 +39,7 @@ _LEAST_STEPS = 30
 _SPEEDING_UP_NS = NS // 2
 _WAY_TOLERANCE_M = 2e-3
 _SPEED_HINT = "linear.x is the speed in metres per second."
+_BACKWARDS_HINT = "Forward is a positive linear.x (REP-103)."
 
 
 class Drives(Parameters):
@@ -147,7 +149,7 @@ def _wrong_speed(
             "Which message made it stop? Log what the callback compares.",
         )
     if middle * wanted < 0.0:
-        return "the robot drives backwards", "Forward is a positive linear.x (REP-103)."
+        return "the robot drives backwards", _BACKWARDS_HINT
     limit = scene.max_linear_m_s
     if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
         return (
@@ -170,35 +172,47 @@ def _wrong_speed(
 class KeepsDriving(Parameters):
     """Parameters of motion.keeps_driving."""
 
-    distance: PositiveLength = Field(description="How far it must go at least, along its path.")
+    distance: PositiveLength = Field(
+        description="How far it must go ahead at least, along its path."
+    )
 
 
 @check("motion.keeps_driving", Subject.RECORDING, KeepsDriving)
 def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
     """The robot drives on where nothing is ahead.
 
-    Judged by the way along its true path.
+    Judged by the way ahead along its true path; what it drives backwards is taken off.
 
     Explains an obstacle beside the path that counted as one ahead (`min(ranges)`), a beam
-    without return (0.0 or inf) that counted as one, contact, a robot that is too slow or never
-    moved, and a process that ended.
+    without return (0.0 or inf) that counted as one, contact, a robot that drives backwards, is
+    too slow or never moved, and a process that ended.
     """
     wanted_m = parameters.distance
-    expected = f"drives {metres(wanted_m)} without stopping, for nothing is near ahead"
+    expected = f"drives {metres(wanted_m)} ahead without stopping, for nothing is near ahead"
     cause = why_not_moved(recording)
     if cause is not None:
         return cause.finding(expected)
     truth = recording.truth
-    gone_m = way_m(truth)
+    gone_m = gone_ahead_m(truth)
     if gone_m >= wanted_m - _WAY_TOLERANCE_M:
         evidence = Evidence(plots=(speed_plot(recording),))
-        return Finding.passed(expected, f"went {metres(gone_m)}", evidence)
+        return Finding.passed(expected, f"went {metres(gone_m)} ahead", evidence)
     cause = why_cut_short(recording) or why_touched(recording)
     if cause is None:
-        rest = final_rest(truth)
-        seen = f"{metres(gone_m)} in all"
-        cause = _too_slow(recording, seen) if rest is None else _stopped(recording, rest, seen)
+        cause = _why_not_ahead(recording, gone_m)
     return cause.finding(expected)
+
+
+def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
+    if gone_m < -_WAY_TOLERANCE_M:
+        return Cause(
+            f"the robot drove {metres(-gone_m)} backwards",
+            _BACKWARDS_HINT,
+            Evidence(plots=(speed_plot(recording),)),
+        )
+    rest = final_rest(recording.truth)
+    seen = f"{metres(gone_m)} in all"
+    return _too_slow(recording, seen) if rest is None else _stopped(recording, rest, seen)
 
 
 def _stopped(recording: Recording, rest: int, seen: str) -> Cause:

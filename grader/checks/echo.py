@@ -18,10 +18,18 @@ class Wanted:
     Attributes:
         message: The message.
         values: Path of each field -> its value.
+        ready_ns: When a subscription was there to get it, later than the message itself for
+            what a publisher kept for late joiners.
     """
 
     message: Message
     values: dict[str, float]
+    ready_ns: int = 0
+
+    @property
+    def due_ns(self) -> int:
+        """From when on a line is waited for."""
+        return max(self.message.stamp_ns, self.ready_ns)
 
 
 @dataclass(frozen=True)
@@ -37,14 +45,21 @@ class Echo:
     lines: tuple[LogLine, ...]
 
 
-def wanted_values(messages: Sequence[Message], fields: Sequence[str]) -> tuple[Wanted, ...]:
+def wanted_values(
+    messages: Sequence[Message], fields: Sequence[str], ready_ns: int = 0
+) -> tuple[Wanted, ...]:
     """What the log should show of each message.
+
+    Args:
+        messages: What the node was sent.
+        fields: Paths of the fields to show.
+        ready_ns: When the node was there to get messages that are older.
 
     Raises:
         NoSuchField: The messages have no such field, or it holds no number.
     """
     return tuple(
-        Wanted(message, {path: number_at(message.value, path) for path in fields})
+        Wanted(message, {path: number_at(message.value, path) for path in fields}, ready_ns)
         for message in messages
     )
 
@@ -86,7 +101,7 @@ def echoes(
     free = 0
     for item in wanted:
         begin_ns = item.message.stamp_ns
-        end_ns = begin_ns + within_ns
+        end_ns = item.due_ns + within_ns
         if forgive:
             end_ns += round(recording.taken_s(begin_ns, end_ns) * NS)
         first = max(free, bisect_left(times, begin_ns))

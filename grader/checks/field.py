@@ -1,4 +1,4 @@
-"""Paths to a number in a message, such as ``pose.pose.position.x`` or ``ranges[0]``."""
+"""Paths to a value in a message, such as ``pose.pose.position.x`` or ``ranges[0]``."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ def _field_path(text: str) -> str:
 FieldPath = Annotated[str, AfterValidator(_field_path)]
 
 
-def number_at(message: Mapping[str, Any], path: str) -> float:
-    """The number in a field of a message.
+def value_at(message: Mapping[str, Any], path: str) -> Any:
+    """The plain value in a field of a message.
 
     Args:
         message: Fields by name.
         path: Names with dots between them, indices of arrays in brackets, counted from 0.
 
     Raises:
-        NoSuchField: The message has no such field, or it holds no number.
+        NoSuchField: The message has no such field, or it holds other fields.
     """
     here: Any = message
     done = "the message"
@@ -55,6 +55,22 @@ def number_at(message: Mapping[str, Any], path: str) -> float:
         else:
             raise NoSuchField(f"{done} has no field {step!r}: it is a plain value")
         done = step
-    if not isinstance(here, int | float):
+    if isinstance(here, Mapping):
+        raise NoSuchField(f"{path} is a message: name one of its fields ({', '.join(here)})")
+    return here
+
+
+def number_at(message: Mapping[str, Any], path: str) -> float:
+    """The number in a field of a message.
+
+    Args:
+        message: Fields by name.
+        path: As for :func:`value_at`.
+
+    Raises:
+        NoSuchField: The message has no such field, or it holds no number.
+    """
+    value = value_at(message, path)
+    if not isinstance(value, int | float):
         raise NoSuchField(f"{path} is not a number")
-    return float(here)
+    return float(value)

@@ -44,6 +44,7 @@ class Plot:
         x: Abscissas.
         y: Ordinates, as many.
         band: Lowest and highest allowed ordinate, or None.
+        histogram: Whether how often each ordinate occurs is worth a look as well.
     """
 
     title: str
@@ -52,6 +53,7 @@ class Plot:
     x: tuple[float, ...]
     y: tuple[float, ...]
     band: tuple[float, float] | None = None
+    histogram: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,70 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Span:
+    """Something that lasted, such as one call of a callback; drawn as a bar.
+
+    Attributes:
+        name: Whose it is; the same name, the same row.
+        begin_s: Seconds since launch.
+        end_s: Seconds since launch, not before ``begin_s``.
+        wrong: Whether the finding is about this one.
+    """
+
+    name: str
+    begin_s: float
+    end_s: float
+    wrong: bool = False
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case that was tried, with how far off the answer was.
+
+    Attributes:
+        name: What was asked, short.
+        group: Cases of one kind have the same, such as ``gimbal lock``.
+        error: In the unit of :attr:`Cases.label`; None where no answer came.
+    """
+
+    name: str
+    group: str
+    error: float | None
+
+
+@dataclass(frozen=True)
+class Cases:
+    """Errors of many cases against one limit; drawn on a logarithmic scale.
+
+    Attributes:
+        title: What was tried.
+        label: What the error is, with unit, such as ``error of the rotation (deg)``.
+        limit: Greatest allowed error.
+        cases: In the order in which they were tried.
+    """
+
+    title: str
+    label: str
+    limit: float
+    cases: tuple[Case, ...]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two texts side by side, such as message definitions; differing lines are marked.
+
+    Attributes:
+        title: What is compared.
+        expected: Lines as they should be.
+        observed: Lines as they are.
+    """
+
+    title: str
+    expected: tuple[str, ...]
+    observed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Evidence:
     """Where a finding can be seen.
 
@@ -73,6 +139,9 @@ class Evidence:
         log: Lines of output that matter, as printed.
         plots: Series to draw.
         tables: Small tables.
+        spans: What lasted how long.
+        cases: Errors of many cases.
+        comparisons: Texts side by side.
     """
 
     moments: tuple[Moment, ...] = ()
@@ -80,6 +149,9 @@ class Evidence:
     log: tuple[str, ...] = ()
     plots: tuple[Plot, ...] = ()
     tables: tuple[Table, ...] = ()
+    spans: tuple[Span, ...] = ()
+    cases: tuple[Cases, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """What stands around the robot, by the geometry of the recorded world.
 
-Distances are from the middle of the robot, where its LiDAR sits unless the scenario says
-otherwise. A moving box counts as the circle around it, for the recording holds no more.
+Distances are from the LiDAR, which sits in the middle of the robot unless the scenario says
+otherwise. Straight ahead is where the robot drives, however the LiDAR is turned.
 """
 
 from __future__ import annotations
@@ -10,10 +10,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from grader.recording.model import NS, Scene, Truth
+from grader.recording.model import Scene, Truth
+from sim.motion import Pose, compose
 from sim.shapes import Capsule, point_clearance_m
-
-_PLACES_PER_S = 10
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class Sight:
 
     Attributes:
         name: Such as ``boxes[2]``.
-        distance_m: From the robot's middle to its outline.
+        distance_m: From the LiDAR to its outline.
         bearing_rad: In the robot's frame, counter-clockwise from straight ahead.
     """
 
@@ -33,12 +32,13 @@ class Sight:
 
 def ahead(scene: Scene, step: Truth) -> Sight | None:
     """The nearest thing straight ahead of the robot, or None where there is nothing."""
+    eye = _eye(scene, step)
     cos, sin = math.cos(step.yaw_rad), math.sin(step.yaw_rad)
     found: Sight | None = None
     for name, capsules in _things(scene, step.time_ns):
         for x1, y1, x2, y2, radius in capsules:
-            # In the robot's frame the ray is the positive x axis.
-            dx1, dy1, dx2, dy2 = x1 - step.x_m, y1 - step.y_m, x2 - step.x_m, y2 - step.y_m
+            # Seen from the LiDAR, along the robot's heading, the ray is the positive x axis.
+            dx1, dy1, dx2, dy2 = x1 - eye.x_m, y1 - eye.y_m, x2 - eye.x_m, y2 - eye.y_m
             distance_m = _ray_m(
                 (
                     cos * dx1 + sin * dy1,
@@ -55,37 +55,35 @@ def ahead(scene: Scene, step: Truth) -> Sight | None:
 
 def nearest(scene: Scene, step: Truth) -> Sight | None:
     """The nearest thing in any direction, or None in an empty world."""
+    eye = _eye(scene, step)
     found: Sight | None = None
     for name, capsules in _things(scene, step.time_ns):
         for capsule in capsules:
-            distance_m = abs(point_clearance_m(step.x_m, step.y_m, capsule))
+            distance_m = abs(point_clearance_m(eye.x_m, eye.y_m, capsule))
             if found is None or distance_m < found.distance_m:
-                x, y = _foot(step.x_m, step.y_m, capsule)
-                bearing_rad = math.atan2(y - step.y_m, x - step.x_m) - step.yaw_rad
+                x, y = _foot(eye.x_m, eye.y_m, capsule)
+                bearing_rad = math.atan2(y - eye.y_m, x - eye.x_m) - step.yaw_rad
                 found = Sight(name, distance_m, math.remainder(bearing_rad, math.tau))
     return found
 
 
+def edge_m(scene: Scene) -> float:
+    """Distance from the LiDAR straight ahead to the robot's own edge."""
+    x_m, y_m = scene.lidar.x_m, scene.lidar.y_m
+    return math.sqrt(max(scene.radius_m**2 - y_m**2, 0.0)) - x_m
+
+
+def _eye(scene: Scene, step: Truth) -> Pose:
+    """Where the LiDAR is."""
+    return compose(Pose(step.x_m, step.y_m, step.yaw_rad), scene.lidar)
+
+
 def _things(scene: Scene, time_ns: int) -> Iterator[tuple[str, tuple[Capsule, ...]]]:
     yield from scene.outlines.items()
-    for name, (radius_m, places) in scene.moving.items():
-        place = _place(places, (time_ns - scene.began_ns) * _PLACES_PER_S / NS)
-        if place is not None:
-            yield name, ((*place, *place, radius_m),)
-
-
-def _place(
-    places: tuple[tuple[float, float, float] | None, ...], position: float
-) -> tuple[float, float] | None:
-    """Where something is between two of its places; there only if it is there at both."""
-    if not places:
-        return None
-    index = min(max(int(position), 0), len(places) - 1)
-    before, after = places[index], places[min(index + 1, len(places) - 1)]
-    if before is None or after is None:
-        return None if before is None else before[:2]
-    share = min(max(position - index, 0.0), 1.0)
-    return before[0] + share * (after[0] - before[0]), before[1] + share * (after[1] - before[1])
+    for obstacle in scene.moving:
+        pose = obstacle.pose_at(time_ns - scene.began_ns)
+        if pose is not None:
+            yield obstacle.label, obstacle.shape_at(pose).capsules
 
 
 def _ray_m(capsule: Capsule) -> float | None:

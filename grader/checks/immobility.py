@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.assignment.quantity import format_duration
 from grader.checks.cause import Cause
-from grader.checks.command import TOPIC, Command, commands, is_zero
+from grader.checks.command import Command, command_topic, commands, is_zero
 from grader.checks.compatibility import refusals
 from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Moment
@@ -33,7 +33,7 @@ def why_not_judged(recording: Recording) -> Cause | None:
     if missing is not None:
         return missing
     if recording.matched_ns is None:
-        return why_silent(recording, TOPIC)
+        return why_silent(recording, command_topic(recording))
     return Cause("there is no simulated robot in this scenario: it needs a `world`", ours=True)
 
 
@@ -47,7 +47,8 @@ def why_not_moved(recording: Recording) -> Cause | None:
         return cause_of_death(recording, ended[0]).after(_STILL)
     sent = commands(recording)
     if not sent:
-        cause = why_silent(recording, TOPIC) if not recording.on(TOPIC) else _unreadable(recording)
+        topic = command_topic(recording)
+        cause = _unreadable(recording) if recording.on(topic) else why_silent(recording, topic)
         return cause.after(_STILL)
     return (
         why_rejected(recording)
@@ -80,8 +81,8 @@ def why_rejected(recording: Recording) -> Cause | None:
     first = refused[0]
     were = "was" if len(refused) == 1 else "were"
     return Cause(
-        f"{counted(len(refused), 'command')} on {code(TOPIC)} {were} not finite (first: "
-        f"{first.text}); the robot stops instead",
+        f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
+        f"(first: {first.text}); the robot stops instead",
         _NAN_HINT,
         Evidence(moments=(_moment(recording, "command rejected", first),)),
     )
@@ -92,9 +93,10 @@ def _moment(recording: Recording, label: str, incident: Incident) -> Moment:
 
 
 def _unreadable(recording: Recording) -> Cause:
-    found = sorted({message.type for message in recording.on(TOPIC)})
+    topic = command_topic(recording)
+    found = sorted({message.type for message in recording.on(topic)})
     return Cause(
-        f"what was published on {code(TOPIC)} is no velocity command but {codes(found)}",
+        f"what was published on {code(topic)} is no velocity command but {codes(found)}",
         "Publish geometry_msgs/msg/Twist.",
     )
 
@@ -103,18 +105,19 @@ def _unheard(recording: Recording) -> Cause | None:
     """The probe heard the commands, but the robot's own subscription does not match."""
     if any(step.command_m_s or step.command_rad_s for step in recording.truth):
         return None
-    publishers = recording.student_endpoints(Kind.PUBLISHER, TOPIC)
+    topic = command_topic(recording)
+    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
     readers = [
         item
         for item in recording.endpoints
-        if item.owner is Owner.PROBE and item.kind is Kind.SUBSCRIPTION and item.topic == TOPIC
+        if item.owner is Owner.PROBE and item.kind is Kind.SUBSCRIPTION and item.topic == topic
     ]
     for publisher in publishers:
         for reader in readers:
             reasons = refusals(offered=publisher.qos, requested=reader.qos)
             if reasons:
                 return Cause(
-                    f"{_STILL}: the QoS of the publisher on {code(TOPIC)} does not match that of "
+                    f"{_STILL}: the QoS of the publisher on {code(topic)} does not match that of "
                     f"the robot ({', '.join(reasons)})",
                     "The robot's subscription is reliable: publish reliably, as "
                     "create_publisher(Twist, 'cmd_vel', 10) does.",
@@ -131,7 +134,8 @@ def _asks_nothing(recording: Recording, sent: tuple[Command, ...]) -> Cause | No
             f"{_STILL}: the commands set {codes(stray)}, which a differential drive cannot do",
             "The speed ahead is linear.x, the turn is angular.z.",
         )
-    seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {code(TOPIC)} are zero"
+    topic = code(command_topic(recording))
+    seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
     evidence = Evidence(
         moments=(Moment("first command", recording.since_launch_s(sent[0].time_ns)),)
     )

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import re
-
 from grader.recording.model import Recording
 
-_MILLISECONDS = re.compile(r"(\d+) ms")
 # Late steps are noted before they are done, at the stamp of the step before them.
 _MARGIN_NS = 20_000_000
 
@@ -22,12 +19,9 @@ def taken_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
         begin_ns: Beginning of the interval.
         end_ns: Its end.
     """
-    late_ms = [
-        int(found[1])
+    late_s = [
+        item.value or 0.0
         for item in recording.incidents
-        if item.kind == "late"
-        and begin_ns - _MARGIN_NS <= item.time_ns <= end_ns
-        and (found := _MILLISECONDS.search(item.text))
+        if item.kind == "late" and begin_ns - _MARGIN_NS <= item.time_ns <= end_ns
     ]
-    simulator_s = max(late_ms, default=0) / 1e3
-    return recording.taken_s(begin_ns, max(begin_ns, end_ns)) + simulator_s
+    return recording.taken_s(begin_ns, max(begin_ns, end_ns)) + max(late_s, default=0.0)

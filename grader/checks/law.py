@@ -22,6 +22,7 @@ _MOST_SIZES = 4
 _SAME = 1e-6
 _PLATEAU = 3
 _FEW_WRONG = 0.05
+_LEAST_TRIMMED = 8
 _SHORT_OF = 0.8
 
 
@@ -188,9 +189,21 @@ def _fit(samples: Sequence[Sample], limit_rad_s: float) -> Verdict:
             return wanted < _SHORT_OF * clamp
         return size > low or wanted > floor / _SHORT_OF
 
-    kept = [item for item in samples if counts(item)]
+    kept = _without_strays([item for item in samples if counts(item)])
     gain = _gain(kept)
     return Verdict(Law.PROPORTIONAL, gain, _r2(kept, gain), len(kept))
+
+
+def _without_strays(samples: list[Sample]) -> list[Sample]:
+    """Leave out the few commands that fit worst.
+
+    Where one phase ends and the next begins, a command or two answer the error of the other.
+    """
+    if len(samples) < _LEAST_TRIMMED:
+        return samples
+    gain = _gain(samples)
+    by_rest = sorted(samples, key=lambda item: abs(item.command_rad_s - gain * item.error_rad))
+    return by_rest[: len(samples) - math.ceil(_FEW_WRONG * len(samples))]
 
 
 def _count(sizes: Sequence[float], size: float) -> int:

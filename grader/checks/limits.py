@@ -9,7 +9,7 @@ from pydantic import Field
 from grader.assignment.quantity import Ratio
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.command import TOPIC, Command, commands
+from grader.checks.command import Command, command_topic, commands
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.immobility import why_not_judged, why_rejected
 from grader.checks.measure import speed, turn
@@ -49,7 +49,7 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     )
     sent = commands(recording)
     if not sent:
-        return why_silent(recording, TOPIC).finding(expected)
+        return why_silent(recording, command_topic(recording)).finding(expected)
     cause = why_rejected(recording)
     if cause is not None:
         return cause.finding(expected)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from grader.assignment.model import TopicName
@@ -17,12 +19,19 @@ from grader.checks.wording import code, codes, counted
 from grader.recording.model import NS, Kind, Recording
 
 _SHOWN_LINES = 5
+_SENT = {
+    "any": "",
+    "before_launch": " that were published before the launch",
+    "after_launch": " that were published after the launch",
+}
 
 
 class Follows(Parameters):
     """Parameters of log.follows."""
 
-    topic: TopicName = Field(description="Fully qualified name of a topic that the cell sends.")
+    topic: TopicName = Field(
+        description="Fully qualified name of a topic that the simulated robot or a stimulus sends."
+    )
     fields: tuple[FieldPath, ...] = Field(
         min_length=1,
         description="Numbers of the message that must be logged, such as "
@@ -31,12 +40,18 @@ class Follows(Parameters):
     decimals: int = Field(
         2, ge=0, le=9, description="How many decimals must be right; rounding and cutting off are."
     )
+    sent: Literal["any", "before_launch", "after_launch"] = Field(
+        "any",
+        description="Which messages count: those that a stimulus published before the node was "
+        "launched, those after, or any.",
+    )
     at_least: int = Field(
         1, ge=1, description="How many messages must be followed, each by log lines of its own."
     )
     within: Duration = Field(
         0.5,
-        description="How soon after its message a line must come, by default 500 ms.",
+        description="How soon after its message a line must come, by default 500 ms; for a "
+        "message from before the launch it is the time since the first match.",
         validate_default=False,
     )
 
@@ -60,6 +75,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         f"log lines that show {codes(parameters.fields)} of messages on {code(parameters.topic)}, "
         f"to {counted(parameters.decimals, 'decimal')}, within "
         f"{format_duration(parameters.within)} of {counted(parameters.at_least, 'message')} or more"
+        f"{_SENT[parameters.sent]}"
     )
     if recording.student_endpoints(Kind.PUBLISHER, parameters.topic):
         return Finding.failed(
@@ -68,9 +84,15 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
             "what it was sent",
             "Only the robot publishes its sensors: remove this publisher, and subscribe.",
         )
-    messages = recording.on(parameters.topic)
+    messages = [
+        message
+        for message in recording.carried(parameters.topic)
+        if parameters.sent == "any"
+        or (parameters.sent == "before_launch") == (message.stamp_ns < recording.launched_ns)
+    ]
+    ready_ns = recording.matched_ns or recording.launched_ns
     try:
-        wanted = wanted_values(messages, parameters.fields)
+        wanted = wanted_values(messages, parameters.fields, ready_ns)
     except NoSuchField as error:
         return Finding.error(
             expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
@@ -78,7 +100,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     within_ns = round(parameters.within * NS)
     found = echoes(recording, wanted, parameters.decimals, within_ns)
     if len(found) >= parameters.at_least:
-        return _passed(recording, parameters, expected, found)
+        return _passed(recording, parameters, expected, found, len(messages))
     return why_not_logged(
         recording,
         parameters.topic,
@@ -91,10 +113,13 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
 
 
 def _passed(
-    recording: Recording, parameters: Follows, expected: str, found: tuple[Echo, ...]
+    recording: Recording,
+    parameters: Follows,
+    expected: str,
+    found: tuple[Echo, ...],
+    number: int,
 ) -> Finding:
     lines = [line for echo in found for line in echo.lines]
-    number = len(recording.on(parameters.topic))
     return Finding.passed(
         expected,
         f"log lines follow {len(found)} of {counted(number, 'message')}: " + quote(lines[-1].text),

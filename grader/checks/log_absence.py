@@ -6,20 +6,19 @@ from collections.abc import Sequence
 
 from grader.assignment.quantity import format_duration
 from grader.checks import testimony
+from grader.checks.blockage import HINT, first_unanswered, where_blocked
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
-from grader.checks.delivery import why_not_delivered
+from grader.checks.delivery import why_no_history, why_not_delivered
 from grader.checks.echo import Echo, Wanted, echoes, output_lines, shown
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.misreading import explain
 from grader.checks.printed import numbers, quote
 from grader.checks.wording import code, codes, counted, listing, value_text
-from grader.recording.model import NS, Call, Kind, LogLine, Recording
+from grader.recording.model import NS, Kind, LogLine, Recording
 
 _LOG_LINES = 5
-# An answer that was asked for later than this before the end may be missing for that reason.
-_ANSWER_NS = NS
 # Share of the time that the host may take before silence says nothing any more.
 _STARVED = 0.5
 
@@ -51,6 +50,10 @@ def why_not_logged(
     ended = dead(recording)
     if ended:
         return cause_of_death(recording, ended[0]).after(_seen(topic, found))
+    if wanted and wanted[-1].message.stamp_ns < recording.launched_ns:
+        cause = why_no_history(recording, topic, _seen(topic, found))
+        if cause is not None:
+            return cause
     if len(wanted) < needed:
         return Cause(
             f"only {counted(len(wanted), 'message was', 'messages were')} sent on {code(topic)}",
@@ -89,7 +92,7 @@ def _disturbed(
     decimals: int,
     within_ns: int,
 ) -> Cause | None:
-    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].message.stamp_ns + within_ns
+    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + within_ns
     taken_s = recording.taken_s(begin_ns, end_ns)
     starved = taken_s >= _STARVED * (end_ns - begin_ns) / NS
     if not starved and (len(echoes(recording, wanted, decimals, within_ns, forgive=True)) < needed):
@@ -120,37 +123,19 @@ def _never_spins(recording: Recording, topic: str) -> Cause | None:
 
 def _blocked(recording: Recording, topic: str, found: Sequence[Echo]) -> Cause | None:
     """The node's parameter service tells: it answers only while the executor comes round."""
-    first_ns = recording.on(topic)[0].stamp_ns
     nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
-    calls = [
-        call
-        for call in recording.calls
-        if call.service.rpartition("/")[0] in nodes
-        and call.requested_ns <= recording.stop_ns - _ANSWER_NS
-    ]
-    unanswered = [call for call in calls if call.answered_ns is None]
-    if not unanswered or any(_answered_after(call, first_ns) for call in calls):
+    call = first_unanswered(recording, nodes, recording.carried(topic)[0].stamp_ns)
+    if call is None:
         return None
-    since_s = recording.since_launch_s(unanswered[0].requested_ns)
-    process = testimony.process_of(recording, min(nodes))
-    place = interrupted_place(recording, process.name) if process is not None else None
-    where = f" ({place.file}:{place.line})" if place else ""
+    since_s = recording.since_launch_s(call.requested_ns)
+    where, evidence = where_blocked(recording, min(nodes), call)
     return Cause(
         f"{_seen(topic, found)}: its callback is not called, because something keeps the executor "
         f"from coming round{where}. The subscription is there and its QoS matches, but from "
         f"{since_s:.2f} s after launch on the node's parameter service answers no call either",
-        "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
-        "callback, in the constructor or in main(), and for a node that is not given to "
-        "rclpy.spin().",
-        Evidence(
-            moments=(Moment("first call that was not answered", since_s),),
-            places=(place,) if place else (),
-        ),
+        HINT,
+        evidence,
     )
-
-
-def _answered_after(call: Call, time_ns: int) -> bool:
-    return call.answered_ns is not None and call.answered_ns >= time_ns
 
 
 def _dropped(recording: Recording, topic: str) -> Cause | None:
@@ -184,7 +169,7 @@ def _few(
 
 def _near(recording: Recording, wanted: Sequence[Wanted], within_ns: int) -> list[LogLine]:
     """Lines that could have been an answer to a message."""
-    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].message.stamp_ns + within_ns
+    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + within_ns
     return [line for line in output_lines(recording) if begin_ns <= line.time_ns <= end_ns]
 
 

@@ -156,6 +156,9 @@ def _gone(recording: Recording, name: str | None) -> Node | None:
 def _vanished(recording: Recording, node: Node) -> bool:
     if node.vanished_ns is None or node.vanished_ns >= recording.stop_ns:
         return False
+    # What a stimulus ends is meant to vanish, within the lease of its participant.
+    if any(item.time_ns <= node.vanished_ns for item in recording.interventions):
+        return False
     return not _lives_after(recording, node.name, node.vanished_ns)
 
 
@@ -207,18 +210,35 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
             expected,
             f"{codes(process.name for process in stuck)} could not be ended, not even by SIGKILL",
         )
-    slow = [process for process in recording.processes if not _in_time(process, parameters)]
+    asked = [process for process in recording.processes if not _was_killed(recording, process)]
+    slow = [process for process in asked if not _in_time(process, parameters)]
     if slow:
         worst = max(slow, key=lambda process: _stop_s(recording, process))
         return _too_late(recording, worst, parameters).finding(expected)
     leaving = [process for process in recording.processes if process.survivors]
     if leaving:
         return _survived(leaving[0]).finding(expected)
-    longest_s = max(_stop_s(recording, process) for process in recording.processes)
+    if not asked:
+        return Finding.error(expected, "a stimulus of the scenario had ended it before")
+    longest_s = max(_stop_s(recording, process) for process in asked)
     return Finding.passed(
         expected,
         f"ended {format_duration(longest_s)} after SIGINT",
         Evidence(moments=(Moment("SIGINT", recording.since_launch_s(recording.stop_ns)),)),
+    )
+
+
+def _was_killed(recording: Recording, process: Process) -> bool:
+    """Whether a stimulus ended it in the middle of the run."""
+    ended_ns = process.exited_ns
+    return (
+        process.stopped_by != "itself"
+        and ended_ns is not None
+        and any(
+            item.process == process.name and item.action == "kill" and item.time_ns <= ended_ns
+            for item in recording.interventions
+        )
+        and ended_ns < recording.stop_ns
     )
 
 

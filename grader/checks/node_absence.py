@@ -64,6 +64,12 @@ def _not_started(recording: Recording) -> Cause:
 def _hangs(recording: Recording, process: Process) -> Cause:
     """A process that still ran, but showed no node."""
     name, who = process.name, f"the process {code(process.name)}"
+    others = recording.environment.get("other_domains")
+    if others:
+        return Cause(
+            f"{who} joined ROS domain {others} and not the one that it was started in",
+            "Do not set ROS_DOMAIN_ID or domain_id in the code: the environment chooses it.",
+        )
     if testimony.said(recording, "node", name):
         return Cause(
             f"{who} declared a node, but it never appeared in the ROS graph",

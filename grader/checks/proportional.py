@@ -13,7 +13,7 @@ from grader.assignment.quantity import Frequency, PositiveLength, Ratio
 from grader.checks.approach import NO_SPEED_M_S, Approach, approach, why_not_there
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.command import ODOMETRY, TOPIC, commands, number
+from grader.checks.command import command_topic, commands, number, odometry
 from grader.checks.finding import Evidence, Finding, Plot
 from grader.checks.immobility import why_cut_short
 from grader.checks.law import Law, Sample, Verdict, examine
@@ -75,8 +75,9 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     run = approach(recording, parameters.goal)
     if isinstance(run, Cause):
         return run.finding(expected)
-    if not recording.on(TOPIC):
-        return why_silent(recording, TOPIC).finding(expected)
+    topic = command_topic(recording)
+    if not recording.on(topic):
+        return why_silent(recording, topic).finding(expected)
     arrival = run.arrival(parameters.position)
     if phase == "align" and arrival is None:
         cause = why_not_there(run, parameters.position)
@@ -133,12 +134,12 @@ def _samples(run: Approach, parameters: Proportional, behind: int) -> list[Sampl
     driven = run.driven(parameters.position)
     # One that drives on while it turns is judged by what it does since it arrived.
     aligns_ns = arrival_ns if driven is None else truth[driven].time_ns - _STEP_NS
-    odometry = recording.on(ODOMETRY)
+    told = odometry(recording)
     found: list[Sample] = []
     driving: list[Sample] = []
     for item in commands(recording):
         # What was sent before the first odometry, or after the end, knows no error.
-        seen_ns = _seen_ns(odometry, item.time_ns, behind)
+        seen_ns = _seen_ns(told, item.time_ns, behind)
         if seen_ns is None or item.time_ns > truth[-1].time_ns or not item.twist.is_finite:
             continue
         pose = pose_at(truth, seen_ns)
@@ -153,14 +154,14 @@ def _samples(run: Approach, parameters: Proportional, behind: int) -> list[Sampl
     return found if len(found) >= _LEAST_SAMPLES else [*driving, *found]
 
 
-def _seen_ns(odometry: Sequence[Message], time_ns: int, behind: int) -> int | None:
+def _seen_ns(told: Sequence[Message], time_ns: int, behind: int) -> int | None:
     """Time at which the newest odometry that was known was measured, or None before the first."""
-    if not odometry:
+    if not told:
         return time_ns
-    index = bisect_right(odometry, time_ns, key=_stamp_ns)
+    index = bisect_right(told, time_ns, key=_stamp_ns)
     if index <= behind:
         return None
-    message = odometry[index - 1 - behind]
+    message = told[index - 1 - behind]
     sec, nanosec = (number(message.value, "header", "stamp", key) for key in ("sec", "nanosec"))
     return message.stamp_ns if sec is None or nanosec is None else int(sec) * NS + int(nanosec)
 

@@ -13,7 +13,7 @@ from grader.assignment.model import Durability, Reliability, TopicName
 from grader.assignment.quantity import Duration
 from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.compatibility import duration_words, refusals
+from grader.checks.compatibility import Comparison, comparisons, duration_words
 from grader.checks.finding import Evidence, Finding, Table
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.wording import code, counted
@@ -21,8 +21,16 @@ from grader.recording.model import Endpoint, Kind, Qos, Recording
 
 # DDS carries durations as seconds and a fraction of 2**32.
 _SAME_DURATION = 1e-3
+_ARGUMENTS = {"lease": "liveliness_lease_duration"}
+_POLICIES = {"lease": "liveliness lease"}
+"""Key of the YAML -> name of the policy, where they differ."""
 _WORD_POLICIES = ("reliability", "durability", "liveliness")
-_DURATION_POLICIES = ("deadline", "lifespan")
+_DURATION_POLICIES = {
+    "deadline": "deadline_s",
+    "lifespan": "lifespan_s",
+    "lease": "liveliness_lease_s",
+}
+"""Key of the YAML -> attribute of the profile."""
 
 
 class Profile(Parameters):
@@ -36,6 +44,7 @@ class Profile(Parameters):
     liveliness: Literal["automatic", "manual_by_topic"] | None = Field(
         None, description="Expected liveliness."
     )
+    lease: Duration | None = Field(None, description="Expected lease duration of the liveliness.")
 
     @model_validator(mode="after")
     def _something(self) -> Profile:
@@ -58,6 +67,7 @@ class Profile(Parameters):
             liveliness=self.liveliness or "unknown",
             deadline_s=self.deadline,
             lifespan_s=self.lifespan,
+            liveliness_lease_s=self.lease,
         )
 
 
@@ -70,14 +80,14 @@ class _Side:
         has: ``offers`` or ``requests``.
         did: ``offered`` or ``requested``.
         partner: The other end, in words.
-        refusals: (found, expected) -> why a partner with the expected profile does not match.
+        comparisons: (found, expected) -> how a partner with the expected profile fits.
     """
 
     kind: Kind
     has: str
     did: str
     partner: str
-    refusals: Callable[[Qos, Qos], tuple[str, ...]]
+    comparisons: Callable[[Qos, Qos], tuple[Comparison, ...]]
 
 
 _PUBLISHER = _Side(
@@ -85,14 +95,14 @@ _PUBLISHER = _Side(
     "offers",
     "offered",
     "subscription that requests",
-    lambda found, expected: refusals(offered=found, requested=expected),
+    lambda found, expected: comparisons(offered=found, requested=expected),
 )
 _SUBSCRIPTION = _Side(
     Kind.SUBSCRIPTION,
     "requests",
     "requested",
     "publisher that offers",
-    lambda found, expected: refusals(offered=expected, requested=found),
+    lambda found, expected: comparisons(offered=expected, requested=found),
 )
 
 
@@ -154,7 +164,7 @@ def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
             if actual not in (wanted, "unknown"):
                 found[name] = wanted, actual
         else:
-            actual_s = getattr(qos, f"{name}_s")
+            actual_s = getattr(qos, _DURATION_POLICIES[name])
             if actual_s is None or not math.isclose(actual_s, wanted, rel_tol=_SAME_DURATION):
                 found[name] = wanted, actual_s
     return found
@@ -167,7 +177,8 @@ def _mismatch(
     expected: str,
     side: _Side,
 ) -> Finding:
-    refused = side.refusals(endpoint.qos, parameters.qos)
+    found = side.comparisons(endpoint.qos, parameters.qos)
+    refused = {item.policy for item in found if item.compatible is False}
     observed = f"the {side.kind.value} of {code(endpoint.node)} {side.has} " + ", ".join(
         f"{name} {_words(actual)} instead of {_words(wanted)}"
         for name, (wanted, actual) in wrong.items()
@@ -181,7 +192,7 @@ def _mismatch(
             name,
             _words(wanted),
             _words(actual),
-            "no" if any(reason.startswith(name) for reason in refused) else "yes",
+            "no" if _POLICIES.get(name, name) in refused else "yes",
         )
         for name, (wanted, actual) in wrong.items()
     )
@@ -207,7 +218,7 @@ def _hint(parameters: Profile, side: _Side) -> str:
     arguments = ", ".join(
         f"{name}={name.capitalize()}Policy.{item.upper()}"
         if name in _WORD_POLICIES
-        else f"{name}=Duration(seconds={item:g})"
+        else f"{_ARGUMENTS.get(name, name)}=Duration(seconds={item:g})"
         for name, item in parameters.policies.items()
     )
     create = "create_publisher" if side.kind is Kind.PUBLISHER else "create_subscription"

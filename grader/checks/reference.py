@@ -8,10 +8,16 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from grader.assignment.name import ID
-from grader.assignment.quantity import Dimension, parse_quantity, write_quantity
+from grader.assignment.quantity import (
+    Dimension,
+    parse_quantity,
+    refusal,
+    write_quantity,
+    written_as_read,
+)
 from grader.nearest import did_you_mean
 from sim.coordinates import metres
 from sim.motion import Pose, wrap_angle
@@ -98,13 +104,13 @@ class _Reference:
         if isinstance(value, str) and re.fullmatch(ID, value):
             return value
         if isinstance(value, str) and value.startswith("$"):
-            raise _wrong(f"checks take the bare name of a random value: write {value[1:]!r}")
+            raise refusal(f"checks take the bare name of a random value: write {value[1:]!r}")
         try:
             if self.bare:
                 return metres(value)
             return parse_quantity(value, self.dimension)
         except ValueError as error:
-            raise _wrong(f"{error}, or name a random value") from None
+            raise refusal(f"{error}, or name a random value") from None
 
     def write(self, value: float | str) -> float | str:
         """What :meth:`read` reads again."""
@@ -114,12 +120,7 @@ class _Reference:
         self, source: type[Any], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Validate by :meth:`read`."""
-        return core_schema.no_info_plain_validator_function(
-            self.read,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                self.write, when_used="json-unless-none"
-            ),
-        )
+        return written_as_read(self.read, self.write)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -146,12 +147,7 @@ class _GoalAnnotation:
         self, source: type[Any], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Validate entry by entry; written as it is read."""
-        return core_schema.no_info_plain_validator_function(
-            self._read,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                self._write, when_used="json-unless-none"
-            ),
-        )
+        return written_as_read(self._read, self._write)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -170,22 +166,18 @@ class _GoalAnnotation:
         if isinstance(value, Goal):
             return value
         if not isinstance(value, list | tuple) or len(value) != len(_GOAL_ENTRIES):
-            raise _wrong(f"expected [x, y, theta], not {value!r}")
+            raise refusal(f"expected [x, y, theta], not {value!r}")
         entries = []
         for (name, reference), item in zip(_GOAL_ENTRIES.items(), value, strict=True):
             try:
                 entries.append(reference.read(item))
             except PydanticCustomError as error:
-                raise _wrong(f"{name}: {error}") from None
+                raise refusal(f"{name}: {error}") from None
         return Goal(*entries)
 
     def _write(self, goal: Goal) -> list[float | str]:
         pairs = zip(_GOAL_ENTRIES.values(), (goal.x, goal.y, goal.theta), strict=True)
         return [reference.write(item) for reference, item in pairs]
-
-
-def _wrong(text: str) -> PydanticCustomError:
-    return PydanticCustomError("quantity", "{text}", {"text": text})
 
 
 LengthOrName = Annotated[float | str, _Reference(Dimension.LENGTH)]

@@ -6,7 +6,7 @@ import math
 from bisect import bisect_right
 from dataclasses import dataclass
 
-from grader.checks.command import SCAN, number
+from grader.checks.command import number, scans
 from grader.checks.ground import Sight
 from grader.checks.measure import metres, side
 from grader.checks.wording import code
@@ -32,18 +32,23 @@ class Misreading:
 
 def newest(recording: Recording, time_ns: int) -> Message | None:
     """The last scan that was published by a time."""
-    scans = recording.on(SCAN)
-    index = bisect_right(scans, time_ns, key=_stamp_ns)
-    return scans[index - 1] if index else None
+    told = scans(recording)
+    index = bisect_right(told, time_ns, key=_stamp_ns)
+    return told[index - 1] if index else None
 
 
-def front(scan: Message) -> float | None:
-    """What the beam straight ahead reports, in metres; may be inf, NaN or 0.0."""
+def front(scan: Message, lidar_rad: float = 0.0) -> float | None:
+    """What the beam straight ahead reports, in metres; may be inf, NaN or 0.0.
+
+    Args:
+        scan: What the LiDAR told.
+        lidar_rad: How far the LiDAR is turned on the robot, counter-clockwise.
+    """
     ranges = scan.value.get("ranges")
     start, step = number(scan.value, "angle_min"), number(scan.value, "angle_increment")
     if not isinstance(ranges, list | tuple) or not ranges or start is None or not step:
         return None
-    return float(ranges[round(-start / step) % len(ranges)])
+    return float(ranges[round((-start - lidar_rad) / step) % len(ranges)])
 
 
 def misreading(
@@ -73,7 +78,8 @@ def misreading(
             "Look at the beam straight ahead only, not at min(ranges): its index is "
             "round(-angle_min / angle_increment).",
         )
-    seen = None if scan is None else front(scan)
+    turned_rad = 0.0 if recording.scene is None else recording.scene.lidar.yaw_rad
+    seen = None if scan is None else front(scan, turned_rad)
     if seen == 0.0:
         return Misreading(
             "the beam straight ahead reported 0.0 then, which means that nothing came back",

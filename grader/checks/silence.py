@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from grader.assignment.quantity import format_duration
 from grader.checks import compatibility, testimony
+from grader.checks.blockage import HINT, first_unanswered, where_blocked
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
+from grader.checks.delivery import why_not_delivered
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment
 from grader.checks.topic_absence import why_no_endpoint
+from grader.checks.unanswered import why_raised
 from grader.checks.wording import code, codes, counted, listing
 from grader.recording.model import NS, Endpoint, Kind, LogLine, Owner, Recording
 from grader.submission.record import SourceError
@@ -39,6 +42,7 @@ def why_silent(recording: Recording, topic: str) -> Cause:
     ]
     cause = (
         _other_type(topic, publishers, readers)
+        or _other_definition(recording, topic, publishers)
         or _unmatched(topic, publishers, readers)
         or _held_in_vain(recording, topic)
     )
@@ -47,11 +51,15 @@ def why_silent(recording: Recording, topic: str) -> Cause:
     ended = dead(recording)
     if ended:
         return cause_of_death(recording, ended[0]).after(f"no message on {code(topic)}")
+    asked = _asked_on(recording, topic)
     return (
-        _slow(recording, topic)
+        _undelivered(recording, topic, asked)
+        or (_slow(recording, topic) if not asked else None)
         or _starved(recording, topic)
         or _never_spins(recording, topic)
+        or _blocked(recording, topic)
         or _prints(recording, topic)
+        or _unanswered(recording, topic, asked)
         or _idle(recording, topic)
     )
 
@@ -122,6 +130,19 @@ def _other_type(
     )
 
 
+def _other_definition(
+    recording: Recording, topic: str, publishers: tuple[Endpoint, ...]
+) -> Cause | None:
+    if not recording.misdefined(topic):
+        return None
+    return Cause(
+        f"no message on {code(topic)} could be read: its type {code(publishers[0].type)} has the "
+        "right name, but another definition",
+        "Compare the definition with the one that was asked for: the types, names, array bounds "
+        "and order of its fields must be the same.",
+    )
+
+
 def _unmatched(
     topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
 ) -> Cause | None:
@@ -139,6 +160,13 @@ def _unmatched(
         f"no message on {code(topic)}: the publisher's QoS does not match its reader "
         f"({', '.join(reasons[0])})",
         "A subscription receives nothing from a publisher that offers less than it requests.",
+        Evidence(
+            tables=(
+                compatibility.compatibility_table(
+                    offered=publishers[0].qos, requested=readers[0].qos
+                ),
+            )
+        ),
     )
 
 
@@ -154,6 +182,62 @@ def _held_in_vain(recording: Recording, topic: str) -> Cause | None:
         "be lost",
         ours=True,
         disturbed=True,
+    )
+
+
+def _asked_on(recording: Recording, topic: str) -> tuple[str, ...]:
+    """Topics that the probe publishes on and that a topic answers, as far as it is said."""
+    return tuple(name for name in recording.sent if recording.answers.get(name, topic) == topic)
+
+
+def _undelivered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cause | None:
+    """What the node should answer never reached it."""
+    if not asked or any(recording.sent[name] for name in asked):
+        return None
+    cause = why_not_delivered(recording, asked[0])
+    return cause and cause.after(
+        f"no message on {code(topic)}, because what the node should answer, on {code(asked[0])}, "
+        "never reached it"
+    )
+
+
+def _unanswered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cause | None:
+    """It got what it should answer, and did not."""
+    name = next((name for name in asked if recording.sent[name]), None)
+    if name is None:
+        return None
+    sent = recording.sent[name]
+    seen = (
+        f"no message on {code(topic)}, although {counted(len(sent), 'message')} on {code(name)} "
+        "reached the node"
+    )
+    for process in recording.processes:
+        raised = why_raised(recording, seen, process, sent[0].stamp_ns)
+        if raised is not None:
+            return raised
+    return Cause(
+        seen,
+        "Is publish(msg) reached in the subscription's callback? An `except: pass` hides the error "
+        "that would tell why not.",
+        Evidence(
+            moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
+            places=_interrupted(recording),
+        ),
+    )
+
+
+def _blocked(recording: Recording, topic: str) -> Cause | None:
+    """The node's parameter service tells: it answers only while the executor comes round."""
+    nodes = {item.node for item in recording.student_endpoints(Kind.PUBLISHER, topic)}
+    call = first_unanswered(recording, nodes, recording.launched_ns)
+    if call is None:
+        return None
+    where, evidence = where_blocked(recording, min(nodes), call)
+    return Cause(
+        f"no message on {code(topic)}: something keeps the executor from coming round{where}; the "
+        "node's parameter service answers no call either",
+        HINT,
+        evidence,
     )
 
 
@@ -231,11 +315,7 @@ def _tells_of_publishing(recording: Recording, line: LogLine, words: list[str]) 
 
 
 def _idle(recording: Recording, topic: str) -> Cause:
-    complaints = [
-        line.text
-        for line in recording.log
-        if line.level in ("WARN", "ERROR", "FATAL") or line.stream == "stderr"
-    ]
+    complaints = [line.text for line in recording.log if line.stream == "stderr"]
     evidence = Evidence(places=_interrupted(recording), log=tuple(complaints[-_LOG_LINES:]))
     traced = testimony.traced(recording)
     if traced and not testimony.said(recording, "timer"):

@@ -9,18 +9,18 @@ from pydantic import Field
 from grader.assignment.quantity import Length, PositiveLength, Speed, format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.command import SCAN
+from grader.checks.command import scans
 from grader.checks.contact import why_touched
 from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Finding, Moment, Plot
-from grader.checks.ground import Sight, ahead, nearest
+from grader.checks.ground import Sight, ahead, edge_m, nearest
 from grader.checks.immobility import why_cut_short, why_not_judged, why_not_moved
 from grader.checks.lateness import taken_s
 from grader.checks.measure import metres, speed
 from grader.checks.node_absence import why_no_node
 from grader.checks.scan import misreading
 from grader.checks.track import first_rest, over_time, speed_plot, way_m
-from grader.checks.wording import code
+from grader.checks.wording import code, counted
 from grader.recording.model import NS, Recording, Scene, Truth
 
 _EARLY_HINT = "Which range made it stop? Log the value that the callback compares."
@@ -34,7 +34,7 @@ class Stops(Parameters):
     """Parameters of motion.stops."""
 
     distance: PositiveLength = Field(
-        description="Distance of the obstacle straight ahead, from the LiDAR (the robot's middle)."
+        description="Distance of the obstacle straight ahead, from the LiDAR."
     )
     early: Length = Field(0.03, description="How much farther away it may stop.")
     late: Length = Field(0.05, description="How much nearer it may stop.")
@@ -44,8 +44,8 @@ class Stops(Parameters):
 def stops(recording: Recording, parameters: Stops) -> Finding:
     """The robot stops at the right distance of the obstacle ahead.
 
-    Judged by the true distance from the robot's middle, straight ahead, at the moment it came
-    to rest after it had moved.
+    Judged by the true distance from the LiDAR, straight ahead, at the moment the robot came to
+    rest after it had moved.
 
     Explains a robot that never moved, never stopped or touched something, that stopped for
     something beside it (`min(ranges)`), for a beam without return (0.0 or inf) or because it
@@ -115,13 +115,11 @@ def _early(
     )
     seen = f"stopped early, with {where}"
     evidence = _evidence(recording, scene, rest, parameters)
-    radius_m = scene.radius_m
-    if sight is not None and _near(sight.distance_m - radius_m, parameters):
+    if sight is not None and _near(sight.distance_m - edge_m(scene), parameters):
         return Cause(
-            f"{seen}: {metres(sight.distance_m - radius_m)} from the robot's edge, its radius is "
-            f"{metres(radius_m)}",
-            "Ranges are measured from the LiDAR, in the robot's middle: compare them with the "
-            "distance as they are.",
+            f"{seen}: {metres(sight.distance_m - edge_m(scene))} from the robot's edge, its radius "
+            f"is {metres(scene.radius_m)}",
+            "Ranges are measured from the LiDAR: compare them with the distance as they are.",
             evidence,
         )
     misread = misreading(recording, step.time_ns, nearest(scene, step), parameters.distance)
@@ -155,8 +153,8 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
             ours=True,
             disturbed=True,
         )
-    scans = sum(crossed.time_ns <= scan.stamp_ns <= step.time_ns for scan in recording.on(SCAN))
-    within = f"; {scans} scans told of it meanwhile" if scans else ""
+    told = sum(crossed.time_ns <= scan.stamp_ns <= step.time_ns for scan in scans(recording))
+    within = f"; {counted(told, 'scan')} told of it meanwhile" if told else ""
     return Cause(
         f"{seen}: it came to rest {format_duration(took_s)} after that distance was reached, at up "
         f"to {speed(fastest)}{within}",
@@ -259,10 +257,10 @@ def _from_start(recording: Recording, parameters: StaysAtRest) -> Finding:
         return Finding.passed(expected, f"at rest for {format_duration(watched_s)}, to the end")
     step = truth[moved]
     when_s = recording.since_launch_s(step.time_ns)
-    scans = recording.on(SCAN)
+    seen = scans(recording)
     sight = ahead(recording.scene, step) if recording.scene is not None else None
     where = f", with {code(sight.name)} {metres(sight.distance_m)} ahead" if sight else ""
-    blind = bool(scans) and step.time_ns < scans[0].stamp_ns
+    blind = bool(seen) and step.time_ns < seen[0].stamp_ns
     words = ", before the first scan had come" if blind else ""
     hint = (
         "Publish no speed before the first scan: until then nobody knows what is ahead."

@@ -59,6 +59,26 @@ def never_spun(recording: Recording, process: str | None = None) -> bool:
     return traced(recording, process) and not said(recording, "spin", process)
 
 
+def exiting_ns(recording: Recording, process: str) -> int | None:
+    """When Python began to end in its usual way in the process, or None where it did not."""
+    began = [item for item in recording.declared("started") if item.process == process]
+    # A process may have been started again, and children may have ended under its name.
+    pid = began[-1].data.get("pid") if began else None
+    return next(
+        (
+            item.time_ns
+            for item in recording.declared("exiting")
+            if began and item.process == process and item.data.get("pid") == pid
+        ),
+        None,
+    )
+
+
+def broke_off(recording: Recording, process: str) -> bool:
+    """Whether the tracer was there and Python did not end in its usual way."""
+    return traced(recording, process) and exiting_ns(recording, process) is None
+
+
 def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
     """Timers that the processes declared, in the order of their declaration."""
     found = []

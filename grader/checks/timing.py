@@ -107,7 +107,9 @@ def period(recording: Recording, parameters: Period) -> Finding:
         if ended is not None:
             return ended.finding(expected)
         return Finding.passed(
-            expected, _figures(measured, verdict), _evidence(recording, parameters, measured)
+            expected,
+            _figures(measured, verdict),
+            _evidence(recording, parameters, measured, verdict),
         )
     if judge(forgiven(recording, measured, limits), limits).good:
         taken_s = recording.taken_s(measured[0].begin_ns, measured[-1].end_ns)
@@ -127,7 +129,7 @@ def period(recording: Recording, parameters: Period) -> Finding:
         )
     observed += f": {explanation.words}" if explanation.words else ""
     return Finding.failed(
-        expected, observed, explanation.hint, _evidence(recording, parameters, measured)
+        expected, observed, explanation.hint, _evidence(recording, parameters, measured, verdict)
     )
 
 
@@ -173,8 +175,15 @@ def _figures(measured: tuple[Interval, ...], verdict: Verdict) -> str:
     )
 
 
-def _evidence(recording: Recording, parameters: Period, measured: tuple[Interval, ...]) -> Evidence:
+def _evidence(
+    recording: Recording, parameters: Period, measured: tuple[Interval, ...], verdict: Verdict
+) -> Evidence:
     limits = parameters.limits
+    # Shown is the band that decided: that of the median, or that of the single intervals.
+    if verdict.period_good:
+        middle_s, within_s = verdict.median_s, limits.spread_s
+    else:
+        middle_s, within_s = limits.period_s, limits.median_s
     worst = max(measured, key=lambda item: abs(item.seconds - limits.period_s))
     return Evidence(
         moments=(
@@ -191,9 +200,10 @@ def _evidence(recording: Recording, parameters: Period, measured: tuple[Interval
                 x=tuple(recording.since_launch_s(item.end_ns) for item in measured),
                 y=tuple(item.seconds * _MS for item in measured),
                 band=(
-                    (limits.period_s - limits.spread_s) * _MS,
-                    (limits.period_s + limits.spread_s) * _MS,
+                    (middle_s - within_s) * _MS,
+                    (middle_s + within_s) * _MS,
                 ),
+                histogram=True,
             ),
         ),
     )

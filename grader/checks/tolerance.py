@@ -6,9 +6,15 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, core_schema
 
-from grader.assignment.quantity import UNITS, Dimension, format_duration, parse_quantity
+from grader.assignment.quantity import (
+    UNITS,
+    Dimension,
+    format_duration,
+    parse_quantity,
+    refusal,
+)
 from grader.checks.wording import percent
 
 
@@ -70,7 +76,7 @@ class _Annotation:
             try:
                 return parse_time_tolerance(value)
             except ValueError as error:
-                raise PydanticCustomError("quantity", "{text}", {"text": str(error)}) from None
+                raise refusal(str(error)) from None
 
         return core_schema.no_info_plain_validator_function(
             read, serialization=core_schema.to_string_ser_schema()

@@ -42,6 +42,14 @@ def way_m(truth: Sequence[Truth]) -> float:
     return sum(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in pairwise(truth))
 
 
+def gone_ahead_m(truth: Sequence[Truth]) -> float:
+    """Way that was driven ahead; what was driven backwards is taken off."""
+    return sum(
+        math.copysign(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m), b.linear_m_s)
+        for a, b in pairwise(truth)
+    )
+
+
 def turned_rad(truth: Sequence[Truth]) -> float:
     """Net turn along the path, counter-clockwise, full turns counted."""
     return sum(wrap_angle(b.yaw_rad - a.yaw_rad) for a, b in pairwise(truth))

@@ -26,6 +26,7 @@ _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or
 # Way that braking and the delay of odometry may still cost after the position is reached.
 _RUN_OUT_M = 0.02
 _OFF_RAD = 0.5
+_STRAIGHT_RAD_S = 0.01
 _PAUSE_NS = NS // 5
 _WRAP_HINT = (
     "An angle error beyond [-pi, pi] makes the long way of the short one: normalise it with "
@@ -46,9 +47,9 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     """At the goal's position the robot only turns, it no longer drives.
 
     Judged by the commands in force and the true way. Within `position` of the goal the robot
-    may drive on towards it, as far as its own tolerance says; but while it turns away from the
-    goal, or once it has turned without driving, it may not drive any more (2 cm are allowed for
-    braking and the delay of odometry).
+    may drive on towards it, as far as its own tolerance says, and turn on the spot towards it;
+    but while it turns away from the goal's position, or once it has done so without driving, it
+    may not drive any more (2 cm are allowed for braking and the delay of odometry).
 
     Explains why the position was not reached, a speed in the second phase, and driving and
     turning by turns.
@@ -92,14 +93,25 @@ def _stray(run: Approach, arrival: int, none_m_s: float) -> list[tuple[Truth, Tr
     for before, after in pairwise(run.truth[arrival:]):
         if abs(after.command_m_s) <= none_m_s:
             still_since = still_since or after.time_ns
-            turning |= after.time_ns - still_since >= _PAUSE_NS
+            turning |= after.time_ns - still_since >= _PAUSE_NS and _turns_away(run, after)
             continue
         still_since = None
-        # In the first phase it turns towards the goal, also where it comes in by a curve.
-        error_rad = run.bearing_error_rad(after)
-        if turning or (abs(error_rad) > _OFF_RAD and error_rad * after.command_rad_s <= 0.0):
+        if turning or _turns_away(run, after):
             found.append((before, after))
     return found
+
+
+def _turns_away(run: Approach, step: Truth) -> bool:
+    """Whether it turns away from the goal's position, as no robot on its way there does.
+
+    In the first phase it turns towards the goal, also where it comes in by a curve; one that
+    drives straight past the goal overshoots, but does not align yet.
+    """
+    error_rad, turn_rad_s = run.bearing_error_rad(step), step.command_rad_s
+    return (
+        abs(error_rad) > _OFF_RAD and abs(turn_rad_s) > _STRAIGHT_RAD_S
+        and error_rad * turn_rad_s < 0.0
+    )  # fmt: skip
 
 
 def _way_m(before: Truth, after: Truth) -> float:
@@ -143,7 +155,8 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     second (once driving has ended near the goal) against the goal's heading. The long way
     leads away from the error and through half a turn; overshooting by less is no long way.
 
-    Explains where it turned the long way, from which error, and why the robot never moved.
+    Explains where it turned the long way, from which error, and why the robot never moved or
+    never came to the goal.
     """
     expected = "turns by the short way, never more than half a turn for an error"
     run = approach(recording, parameters.goal)
@@ -152,9 +165,11 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     detours = list(_detours(run, parameters))
     evidence = Evidence(plots=(run.heading_plot,))
     if not detours:
-        deeper = why_cut_short(recording)
-        if deeper is not None and run.arrival(parameters.position) is None:
-            return deeper.finding(expected)
+        # One that drives off has shown nothing of how it turns to this goal.
+        arrived = run.arrival(parameters.position) is not None
+        cause = None if arrived else why_not_there(run, parameters.position)
+        if cause is not None:
+            return cause.finding(expected)
         return Finding.passed(expected, "no long way", evidence)
     first = detours[0]
     when_s = recording.since_launch_s(first.step.time_ns)

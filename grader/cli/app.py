@@ -13,10 +13,14 @@ import typer
 from grader import __version__
 from grader.cli import (
     assignments,
+    batch,
     catalogue,
     check,
     doctor,
+    export,
     regrade,
+    replay,
+    report,
     selftest,
     sim,
 )
@@ -56,7 +60,11 @@ def _options(
 app.command("list")(assignments.list_command)
 app.command("show")(assignments.show)
 app.command("check")(check.check)
+app.command("batch")(batch.batch)
 app.command("regrade")(regrade.regrade)
+app.command("report")(report.report)
+app.command("replay")(replay.replay)
+app.add_typer(export.app, name="export")
 app.command("selftest")(selftest.selftest)
 app.command("validate")(catalogue.validate)
 app.command("schema")(catalogue.schema)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.console import output_console, print_error
+from grader.cli.console import output_console, print_error, print_warning
 from grader.errors import RosgradeError
 
 
@@ -26,6 +26,7 @@ def validate(
     ],
 ) -> None:
     """Check assignments without running anything: file, line, and what is allowed."""
+    from grader.assignment.doubts import doubts
     from grader.assignment.load import load_assignment
     from grader.assignment.mutation import MUTANTS_FILE, load_mutants
 
@@ -39,6 +40,8 @@ def validate(
             print_error(str(error))
             broken += 1
             continue
+        for doubt in doubts(loaded, mutants.mutants if mutants else None):
+            print_warning(f"{loaded.file}: {doubt}")
         tested = f", {len(mutants.mutants)} mutants" if mutants else ""
         typer.echo(
             f"{loaded.file}: {len(loaded.assignment.scenarios)} scenarios, "

@@ -7,7 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from grader.cli.console import Progress, cache_folder, output_console
+from grader.cli.console import Progress, output_console
+from grader.cli.formats import (
+    Classroom50,
+    Formats,
+    Github,
+    GradescopeFile,
+    GradescopeMetadata,
+    JunitFamily,
+    JunitFamilyName,
+    JunitFile,
+    MarkdownFile,
+)
+from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
+from grader.resources import cache_folder
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,6 +49,21 @@ def check(
     seed: Annotated[
         int | None, typer.Option(help="Seed of all random values; by default the submission's.")
     ] = None,
+    hidden: Annotated[
+        bool,
+        typer.Option("--hidden", help="Run and show the hidden checks too: for instructors."),
+    ] = False,
+    junit: JunitFile = None,
+    junit_family: JunitFamilyName = JunitFamily.XUNIT2,
+    markdown: MarkdownFile = None,
+    gradescope: GradescopeFile = None,
+    gradescope_metadata: GradescopeMetadata = None,
+    github: Github = False,
+    classroom50: Classroom50 = False,
+    sandbox: SandboxChoice = Choice.AUTO,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep what colcon installed, in the report's folder.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
     open_report: Annotated[
         bool, typer.Option("--open", help="Open the report in a browser.")
@@ -50,34 +78,48 @@ def check(
     from grader.run.runner import Runner
 
     clock = Clock()
-    progress = Progress(quiet)
-    runner = Runner(ros.find(), progress=_narrator(progress))
-    runner.get_ready()
-    try:
-        # Imported while the cell gets ready.
-        from grader.assignment.load import load_assignment
-        from grader.assignment.selection import select
-        from grader.batch.files import write_graded
-        from grader.batch.grading import RECORDINGS_FOLDER, Grading
-        from grader.report.terminal import print_grade
-        from grader.submission.locate import check_path
+    formats = Formats(
+        junit, junit_family, markdown, gradescope, gradescope_metadata, github, classroom50
+    )
+    with formats.grading():
+        progress = Progress(quiet)
+        installation = ros.find()
+        runner = Runner(
+            installation,
+            progress=_narrator(progress),
+            sandbox=chosen_sandbox(sandbox, progress),
+        )
+        runner.get_ready()
+        try:
+            # Imported while the cell gets ready.
+            from grader.assignment.load import load_assignment
+            from grader.assignment.selection import select, visible_part
+            from grader.batch.files import keep_install, write_graded
+            from grader.batch.grading import RECORDINGS_FOLDER, Grading
+            from grader.report.terminal import print_grade
+            from grader.submission.locate import check_path
 
-        loaded = select(load_assignment(assignment), tuple(only or ()), tuple(scenario or ()))
-        check_path(submission)
-        grading = Grading(loaded, runner, cache_folder(), seed=seed)
-        with progress.shown():
-            progress.say(f"reading {submission}")
-            graded = grading.grade(submission, report / RECORDINGS_FOLDER, progress.say)
-    finally:
-        runner.abort()
-    written = write_graded(graded, report, clock, json_file)
-    console = output_console()
-    print_grade(console, graded.grade)
-    console.print(f"Report: {written}", soft_wrap=True)
+            whole = load_assignment(assignment)
+            shown = whole if hidden else visible_part(whole)
+            loaded = select(shown, tuple(only or ()), tuple(scenario or ()))
+            check_path(submission)
+            grading = Grading(loaded, runner, cache_folder(), seed=seed)
+            with progress.shown():
+                progress.say(f"reading {submission}")
+                graded = grading.grade(submission, report / RECORDINGS_FOLDER, progress.say)
+        finally:
+            runner.close()
+        written = write_graded(graded, report, clock, json_file)
+        console = output_console()
+        print_grade(console, graded.grade)
+        console.print(f"Report: {written.report}", soft_wrap=True)
+        if keep:
+            console.print(f"Installed: {keep_install(graded, report)}", soft_wrap=True)
+    formats.write(written.result, submission)
     if open_report:
-        typer.launch(written.resolve().as_uri())
+        typer.launch(written.report.resolve().as_uri())
     grade = graded.grade
-    status = FULL_POINTS if grade.full_points else POINTS_LOST
+    status = FULL_POINTS if grade.full_points or classroom50 else POINTS_LOST
     raise typer.Exit(status if grade.graded else NOT_GRADED)
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,17 +20,20 @@ def output_console() -> Console:
 
 def print_error(message: str) -> None:
     """One message on standard error."""
+    _print("rosgrade: error: ", "bold red", message)
+
+
+def print_warning(message: str) -> None:
+    """One message on standard error that stops nothing."""
+    _print("rosgrade: warning: ", "bold yellow", message)
+
+
+def _print(label: str, style: str, message: str) -> None:
     from rich.console import Console
     from rich.text import Text
 
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
-    console.print(Text.assemble(("rosgrade: error: ", "bold red"), message))
-
-
-def cache_folder() -> Path:
-    """Folder for builds that may be deleted at any time (XDG Base Directory)."""
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "rosgrade"
+    console.print(Text.assemble((label, style), message))
 
 
 class Progress:

@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from grader.cli.console import output_console
+from grader.cli.progress import ClassProgress
+
+NOT_GRADED = 3
 
 
 def regrade(
     path: Annotated[
-        Path, typer.Argument(help="A report folder, its recordings folder, or one .mcap file.")
+        Path,
+        typer.Argument(
+            help="The folder of a batch or of a report, its recordings folder, or one .mcap file."
+        ),
     ],
     assignment: Annotated[
         str | None,
         typer.Argument(help="Id or folder; by default the one that the result names."),
     ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
     """Judge again from the recordings, with the YAML as it is now. Nothing is run.
 
-    Says what changed, and writes report and result anew where there were some.
+    Says what changed and why, and writes reports and results anew where there were some; of a
+    class, the results until now are kept beside them.
     """
+    from grader.batch.ledger import BATCH_FILE
+
+    if (path / BATCH_FILE).is_file():
+        _class(path, assignment, quiet)
+    else:
+        _one(path, assignment)
+
+
+def _one(path: Path, assignment: str | None) -> None:
     from grader.assignment.load import load_assignment
     from grader.batch.files import write_graded
     from grader.batch.regrading import compare, find
@@ -39,6 +57,41 @@ def regrade(
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
             console.print(line, markup=False)
-        console.print(f"Report: {write_graded(graded, found.folder, clock)}", soft_wrap=True)
+        written = write_graded(graded, found.folder, clock)
+        console.print(f"Report: {written.report}", soft_wrap=True)
     grade = graded.grade
-    raise typer.Exit(3 if not grade.graded else 0 if grade.full_points else 1)
+    raise typer.Exit(NOT_GRADED if not grade.graded else 0 if grade.full_points else 1)
+
+
+def _class(path: Path, assignment: str | None, quiet: bool) -> None:
+    from grader.assignment.load import load_assignment
+    from grader.batch.class_files import GRADES_FILE, write_class
+    from grader.batch.class_regrading import regrade_class
+    from grader.batch.ledger import Ledger
+
+    console = output_console()
+    began_s = time.monotonic()
+    rows = []
+    with Ledger(path).opened() as ledger, ClassProgress(quiet) as progress:
+        name, entries = ledger.read()
+        progress.begin("judging", len(entries))
+        for row in regrade_class(load_assignment(assignment or name), ledger):
+            rows.append(row)
+            progress.advance(row.done.entry.key)
+        overview = write_class([row.done for row in rows], ledger)
+    for row in rows:
+        for change in row.changes:
+            console.print(f"{row.done.entry.key}: {change}", soft_wrap=True)
+    gain = [row for row in rows if row.gained > 0]
+    lose = [row for row in rows if row.gained < 0]
+    console.print(
+        f"{len(rows)} judged again in {time.monotonic() - began_s:.1f} s: {len(gain)} gain "
+        f"{sum(row.gained for row in gain):g} points, {len(lose)} lose "
+        f"{-sum(row.gained for row in lose):g} points, "
+        f"{sum(bool(row.changes) for row in rows)} with a change",
+        soft_wrap=True,
+    )
+    console.print(f"Overview: {overview}", soft_wrap=True)
+    console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
+    graded = all(row.done.result is None or row.done.result.graded for row in rows)
+    raise typer.Exit(0 if graded else NOT_GRADED)

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.console import Progress, cache_folder, output_console
+from grader.cli.console import Progress, output_console
+from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
+from grader.resources import cache_folder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,6 +23,11 @@ def selftest(
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Submissions at once; by default two per CPU.")
     ] = None,
+    record: Annotated[
+        bool,
+        typer.Option("--record", help="Grade only the reference, and keep its runs for reports."),
+    ] = False,
+    sandbox: SandboxChoice = Choice.AUTO,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
 ) -> None:
     """Grade the reference, the variants and the mutants of an assignment.
@@ -31,25 +38,37 @@ def selftest(
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
     from grader.batch.grading import Grading
-    from grader.batch.selftest import mutation_score
+    from grader.batch.reference_run import keep_reference
+    from grader.batch.selftest import Role, mutation_score
     from grader.batch.selftest import selftest as run_selftest
-    from grader.run.admission import cpu_count
+    from grader.run.load import cpu_count
     from grader.run.runner import Runner
 
     console = output_console()
     perfect = True
+    chosen = chosen_sandbox(sandbox, Progress(quiet))
     for name in assignments or list_assignments():
         loaded = load_assignment(name)
-        runner = Runner(ros.find())
-        grading = Grading(loaded, runner, cache_folder())
         results: list[TrialResult] = []
-        with Progress(quiet).shown() as progress:
-            for result in run_selftest(loaded, grading, jobs=jobs or 2 * cpu_count()):
+        with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
+            grading = Grading(loaded, runner, cache_folder())
+            for result in run_selftest(
+                loaded,
+                grading,
+                jobs=jobs or 2 * cpu_count(),
+                chosen=lambda trial: not record or trial.role is Role.REFERENCE,
+            ):
                 results.append(result)
                 progress.say(
                     f"{loaded.assignment.id}: {len(results)} graded, last {result.trial.id}",
                     passing=True,
                 )
+        if record:
+            console.print(
+                keep_reference(loaded, results[0].graded.grade, results[0].graded.recordings),
+                soft_wrap=True,
+            )
+            continue
         score = mutation_score(results)
         perfect = perfect and score.perfect
         _print(console, loaded.assignment.id, results)

@@ -22,11 +22,15 @@ def sim(
     duration: Annotated[
         float | None, typer.Option(help="End after so many simulated seconds.")
     ] = None,
+    values: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value of the world.")
+    ] = None,
 ) -> None:
     """Simulate a robot in a world in real time, with a live view, until Ctrl-C.
 
     It listens to /cmd_vel and speaks on /odom and /scan, like a TurtleBot3 in Gazebo.
     """
+    from sim.__main__ import read_values
     from sim.live import run
 
     run(
@@ -36,5 +40,6 @@ def sim(
         pose=pose,
         seed=seed,
         domain_id=domain_id,
+        values=read_values(values or []),
         duration_s=duration,
     )

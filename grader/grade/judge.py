@@ -63,7 +63,7 @@ def grade(
         )
         results[name] = _result(bound[name], loaded, findings, roots)
     ordered = tuple(results[name] for name in bound)
-    return Grade(loaded.assignment, loaded.sha256, submission, ordered)
+    return Grade(loaded.assignment, loaded.sha256, submission, ordered, loaded.withheld)
 
 
 def _result(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.assignment.model import Assignment, Visibility
+from grader.assignment.withheld import Withheld
 from grader.checks.finding import Finding, Status
 from grader.grade.points import total
 from grader.submission.record import SubmissionRecord
@@ -75,12 +76,14 @@ class Grade:
         assignment_sha256: Hash of its files, as hex.
         submission: What was handed in.
         results: One per check, in the author's order.
+        withheld: Checks that were not judged because a student does not get to see them yet.
     """
 
     assignment: Assignment
     assignment_sha256: str
     submission: SubmissionRecord
     results: tuple[CheckResult, ...]
+    withheld: Withheld = Withheld()
 
     @property
     def graded(self) -> bool:

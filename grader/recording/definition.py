@@ -25,13 +25,15 @@ def definition_finder(prefixes: Iterable[Path]) -> Callable[[str], str]:
         prefixes: ament prefixes, the first wins.
 
     Returns:
-        A function from ``package/msg/Name`` to the file's text; KeyError if there is none.
+        A function from ``package/msg/Name`` (or ``srv``, ``action``) to the file's text; KeyError
+        if there is none.
     """
     folders = tuple(prefixes)
 
     def find(interface: str) -> str:
         for prefix in folders:
-            file = prefix / "share" / f"{interface}.msg"
+            kind = interface.split("/")[1]
+            file = prefix / "share" / f"{interface}.{kind}"
             if file.is_file():
                 return file.read_text(encoding="utf-8")
         raise KeyError(interface)

@@ -15,13 +15,17 @@ from mcap_ros2.decoder import DecoderFactory
 from pydantic import TypeAdapter
 
 from grader.errors import UsageError
-from grader.recording.mcap_writer import CHANNELS, FORMAT
+from grader.recording.interaction import Goal, Service
+from grader.recording.mcap_writer import CHANNELS, FORMAT, JOIN, SENT, TOPIC
 from grader.recording.model import (
+    Breach,
     Call,
     Declaration,
     Disturbance,
     Endpoint,
     Incident,
+    Intervention,
+    Join,
     LogLine,
     Message,
     Node,
@@ -39,7 +43,12 @@ _FACTS: dict[str, type] = {
     "log": LogLine,
     "declarations": Declaration,
     "calls": Call,
+    "services": Service,
+    "goals": Goal,
     "waits": Wait,
+    "joins": Join,
+    "interventions": Intervention,
+    "breaches": Breach,
     "disturbance": Disturbance,
     "truth": Truth,
     "incidents": Incident,
@@ -83,6 +92,8 @@ def _read(stream: Any) -> Recording:
     frame = _frame(reader)
     facts: dict[str, list[Any]] = {name: [] for name in CHANNELS}
     messages: dict[str, list[Message]] = {}
+    sent: dict[str, list[Message]] = {topic: [] for topic in frame.pop("sent", ())}
+    joined: dict[str, list[Message]] = {}
     factory = DecoderFactory()
     for schema, channel, message in reader.iter_messages(log_time_order=False):
         if channel.message_encoding == "json":
@@ -94,16 +105,20 @@ def _read(stream: Any) -> Recording:
         decode = factory.decoder_for(channel.message_encoding, schema)
         if decode is None or schema is None:
             continue
-        messages.setdefault(channel.topic, []).append(
-            Message(
-                topic=channel.topic,
-                type=schema.name,
-                value=_fields(decode(message.data)),
-                stamp_ns=message.publish_time,
-                received_ns=message.log_time,
-                sequence=message.sequence,
-            )
+        found = Message(
+            topic=channel.metadata.get(TOPIC, channel.topic),
+            type=schema.name,
+            value=_fields(decode(message.data)),
+            stamp_ns=message.publish_time,
+            received_ns=message.log_time,
+            sequence=message.sequence,
         )
+        join = channel.metadata.get(JOIN)
+        if join is not None:
+            joined.setdefault(join, []).append(found)
+        else:
+            topics = sent if SENT in channel.metadata else messages
+            topics.setdefault(found.topic, []).append(found)
     ordered = {
         name: tuple(fact for _, fact in sorted(items, key=lambda item: item[0]))
         for name, items in facts.items()
@@ -113,13 +128,62 @@ def _read(stream: Any) -> Recording:
             **frame,
             **ordered,
             "submission": _submission(reader),
-            "messages": {
-                topic: tuple(sorted(items, key=lambda m: (m.stamp_ns, m.sequence)))
-                for topic, items in messages.items()
-            },
+            "messages": _in_order(messages),
+            "sent": _in_order(sent),
+            "joined": {name: tuple(items) for name, items in joined.items()},
         }
     )
     return recording
+
+
+def _in_order(messages: Mapping[str, list[Message]]) -> dict[str, tuple[Message, ...]]:
+    return {
+        topic: tuple(sorted(items, key=lambda m: (m.stamp_ns, m.sequence)))
+        for topic, items in messages.items()
+    }
+
+
+def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, ...]]:
+    """Read the messages on one topic of any MCAP file with messages of ROS 2.
+
+    Args:
+        file: Such as a bag that ``ros2 bag record --storage mcap`` made.
+        topic: Fully qualified topic name.
+
+    Returns:
+        The messages in the order of their reception, and the names of all topics.
+
+    Raises:
+        OSError: The file cannot be read.
+        ValueError: It is damaged, or no MCAP file.
+    """
+    factory = DecoderFactory()
+    found = []
+    with file.open("rb") as stream:
+        try:
+            reader = make_reader(stream)
+            summary = reader.get_summary()
+            channels = summary.channels.values() if summary else ()
+            topics = tuple(sorted({channel.topic for channel in channels}))
+            for schema, channel, message in reader.iter_messages(topics=[topic]):
+                decode = factory.decoder_for(channel.message_encoding, schema)
+                if decode is None or schema is None:
+                    continue
+                found.append(
+                    Message(
+                        topic,
+                        schema.name,
+                        _fields(decode(message.data)),
+                        message.publish_time,
+                        message.log_time,
+                        message.sequence,
+                    )
+                )
+        except Exception as error:
+            # As in read_recording: damage has many faces.
+            reason = str(error).partition("\n")[0] or type(error).__name__
+            raise ValueError(f"no MCAP file that can be read: {reason}") from error
+    return tuple(found), topics
 
 
 def _frame(reader: Any) -> dict[str, Any]:

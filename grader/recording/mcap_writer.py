@@ -20,7 +20,10 @@ from mcap.writer import CompressionType, Writer
 from grader.recording.fact import to_json
 from grader.recording.model import Recording
 
-FORMAT = "1"
+# Metadata of a channel of messages.
+JOIN, TOPIC, SENT = "rosgrade_join", "rosgrade_topic", "rosgrade_sent"
+
+FORMAT = "2"
 """Version of the layout; a reader refuses another one."""
 
 CHANNELS: dict[str, str] = {
@@ -30,7 +33,12 @@ CHANNELS: dict[str, str] = {
     "log": "time_ns",
     "declarations": "time_ns",
     "calls": "requested_ns",
+    "services": "appeared_ns",
+    "goals": "sent_ns",
     "waits": "began_ns",
+    "joins": "joined_ns",
+    "interventions": "time_ns",
+    "breaches": "time_ns",
     "disturbance": "time_ns",
     "truth": "time_ns",
     "incidents": "time_ns",
@@ -49,6 +57,8 @@ class RawMessage:
         stamp_ns: Source timestamp.
         received_ns: When the reader had it.
         sequence: The writer's sequence number.
+        join: Name of the late joiner that received it, or empty.
+        is_sent: Whether the probe published it.
     """
 
     topic: str
@@ -57,6 +67,8 @@ class RawMessage:
     stamp_ns: int
     received_ns: int
     sequence: int
+    join: str = ""
+    is_sent: bool = False
 
 
 def write_recording(
@@ -124,16 +136,25 @@ def _write(
 def _write_messages(
     writer: Writer, messages: Iterable[RawMessage], definitions: Mapping[str, str]
 ) -> None:
-    channels: dict[tuple[str, str], int] = {}
+    channels: dict[tuple[str, str, str, bool], int] = {}
     schemas: dict[str, int] = {}
     for message in messages:
-        key = (message.topic, message.type)
+        key = (message.topic, message.type, message.join, message.is_sent)
         if key not in channels:
             if message.type not in schemas:
                 schemas[message.type] = writer.register_schema(
                     message.type, "ros2msg", definitions[message.type].encode()
                 )
-            channels[key] = writer.register_channel(message.topic, "cdr", schemas[message.type])
+            channels[key] = writer.register_channel(
+                f"/rosgrade/joins/{message.join}" if message.join else message.topic,
+                "cdr",
+                schemas[message.type],
+                {JOIN: message.join, TOPIC: message.topic}
+                if message.join
+                else {SENT: "true"}
+                if message.is_sent
+                else {},
+            )
         writer.add_message(
             channels[key], message.received_ns, message.cdr, message.stamp_ns, message.sequence
         )
@@ -151,6 +172,8 @@ def _frame(recording: Recording) -> dict[str, str]:
         "end_ns": recording.end_ns,
         "faults": list(recording.faults),
         "values": dict(recording.values),
+        "sent": sorted(recording.sent),
+        "answers": dict(recording.answers),
         "scene": dataclasses.asdict(recording.scene) if recording.scene else None,
         "environment": dict(recording.environment),
     }

@@ -13,7 +13,10 @@ from enum import Enum
 from functools import cached_property
 from typing import Any
 
+from grader.recording.interaction import Goal, Service
 from grader.submission.record import SubmissionRecord
+from sim.motion import ORIGIN, Pose
+from sim.script import MovingObstacle
 
 NS = 1_000_000_000
 
@@ -45,7 +48,7 @@ class Ending(str, Enum):
     NO_NODE = "no_node"
     """No node of the student appeared within the discovery limit."""
     NO_MATCH = "no_match"
-    """Nodes appeared, but no endpoint on a recorded topic."""
+    """Nodes appeared, but no endpoint on a topic that is recorded or that a stimulus uses."""
     NOT_STARTED = "not_started"
     """Nothing could be launched: the executable does not exist."""
     FAULT = "fault"
@@ -106,6 +109,7 @@ class Endpoint:
         owner: Whose it is.
         qos: As discovered.
         gid: DDS identifier as hex.
+        type_hash: Of the interface's definition (REP-2011), or empty where it is not told.
         appeared_ns: First time it was seen.
         vanished_ns: First time it was missing again, or None.
     """
@@ -119,6 +123,7 @@ class Endpoint:
     gid: str
     appeared_ns: int
     vanished_ns: int | None = None
+    type_hash: str = ""
 
 
 @dataclass(frozen=True)
@@ -200,7 +205,8 @@ class Declaration:
         time_ns: When the probe read it.
         process: ``package/executable``.
         kind: ``started``, ``node``, ``publisher``, ``subscription``, ``timer``, ``spin``,
-            ``executor``, ``callback_group``, ``held`` (a publisher waited for its match).
+            ``executor``, ``callback_group``, ``held`` (a publisher waited for its match),
+            ``exiting`` (Python ends in its usual way).
         data: For publisher and subscription: node, topic, type, reliability, durability,
             history, depth. For timer: node, period_s, callback, group. For spin: executor,
             threads. For held: topic, waited_s, matched.
@@ -221,12 +227,83 @@ class Call:
         type: Interface name.
         requested_ns: When the request was sent.
         answered_ns: When the answer was there, or None if there was none by the end.
+        request: Fields of the request; of the calls to ``list_parameters`` they are not kept.
+        response: Fields of the response, or None.
+        error: Why it could not be sent or read: ``no server``, or what of ours went wrong.
     """
 
     service: str
     type: str
     requested_ns: int
     answered_ns: int | None = None
+    request: Mapping[str, Any] | None = None
+    response: Mapping[str, Any] | None = None
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class Join:
+    """A subscription of the probe that was created in the middle of the run.
+
+    Attributes:
+        name: What its messages are recorded under.
+        topic: Fully qualified topic name.
+        type: Interface name.
+        qos: As requested.
+        joined_ns: When it was created.
+        matched_ns: When a publisher had matched it, or None.
+    """
+
+    name: str
+    topic: str
+    type: str
+    qos: Qos
+    joined_ns: int
+    matched_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Intervention:
+    """Something that the probe did to a process of the student because the scenario says so.
+
+    Attributes:
+        time_ns: When.
+        process: ``package/executable``.
+        action: ``kill`` (a signal was sent) or ``restart`` (it was started again).
+        signal: Name of the signal, or empty.
+    """
+
+    time_ns: int
+    process: str
+    action: str
+    signal: str = ""
+
+
+@dataclass(frozen=True)
+class Breach:
+    """A limit of the sandbox that the student's processes reached.
+
+    Attributes:
+        time_ns: When it was first seen.
+        what: ``memory``, ``processes``, ``sessions``, ``output``, ``disk``, ``shared memory``,
+            ``files in disk`` or ``files in shared memory``.
+        taken: Such as ``1056 MiB of memory``.
+        allowed: Such as ``1024 MiB``.
+    """
+
+    time_ns: int
+    what: str
+    taken: str
+    allowed: str
+
+    @property
+    def ended(self) -> bool:
+        """Whether the processes were ended for it; the kernel itself bounds the others."""
+        return self.what in ("memory", "sessions", "output")
+
+    def __str__(self) -> str:
+        """Say it in words."""
+        return f"its processes took {self.taken}, {self.allowed} are allowed"
 
 
 @dataclass(frozen=True)
@@ -298,11 +375,13 @@ class Incident:
         kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout`` or
             ``late`` (steps that the host did not let us do in time and that were caught up).
         text: For people.
+        value: For ``late`` how late in seconds, else None.
     """
 
     time_ns: int
     kind: str
     text: str
+    value: float | None = None
 
 
 @dataclass(frozen=True)
@@ -314,18 +393,25 @@ class Scene:
         max_linear_m_s: Limit of the robot.
         max_angular_rad_s: Limit of the robot.
         outlines: Name of each thing that stands still -> its capsules: x1, y1, x2, y2, radius.
-        moving: Name of each thing that moves -> its places, every 0.1 s from the start of the
-            simulation: x, y, yaw, or None while it is not there; with its radius (a box is
-            drawn as the circle around it).
+        moving: Everything that moves, with its shape and its script; where it is at a time is
+            a pure function of simulated time.
         began_ns: When simulated time began.
+        lidar: Where the LiDAR sits, in the robot's frame.
+        command_topic: The velocity commands that the robot obeys.
+        odometry_topic: Where it tells its odometry.
+        scan_topic: Where it tells its scans.
     """
 
     radius_m: float
     max_linear_m_s: float
     max_angular_rad_s: float
     outlines: Mapping[str, tuple[tuple[float, float, float, float, float], ...]]
-    moving: Mapping[str, tuple[float, tuple[tuple[float, float, float] | None, ...]]]
+    moving: tuple[MovingObstacle, ...]
     began_ns: int
+    lidar: Pose = ORIGIN
+    command_topic: str = "/cmd_vel"
+    odometry_topic: str = "/odom"
+    scan_topic: str = "/scan"
 
 
 @dataclass(frozen=True)
@@ -342,12 +428,20 @@ class Recording:
         end_ns: When everything had ended.
         submission: What was known before the run.
         messages: By topic, in the order of their source timestamps.
+        sent: What the probe published, by topic, in that order; a topic on which it should have
+            published, but on which no subscription of the student's ever matched, has none.
+        answers: Topic in ``sent`` -> topic on which the answers are expected, where the scenario
+            names one.
+        joined: What late joiners received, by their names, in the order of their reception.
+        services: What the student's nodes offer.
+        goals: Goals that the probe sent.
         faults: What of ours or of the machine went wrong, one sentence each.
         truth: The simulated robot, step by step; empty in a scenario without a world.
         incidents: What the simulator noted.
         scene: World and robot, or None in a scenario without a world.
         values: Random values of the scenario by name, in SI units.
-        environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...
+        environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; where it
+            is known and there are any, ``other_domains`` that the student joined.
     """
 
     scenario: str
@@ -359,13 +453,21 @@ class Recording:
     submission: SubmissionRecord
     matched_ns: int | None = None
     messages: Mapping[str, tuple[Message, ...]] = field(default_factory=dict)
+    sent: Mapping[str, tuple[Message, ...]] = field(default_factory=dict)
+    answers: Mapping[str, str] = field(default_factory=dict)
+    joined: Mapping[str, tuple[Message, ...]] = field(default_factory=dict)
     nodes: tuple[Node, ...] = ()
     endpoints: tuple[Endpoint, ...] = ()
     processes: tuple[Process, ...] = ()
     log: tuple[LogLine, ...] = ()
     declarations: tuple[Declaration, ...] = ()
     calls: tuple[Call, ...] = ()
+    services: tuple[Service, ...] = ()
+    goals: tuple[Goal, ...] = ()
     waits: tuple[Wait, ...] = ()
+    joins: tuple[Join, ...] = ()
+    interventions: tuple[Intervention, ...] = ()
+    breaches: tuple[Breach, ...] = ()
     disturbance: tuple[Disturbance, ...] = ()
     faults: tuple[str, ...] = ()
     truth: tuple[Truth, ...] = ()
@@ -377,6 +479,10 @@ class Recording:
     def on(self, topic: str) -> tuple[Message, ...]:
         """Messages on a topic, oldest first."""
         return self.messages.get(topic, ())
+
+    def carried(self, topic: str) -> tuple[Message, ...]:
+        """Messages that a subscription to the topic could get: recorded, or sent by the probe."""
+        return self.on(topic) or self.sent.get(topic, ())
 
     @cached_property
     def student_nodes(self) -> tuple[Node, ...]:
@@ -392,6 +498,17 @@ class Recording:
             and endpoint.kind is kind
             and topic in (None, endpoint.topic)
         )
+
+    def misdefined(self, topic: str) -> bool:
+        """Whether the student publishes another definition of the type that the probe reads.
+
+        The middleware lets such endpoints meet, for their types have the same name.
+        """
+        ends = [item for item in self.endpoints if item.topic == topic and item.type_hash]
+        ours = {(e.type, e.type_hash) for e in ends if e.owner is Owner.PROBE}
+        theirs = (e for e in ends if e.owner is Owner.STUDENT and e.kind is Kind.PUBLISHER)
+        types = {name for name, _ in ours}
+        return any(e.type in types and (e.type, e.type_hash) not in ours for e in theirs)
 
     def declared(self, kind: str) -> tuple[Declaration, ...]:
         """Declarations of a kind."""

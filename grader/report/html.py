@@ -1,12 +1,12 @@
-"""The HTML report: one file that needs no network and no JavaScript.
+"""The HTML report: one file that needs no network, and no JavaScript to be read.
 
 Whatever a student chose is untrusted: every value is cleaned of control characters and escaped
-on its way into the page, and the page's own policy forbids scripts and requests besides.
+on its way into the page, and the page's own policy forbids requests and every script and style
+but its own, which it names by their hashes.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -19,41 +19,80 @@ from grader.checks.wording import counted
 from grader.grade.model import Grade
 from grader.recording.model import NS, Recording
 from grader.report import words
+from grader.report.build_log import arrange
+from grader.report.callbacks import draw_callbacks
+from grader.report.cases import draw_cases
 from grader.report.clean import clean
+from grader.report.comparison import align
 from grader.report.facts import RunFacts
-from grader.report.plot import draw_plot
-from grader.report.sections import ENDINGS, Section, make_sections, shorten
-from grader.report.svg import Figure
-from grader.report.timeline import draw_timeline
+from grader.report.pictures import Gallery, draw_run, draw_shares
+from grader.report.policy import content_security_policy
+from grader.report.replay import Replay, embedded, make_replay
+from grader.report.sections import ENDINGS, make_sections, shorten
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+NO_REFERENCE: Mapping[str, Replay] = {}
 
-def render_report(grade: Grade, recordings: Mapping[str, Recording], facts: RunFacts) -> str:
+
+def render_report(
+    grade: Grade,
+    recordings: Mapping[str, Recording],
+    facts: RunFacts,
+    references: Mapping[str, Replay] = NO_REFERENCE,
+) -> str:
     """Render the report of one submission.
 
     Args:
         grade: The grade.
         recordings: By scenario id; may lack scenarios that were not run.
         facts: How the grade came about.
+        references: Replays of the reference solution by scenario id, to be seen beside the
+            submission's own.
 
     Returns:
         A whole HTML document; the same input gives the same text.
     """
     sections = make_sections(grade, recordings)
+    runs = [section.recording for section in sections if section.recording]
+    replays = {
+        section.scenario.id: made
+        for section in sections
+        if section.scenario is not None
+        and section.recording is not None
+        and (made := make_replay(section.recording, section.scenario)) is not None
+    }
+    style, script = _asset("report.css"), _asset("report.js")
     return (
-        _environment()
+        environment()
         .get_template("report.html.j2")
         .render(
             grade=grade,
             facts=facts,
             sections=sections,
-            timelines={section.id: _timeline(grade, section) for section in sections},
-            runs=[section.recording for section in sections if section.recording],
+            pictures={
+                section.id: draw_run(grade, section, alone=len(runs) == 1) for section in sections
+            },
+            gallery=Gallery(),
+            shares=draw_shares(grade.results),
+            replays={
+                name: embedded({"student": own, "reference": references.get(name)})
+                for name, own in replays.items()
+            },
+            told={run.scenario for run in runs},
+            runs=runs,
             faults=_faults(grade),
+            style=Markup(style),
+            script=Markup(script),
+            policy=content_security_policy(style, script),
         )
     )
+
+
+@cache
+def _asset(name: str) -> str:
+    return (resources.templates() / name).read_text(encoding="utf-8")
 
 
 def _faults(grade: Grade) -> tuple[str, ...]:
@@ -68,22 +107,9 @@ def _faults(grade: Grade) -> tuple[str, ...]:
     )
 
 
-def _timeline(grade: Grade, section: Section) -> Figure | None:
-    if section.scenario is None or section.recording is None:
-        return None
-    moments = tuple(
-        moment
-        for result in grade.results
-        for item in result.findings
-        if item.scenario == section.scenario.id and item.finding.status is not Status.PASSED
-        for moment in item.finding.evidence.moments
-        if math.isfinite(moment.time_s)
-    )
-    return draw_timeline(section.recording, moments, f"line-{section.id}")
-
-
 @cache
-def _environment() -> Environment:
+def environment() -> Environment:
+    """The templates, with all that they call; whatever they print is cleaned and escaped."""
     # Imported late: the commands that write no report start faster without it.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -108,7 +134,10 @@ def _environment() -> Environment:
         counted=counted,
         tally=words.tally,
         waiting=words.waiting,
-        draw_plot=draw_plot,
+        align=align,
+        arrange=arrange,
+        draw_callbacks=draw_callbacks,
+        draw_cases=draw_cases,
         shorten=shorten,
         taken_ms=_taken_ms,
         run_s=lambda recording: (recording.end_ns - recording.launched_ns) / NS,

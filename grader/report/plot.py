@@ -10,17 +10,22 @@ from markupsafe import Markup
 from grader.checks.finding import Plot
 from grader.checks.wording import counted
 from grader.report.clean import one_line
+from grader.report.histogram import bars
 from grader.report.svg import (
     NARROW,
     WIDE,
     Figure,
+    Point,
     Scale,
-    cross,
+    crosses,
+    curve,
+    dots,
     drawing,
     element,
     label,
     line,
     ticks,
+    unit_of,
 )
 
 HEIGHT = 232
@@ -28,9 +33,13 @@ LEFT, RIGHT, TOP, BOTTOM = 54, 12, 26, 42
 DRAWABLE = 1e15
 """Beyond this a double cannot tell neighbouring pixels apart."""
 MANY = 600
-"""Points that are still drawn one by one."""
-
-Point = tuple[float, float]
+"""Points that are still all looked at."""
+ASIDE, GAP = 0.2, 14
+"""Share of the width that a histogram takes, and the pixels before it."""
+APART = 5.0
+"""Pixels between two crosses that are still told apart."""
+DOTS = 120
+"""Points that are still told apart; more are a line."""
 
 
 def draw_plot(plot: Plot, name: str) -> Figure:
@@ -64,46 +73,60 @@ def _draw(
     width: float,
 ) -> Markup:
     edges = [edge for edge in band or () if abs(edge) < DRAWABLE]
-    x = Scale(*_span([x for x, _ in points], 0.0), LEFT, width - RIGHT)
+    aside = width * ASIDE if plot.histogram and points else 0.0
+    x = Scale(*_span([x for x, _ in points], 0.0), LEFT, width - RIGHT - aside)
     y = Scale(*_span([y for _, y in points] + edges, 0.1), HEIGHT - BOTTOM, TOP)
+    end = width - RIGHT
     content = [
         label(plot.y_label, 0, 12),
-        label(plot.x_label, width - RIGHT, HEIGHT - 4, anchor="end"),
+        label(plot.x_label, x.end, HEIGHT - 4, anchor="end"),
     ]
     if band:
         top, bottom = y.clipped(band[1]), y.clipped(band[0])
+        height = max(1.0, bottom - top)
         content.append(
-            element(
-                "rect",
-                x=LEFT,
-                y=top,
-                width=x.end - LEFT,
-                height=max(1.0, bottom - top),
-                class_="band",
-            )
+            element("rect", x=LEFT, y=top, width=end - LEFT, height=height, class_="band")
         )
-        content += [line(LEFT, y(edge), x.end, y(edge), "band-edge") for edge in edges]
+        content += [line(LEFT, y(edge), end, y(edge), "band-edge") for edge in edges]
     for value, text in ticks(y.low, y.high, 4):
-        content.append(line(LEFT, y(value), x.end, y(value), "grid"))
+        content.append(line(LEFT, y(value), end, y(value), "grid"))
         content.append(label(text, LEFT - 8, y(value) + 4, anchor="end"))
-    content.append(line(LEFT, y.begin, x.end, y.begin, "axis"))
-    for value, text in ticks(x.low, x.high, 8 if width > NARROW else 4):
+    content.append(line(LEFT, y.begin, end, y.begin, "axis"))
+    for value, text in ticks(x.low, x.high, 8 if width > NARROW else 3):
         content.append(line(x(value), y.begin, x(value), y.begin + 5, "axis"))
         content.append(label(text, x(value), y.begin + 18, anchor="middle"))
     content += _series(points, band, x, y)
+    if aside:
+        content += bars([y for _, y in points], y, x.end + GAP, end)
+        content.append(label("how many", end, HEIGHT - 4, anchor="end"))
     return drawing(name, plot.title, caption, (width, HEIGHT), content)
 
 
 def _series(points: Sequence[Point], band: Point | None, x: Scale, y: Scale) -> list[Markup]:
     shown = _thinned(points, x)
-    path = "M" + "L".join(f"{x(a):.1f} {y(b):.1f}" for a, b in shown)
-    drawn = [element("path", d=path, class_="series")] if len(shown) > 1 else []
-    for a, b in shown:
-        if _inside(b, band):
-            drawn.append(element("circle", cx=x(a), cy=y(b), r=2.5, class_="dot"))
-        else:
-            drawn.append(cross(x(a), y(b), "out"))
+    dense = len(shown) > DOTS
+    drawn = []
+    placed = [(x(a), y(b)) for a, b in shown]
+    if len(shown) > 1:
+        drawn.append(curve(placed, "series dense" if dense else "series"))
+    within = [_inside(b, band) for _, b in shown]
+    inside = [point for point, good in zip(placed, within, strict=True) if good]
+    outside = [point for point, good in zip(placed, within, strict=True) if not good]
+    if inside and not dense:
+        drawn.append(dots(inside, "dots"))
+    if outside:
+        drawn.append(crosses(_apart(outside), "out"))
     return drawn
+
+
+def _apart(points: Sequence[Point]) -> list[Point]:
+    """Points that are still told apart as crosses; the last of a run always stays."""
+    kept: list[Point] = []
+    for point in points:
+        if len(kept) > 1 and math.dist(kept[-2], point) < APART:
+            kept.pop()
+        kept.append(point)
+    return kept
 
 
 def _thinned(points: Sequence[Point], x: Scale) -> list[Point]:
@@ -140,7 +163,7 @@ def _caption(plot: Plot, points: Sequence[Point], band: Point | None, lost: int)
         parts.append("no values")
     elif band:
         outside = sum(not _inside(y, band) for _, y in points)
-        parts.append(f"{_allowed(band)} (shaded)")
+        parts.append(f"{_allowed(band)}{unit_of(plot.y_label)} (shaded)")
         parts.append(
             f"{outside} of {len(points)} outside (marked ×)"
             if outside

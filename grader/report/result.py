@@ -27,6 +27,7 @@ from grader.report.result_model import (
     Result,
     ScenarioPart,
     SubmissionPart,
+    WithheldPart,
 )
 
 
@@ -52,6 +53,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
         graded=grade.graded,
         first_to_fix=first.id if first else None,
         checks=tuple(_check(result) for result in grade.results),
+        withheld=WithheldPart(checks=grade.withheld.checks, points=grade.withheld.points),
         scenarios=tuple(
             _scenario(recordings[scenario.id], facts.recordings.get(scenario.id))
             for scenario in grade.assignment.scenarios

@@ -87,6 +87,7 @@ class PlotPart(_Part):
     x: tuple[Number, ...]
     y: tuple[Number, ...]
     band: tuple[Number, Number] | None
+    histogram: bool = False
 
 
 class TablePart(_Part):
@@ -97,6 +98,40 @@ class TablePart(_Part):
     rows: tuple[tuple[Text, ...], ...]
 
 
+class SpanPart(_Part):
+    """Something that lasted, in seconds since launch."""
+
+    name: Text
+    begin_s: Number
+    end_s: Number
+    wrong: bool
+
+
+class CasePart(_Part):
+    """One case that was tried; ``error`` is null where no answer came."""
+
+    name: Text
+    group: Text
+    error: Number | None
+
+
+class CasesPart(_Part):
+    """Errors of many cases; the label names their unit and that of the limit."""
+
+    title: Text
+    label: Text
+    limit: Number
+    cases: tuple[CasePart, ...]
+
+
+class ComparisonPart(_Part):
+    """Two texts side by side, line by line."""
+
+    title: Text
+    expected: tuple[Text, ...]
+    observed: tuple[Text, ...]
+
+
 class EvidencePart(_Part):
     """Where a finding can be seen."""
 
@@ -105,6 +140,9 @@ class EvidencePart(_Part):
     log: tuple[Text, ...]
     plots: tuple[PlotPart, ...]
     tables: tuple[TablePart, ...]
+    spans: tuple[SpanPart, ...] = ()
+    cases: tuple[CasesPart, ...] = ()
+    comparisons: tuple[ComparisonPart, ...] = ()
 
 
 class FindingPart(_Part):
@@ -135,6 +173,13 @@ class CheckPart(FindingPart):
     author_hint: Text
     waits_for: tuple[Text, ...]
     other_scenarios: tuple[FindingPart, ...]
+
+
+class WithheldPart(_Part):
+    """Checks that the reader does not get to see yet; they are not in ``max_score`` either."""
+
+    checks: int
+    points: Number
 
 
 class DisturbancePart(_Part):
@@ -184,6 +229,7 @@ class Result(_Part):
     graded: bool
     first_to_fix: Text | None
     checks: tuple[CheckPart, ...]
+    withheld: WithheldPart
     scenarios: tuple[ScenarioPart, ...]
     build: BuildPart | None
     environment: dict[Text, Text]

@@ -15,6 +15,7 @@ from markupsafe import Markup, escape
 from grader.report.clean import one_line
 
 WIDE, NARROW = 760, 330
+Point = tuple[float, float]
 LETTER = 6.3
 """Mean width of a character of the labels, in pixels; generous, so that nothing collides."""
 
@@ -68,12 +69,13 @@ def element(tag: str, *content: str, **attributes: str | float) -> Markup:
         content: Text or elements.
         attributes: By name; ``class_`` gives ``class``, ``stroke_width`` ``stroke-width``.
     """
-    written = Markup("").join(
-        Markup(' {}="{}"').format(name.rstrip("_").replace("_", "-"), _attribute(value))
+    # Plain strings, each escaped here: Markup.format takes ten times as long.
+    written = "".join(
+        f' {name.rstrip("_").replace("_", "-")}="{_attribute(value)}"'
         for name, value in attributes.items()
     )
-    inner = Markup("").join(escape(item) for item in content)
-    return Markup("<{0}{1}>{2}</{0}>").format(Markup(tag), written, inner)
+    inner = "".join(escape(item) for item in content)
+    return Markup(f"<{tag}{written}>{inner}</{tag}>")
 
 
 def drawing(
@@ -112,13 +114,54 @@ def label(text: str, x: float, y: float, class_: str = "label", anchor: str = "s
     return element("text", one_line(text), x=x, y=y, class_=class_, text_anchor=anchor)
 
 
-def cross(x: float, y: float, class_: str, size: float = 3.5) -> Markup:
-    """A diagonal cross around a point."""
-    path = (
-        f"M{x - size:.1f} {y - size:.1f}L{x + size:.1f} {y + size:.1f}"
-        f"M{x - size:.1f} {y + size:.1f}L{x + size:.1f} {y - size:.1f}"
-    )
+def curve(points: Sequence[Point], class_: str) -> Markup:
+    """A line through points, as smooth as a screen can show and no finer."""
+    return element("path", d="M" + "L".join(map(_pair, simplified(points))), class_=class_)
+
+
+def dots(points: Iterable[Point], class_: str) -> Markup:
+    """A round dot on each point; the style sheet gives its size as the width of a stroke."""
+    return element("path", d="".join(f"M{_pair(point)}h0" for point in points), class_=class_)
+
+
+def crosses(points: Iterable[Point], class_: str, size: float = 3.5) -> Markup:
+    """A diagonal cross around each point, all in one element."""
+    there, back = f"l{2 * size:g} {2 * size:g}", f"m{-2 * size:g} 0l{2 * size:g} {-2 * size:g}"
+    path = "".join(f"M{_pair((x - size, y - size))}{there}{back}" for x, y in points)
     return element("path", d=path, class_=class_)
+
+
+def simplified(points: Sequence[Point], tolerance: float = 0.3) -> list[Point]:
+    """Leave out what lies on the line between its neighbours.
+
+    The algorithm of Douglas and Peucker (1973, doi:10.3138/FM57-6770-U75U-7727), without
+    recursion.
+
+    Args:
+        points: At least one.
+        tolerance: How far a point that is left out may lie from the line, in the points' unit.
+    """
+    kept = {0, len(points) - 1}
+    parts = [(0, len(points) - 1)]
+    while parts:
+        first, last = parts.pop()
+        (x1, y1), (x2, y2) = points[first], points[last]
+        dx, dy = x2 - x1, y2 - y1
+        length = math.hypot(dx, dy)
+        between = points[first + 1 : last]
+        if length > tolerance:
+            # The distance from the line times its length: one division less for each point.
+            offs = [abs(dx * (y - y1) - dy * (x - x1)) for x, y in between]
+            limit = tolerance * length
+        else:
+            offs = [math.hypot(x - x1, y - y1) for x, y in between]
+            limit = tolerance
+        worst = max(offs, default=0.0)
+        if worst > limit:
+            index = first + 1 + offs.index(worst)
+            kept.add(index)
+            parts += [(first, index), (index, last)]
+    return [points[index] for index in sorted(kept)]
 
 
 def fitted(text: str, width: float) -> str:
@@ -129,6 +172,12 @@ def fitted(text: str, width: float) -> str:
         return text
     head = (room - 1) // 2
     return f"{text[:head]}…{text[len(text) - (room - 1 - head) :]}"
+
+
+def unit_of(text: str) -> str:
+    """The unit in a label such as ``period (ms)``, with a space before it; nothing without."""
+    unit = one_line(text).rpartition("(")[2].rpartition(")")[0]
+    return f" {unit}" if unit else ""
 
 
 def ticks(low: float, high: float, count: int) -> tuple[tuple[float, str], ...]:
@@ -155,4 +204,8 @@ def _number(value: float, digits: int) -> str:
 
 
 def _attribute(value: str | float) -> str:
-    return value if isinstance(value, str) else f"{value:.1f}".removesuffix(".0")
+    return escape(value) if isinstance(value, str) else f"{value:.1f}".removesuffix(".0")
+
+
+def _pair(point: Point) -> str:
+    return f"{point[0]:.1f} {point[1]:.1f}".replace(".0 ", " ").removesuffix(".0")

@@ -142,6 +142,8 @@ def _conclude(console: Console, grade: Grade) -> None:
         score = f"{words.number(grade.score)} of {words.number(grade.max_score)} points"
         style = "bold green" if grade.full_points else "bold"
         console.print(Text(f"Score: {score}", style))
+        if grade.withheld.checks:
+            console.print(Text(words.headline(grade)))
     else:
         console.print(Text(f"Not graded. {words.headline(grade)}", "bold magenta"))
 

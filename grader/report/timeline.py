@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from grader.checks.finding import Moment
+from grader.checks.topic_absence import OWN_TOPICS
 from grader.checks.wording import counted
-from grader.recording.model import Process, Recording
+from grader.recording.model import Call, LogLine, Owner, Process, Recording
+from grader.report import axis
+from grader.report.axis import time_axis
 from grader.report.clean import one_line
 from grader.report.flags import Flag, draw_flags
 from grader.report.sections import printed
@@ -19,18 +22,18 @@ from grader.report.svg import (
     Figure,
     Scale,
     columns,
-    cross,
+    crosses,
     drawing,
     element,
     fitted,
     label,
-    line,
-    ticks,
 )
 
 LANE = 36
 TRACK = 12
 SIDE = 6
+MOST_NODES = 4
+_COMPLAINTS = ("Traceback (most recent call last)", "[ERROR]", "[FATAL]")
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,8 @@ def _flags(recording: Recording) -> tuple[Flag, ...]:
 def _exit(process: Process) -> str:
     if process.exit_code is not None and process.exit_code < 0:
         return f"ended by signal {-process.exit_code} at"
-    return f"exit {process.exit_code} at"
+    needed = f" after {process.stopped_by}" if process.stopped_by in ("SIGTERM", "SIGKILL") else ""
+    return f"exit {process.exit_code}{needed} at"
 
 
 def _lanes(recording: Recording, moments: Sequence[Moment]) -> list[Lane]:
@@ -111,26 +115,40 @@ def _lanes(recording: Recording, moments: Sequence[Moment]) -> list[Lane]:
         end_ns = recording.end_ns if process.exited_ns is None else process.exited_ns
         begin, end = since(process.started_ns), since(end_ns)
         lanes.append(Lane(process.name, f"ran for {end - begin:.2f} s", bar=(begin, end)))
+    lanes += _graph(recording)
     for topic, messages in sorted(recording.messages.items()):
         times = tuple(since(message.stamp_ns) for message in messages)
         lanes.append(Lane(topic, counted(len(times), "message"), ticks=times))
-    if recording.calls:
-        lost = [call for call in recording.calls if call.answered_ns is None]
-        note = counted(len(recording.calls), "call")
+    for asked, calls in _calls(recording).items():
+        lost = [call for call in calls if call.answered_ns is None]
+        note = counted(len(calls), "call")
         lanes.append(
             Lane(
-                "parameter service",
+                asked,
                 f"{note}, {len(lost)} without an answer" if lost else f"{note}, all answered",
                 ticks=tuple(
-                    since(call.requested_ns)
-                    for call in recording.calls
-                    if call.answered_ns is not None
+                    since(call.requested_ns) for call in calls if call.answered_ns is not None
                 ),
                 crosses=tuple(since(call.requested_ns) for call in lost),
             )
         )
-    lines = tuple(since(entry.time_ns) for entry in printed(recording))
-    lanes.append(Lane("output", counted(len(lines), "line"), ticks=lines))
+    for goal in recording.goals:
+        end_ns = recording.stop_ns if goal.result_ns is None else goal.result_ns
+        became = "rejected" if goal.accepted is False else goal.status or "no result"
+        lanes.append(
+            Lane(
+                goal.action,
+                f"goal: {became}, {counted(len(goal.feedback), 'message')} of feedback",
+                bar=(since(goal.sent_ns), since(end_ns)),
+                ticks=tuple(since(item.time_ns) for item in goal.feedback),
+            )
+        )
+    lines = printed(recording)
+    bad = tuple(since(entry.time_ns) for entry in lines if _complains(entry))
+    note = counted(len(lines), "line") + (f", {counted(len(bad), 'error')}" if bad else "")
+    lanes.append(
+        Lane("output", note, ticks=tuple(since(entry.time_ns) for entry in lines), crosses=bad)
+    )
     if moments:
         lanes.append(
             Lane(
@@ -139,6 +157,47 @@ def _lanes(recording: Recording, moments: Sequence[Moment]) -> list[Lane]:
                 crosses=tuple(moment.time_s for moment in moments),
             )
         )
+    return lanes
+
+
+def _complains(entry: LogLine) -> bool:
+    return entry.level in ("ERROR", "FATAL") or entry.text.startswith(_COMPLAINTS)
+
+
+def _calls(recording: Recording) -> dict[str, list[Call]]:
+    """Calls by the lane that they are drawn in."""
+    found: dict[str, list[Call]] = {}
+    for call in recording.calls:
+        own = call.service.endswith("_parameters")
+        found.setdefault("parameter service" if own else call.service, []).append(call)
+    return found
+
+
+def _graph(recording: Recording) -> list[Lane]:
+    """When nodes were there, and when their endpoints came and went."""
+    since = recording.since_launch_s
+    lanes = []
+    for node in recording.student_nodes[:MOST_NODES]:
+        vanished = node.vanished_ns is not None and node.vanished_ns < recording.stop_ns
+        end_ns = node.vanished_ns if node.vanished_ns is not None else recording.end_ns
+        note = "in the graph until it vanished" if vanished else "in the graph to the end"
+        bar = since(node.appeared_ns), since(max(end_ns, node.appeared_ns))
+        lanes.append(Lane(f"node {node.name}", note, bar=bar))
+    own = [
+        item
+        for item in recording.endpoints
+        if item.owner is Owner.STUDENT and item.topic not in OWN_TOPICS
+    ]
+    gone = [
+        item.vanished_ns
+        for item in own
+        if item.vanished_ns is not None and item.vanished_ns < recording.stop_ns
+    ]
+    if own:
+        note = f"{counted(len(own), 'endpoint')} came, {len(gone) or 'none'} went"
+        came = tuple(since(item.appeared_ns) for item in own)
+        lost = tuple(since(time_ns) for time_ns in gone)
+        lanes.append(Lane("publishers and subscriptions", note, ticks=came, crosses=lost))
     return lanes
 
 
@@ -156,17 +215,11 @@ def _draw(
     for index, lane in enumerate(lanes):
         content += _lane(lane, scale, top + index * LANE, width)
     bottom = top + bottom_of_lanes + 6
-    content.append(line(SIDE, bottom, width - SIDE, bottom, "axis"))
-    for value, text in ticks(0.0, end_s, 10 if width > NARROW else 5):
-        x = scale(value)
-        content.append(line(x, bottom, x, bottom + 5, "axis"))
-        anchor = "start" if x < 20 else "end" if x > width - 20 else "middle"
-        content.append(label(text, x, bottom + 18, anchor=anchor))
-    content.append(label("time since launch (s)", width - SIDE, bottom + 34, anchor="end"))
+    content += time_axis(scale, bottom, width)
     described = [f"{flag.text}" for flag in flags]
     described += [f"{one_line(lane.name)}: {lane.note}" for lane in lanes]
     title = f"Time line of the scenario {recording.scenario}"
-    return drawing(name, title, "; ".join(described), (width, bottom + 40), content)
+    return drawing(name, title, "; ".join(described), (width, bottom + axis.HEIGHT), content)
 
 
 def _lane(lane: Lane, scale: Scale, top: float, width: float) -> list[Markup]:
@@ -184,8 +237,11 @@ def _lane(lane: Lane, scale: Scale, top: float, width: float) -> list[Markup]:
                 "rect", x=begin, y=y, width=max(2.0, end - begin), height=TRACK, rx=3, class_="bar"
             )
         )
-    for x in columns([scale.clipped(time_s) for time_s in lane.ticks]):
-        drawn.append(line(x, y + 1, x, y + TRACK - 1, "tick"))
-    for x in columns([scale.clipped(time_s) for time_s in lane.crosses]):
-        drawn.append(cross(x, y + TRACK / 2, "out", 4.0))
+    if lane.ticks:
+        places = columns([scale.clipped(time_s) for time_s in lane.ticks])
+        path = "".join(f"M{x:g} {y + 1:g}v{TRACK - 2}" for x in places)
+        drawn.append(element("path", d=path, class_="tick"))
+    if lane.crosses:
+        places = columns([scale.clipped(time_s) for time_s in lane.crosses])
+        drawn.append(crosses([(x, y + TRACK / 2) for x in places], "out", 4.0))
     return drawn

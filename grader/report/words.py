@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from grader.assignment.model import Visibility
+from grader.assignment.withheld import Withheld
 from grader.checks.finding import Finding, Status
 from grader.checks.wording import counted
 from grader.grade.model import CheckResult, Grade
@@ -63,17 +65,40 @@ def tally(grade: Grade, status: Status) -> str:
 
 
 def headline(grade: Grade) -> str:
-    """One sentence on the whole."""
-    if not grade.graded:
-        return "Something of the grader or of the machine failed; no point is lost by it."
-    if grade.full_points:
-        return "Full points."
-    failed, skipped = len(grade.of(Status.FAILED)), len(grade.of(Status.SKIPPED))
-    text = f"{counted(failed, 'check')} failed"
-    if skipped:
-        verb = "waits" if skipped == 1 else "wait"
-        text += f", {counted(skipped, 'other')} {verb} for {'it' if failed == 1 else 'them'}"
-    return f"{text}."
+    """One sentence on the whole, and one on what is judged only at grading."""
+    return summary([result.status for result in grade.results], grade.withheld)
+
+
+def summary(statuses: Sequence[Status], withheld: Withheld) -> str:
+    """:func:`headline` of checks that ended so."""
+    total, passed = len(statuses), statuses.count(Status.PASSED)
+    failed, skipped = statuses.count(Status.FAILED), statuses.count(Status.SKIPPED)
+    if Status.ERROR in statuses:
+        text = "Something of the grader or of the machine failed; no point is lost by it"
+    elif passed == total:
+        text = f"{passed} of {total} visible checks passed" if withheld.checks else "Full points"
+    else:
+        text = f"{counted(failed, 'check')} failed"
+        if skipped:
+            verb = "waits" if skipped == 1 else "wait"
+            text += f", {counted(skipped, 'other')} {verb} for {'it' if failed == 1 else 'them'}"
+    return f"{text}{announcement(withheld)}."
+
+
+def announcement(withheld: Withheld) -> str:
+    """What to say of checks that are left out, to follow a sentence; nothing where none are."""
+    if not withheld.checks:
+        return ""
+    verb = "runs" if withheld.checks == 1 else "run"
+    return (
+        f"; {counted(withheld.checks, 'hidden check')}, "
+        f"{counted_points(withheld.points)}, {verb} at grading"
+    )
+
+
+def counted_points(points: float) -> str:
+    """``1 point``, ``2.5 points``."""
+    return f"{number(points)} point{'' if points == 1 else 's'}"
 
 
 def waiting(grade: Grade, result: CheckResult) -> str:

@@ -17,32 +17,34 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.recording.model import NS, Ending, Owner, Recording, Wait
+from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording, Wait
 from grader.run.descendants import become_subreaper, kill_descendants
 from grader.run.disturbance import DisturbanceMeter
-from grader.run.domain import lock_domain
+from grader.run.domain import DomainLock, joined_domains, lock_domain
 from grader.run.ending import EndingConditions
-from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
+from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder, Command
 from grader.run.output import OutputReader
 from grader.run.stopwatch import Stopwatch
 from grader.run.student import StudentProcesses
+from grader.run.watchdog import Watchdog
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
     from grader.run.graph import GraphObserver
     from grader.run.probe import Probe
     from grader.run.simulator import SimulatedRobot
+    from grader.sandbox.namespaces import Mounter
 
 _TICK_S = 0.02
 _CALM_TICK_S = 0.1
 _GRAPH_PERIOD_S = 0.1
+# Who comes and goes later than the first match matters to no wait.
+_SETTLED_GRAPH_PERIOD_S = 0.25
 _PIPES_LIMIT_S = 1.0
-# A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
-_SET_UP_S = 0.5
 
 
 class Abandoned(Exception):
@@ -60,26 +62,48 @@ class Cell:
     def __init__(self, order: CellOrder, domain_id: int, probe: Probe) -> None:
         """Set the cell up; nothing of the student's runs yet."""
         from grader.run.graph import GraphObserver
+        from grader.run.stimuli.player import Player
+        from grader.run.stimuli.stage import Stage
 
         self._order = order
         self._domain_id = domain_id
         self._probe = probe
         self._output = OutputReader(order.limits.output_bytes)
-        self._students = StudentProcesses(self._output)
+        self._students = StudentProcesses(self._output, order.enclosure)
+        self._other_domains: tuple[int, ...] = ()
+        self._watchdog: Watchdog | None = None
+        if order.enclosure is not None:
+            self._watchdog = Watchdog(
+                order.enclosure.limits,
+                lambda: self._students.inits,
+                lambda: self._output.written_bytes,
+            )
         self._meter = DisturbanceMeter(lambda: self._students.pids)
         self._graph: GraphObserver = GraphObserver(
-            probe.node, lambda: self._students.pids, self._students.refresh
+            probe.node,
+            lambda: self._students.pids,
+            self._students.refresh,
+            private=order.enclosure is not None,
         )
+        self._waits: list[Wait] = []
         self._robot: SimulatedRobot | None = None
         if order.simulator is not None:
             from grader.run.simulator import SimulatedRobot
 
             self._robot = SimulatedRobot(probe.node, order.simulator)
-        self._ending = EndingConditions(probe, self._output, self._robot)
-        self._waits: list[Wait] = []
+        self._stage = Stage(
+            probe,
+            self._graph,
+            self._students,
+            self._meter,
+            order.limits,
+            self._start_again,
+            self._waits,
+        )
+        self._player = Player(order.stimuli, self._stage)
+        self._ending = EndingConditions(probe, self._output, self._robot, self._player)
         self._faults: list[str] = []
         self._next_graph = 0.0
-        self._next_call = 0.0
         self._told = 0
         self._matched_ns: int | None = None
 
@@ -90,19 +114,26 @@ class Cell:
             Abandoned: Nobody waits for the recording any more.
         """
         self._meter.start()
+        if self._watchdog is not None:
+            self._watchdog.start()
         launched_ns = time.time_ns()
         try:
             ending = self._observe()
             self._probe.recording = False
             stop_ns = time.time_ns()
+            self._player.finish()
             if self._robot is not None:
                 self._robot.stop()
             tell("stopping")
             self._stop()
         finally:
             self._students.clean_up()
-        log = self._output.close(_PIPES_LIMIT_S)
+            self._faults += self._students.faults()
+            breaches = self._watchdog.stop() if self._watchdog is not None else ()
+        written = self._output.close(_PIPES_LIMIT_S)
+        log = sorted((*written, *self._probe.rosout.lines), key=lambda line: line.time_ns)
         disturbance = self._meter.stop()
+        others = ", ".join(map(str, self._other_domains))
         return Recording(
             scenario=self._order.scenario,
             seed=self._order.seed,
@@ -115,17 +146,28 @@ class Cell:
             nodes=self._graph.nodes,
             endpoints=self._graph.endpoints,
             processes=self._students.records(),
-            log=log,
+            log=tuple(log),
             declarations=self._output.declarations,
-            calls=self._probe.calls,
+            calls=_by_time((*self._probe.calls, *self._stage.asker.calls)),
+            services=self._graph.services,
+            goals=tuple(sent.record for sent in self._stage.goals),
             waits=tuple(self._waits),
+            joins=tuple(self._stage.joins.values()),
+            interventions=tuple(self._stage.interventions),
+            breaches=breaches,
+            sent=dict.fromkeys(self._player.topics, ()),
+            answers=self._player.answers,
             disturbance=disturbance,
             faults=tuple(self._faults),
             truth=self._robot.truth if self._robot else (),
             incidents=self._robot.incidents if self._robot else (),
             scene=self._robot.scene() if self._robot else None,
             values=self._order.values,
-            environment={**self._order.facts, "domain_id": str(self._domain_id)},
+            environment={
+                **self._order.facts,
+                "domain_id": str(self._domain_id),
+                **({"other_domains": others} if others else {}),
+            },
         )
 
     def _observe(self) -> Ending:
@@ -136,30 +178,42 @@ class Cell:
         ending = ending or self._await_node() or self._await_match()
         if ending is None:
             tell("matched")
+            self._player.begin()
             if self._robot is not None:
                 self._robot.start()
             ending = self._await_until()
+        if self._order.enclosure is not None:
+            self._other_domains = tuple(d for d in joined_domains() if d != self._domain_id)
         # What arrived while the last wait ended still counts.
         self._graph.poll()
         self._find_foreign()
         return Ending.FAULT if self._faults else ending
 
     def _launch(self) -> Ending | None:
-        environment = dict(self._order.environment)
-        environment["ROS_DOMAIN_ID"] = str(self._domain_id)
-        environment["ROSGRADE_HOLD"] = ":".join(topic.name for topic in self._order.topics)
         for command in self._order.commands:
             tell("launching", process=command.name)
             try:
-                self._students.launch(
-                    command.name, command.argv, environment, Path(self._order.scratch)
-                )
+                self._start(command)
             except OSError as error:
                 self._waits.append(
                     Wait(f"start of {command.name}: {error.strerror}", 0.0, time.time_ns())
                 )
                 return Ending.NOT_STARTED
         return None
+
+    def _start_again(self, name: str) -> None:
+        self._start(next(item for item in self._order.commands if item.name == name))
+
+    def _start(self, command: Command) -> None:
+        """Start a process of the student.
+
+        Raises:
+            OSError: It cannot be executed.
+        """
+        environment = dict(self._order.environment)
+        environment["ROS_DOMAIN_ID"] = str(self._domain_id)
+        environment["ROSGRADE_HOLD"] = ":".join(topic.name for topic in self._order.topics)
+        self._students.launch(command.name, command.argv, environment, Path(self._order.scratch))
 
     def _await_node(self) -> Ending | None:
         def seen() -> bool:
@@ -189,15 +243,18 @@ class Cell:
         return Ending.EXITED
 
     def _await_match(self) -> Ending | None:
-        topics = self._order.topics
-        if not topics:
+        names = ", ".join(topic.name for topic in self._order.topics)
+        expected = [f"a publisher on {names}"] if names else []
+        if self._player.topics:
+            expected.append(f"a subscription on {', '.join(self._player.topics)}")
+        if not expected:
             self._matched_ns = time.time_ns()
             return None
-        names = ", ".join(topic.name for topic in topics)
-        tell("waiting", what=f"a publisher on {names}")
+        what = " or ".join(expected)
+        tell("waiting", what=what)
         settle_s = self._order.limits.settle_s
         changed_ns, since_change = 0, Stopwatch(self._meter)
-        for _ in self._wait(f"a publisher on {names}", settle_s):
+        for _ in self._wait(what, settle_s):
             if self._match():
                 return None
             if self._faults:
@@ -207,16 +264,24 @@ class Cell:
             if self._graph.changed_ns != changed_ns:
                 changed_ns, since_change = self._graph.changed_ns, Stopwatch(self._meter)
             if since_change.elapsed_s > settle_s:
-                return Ending.NO_MATCH
+                if not self._player.asks:
+                    return Ending.NO_MATCH
+                # What it should publish is not there; what it is asked, it may still answer.
+                self._matched_ns = time.time_ns()
+                return None
         return None
 
     def _match(self) -> bool:
         matching = [e for e in self._graph.endpoints if self._probe.matches(e)]
         for endpoint in matching:
             self._probe.subscribe_leniently(endpoint)
+        matching += [e for topic in self._player.topics for e in self._listeners(topic)]
         if matching and self._matched_ns is None:
             self._matched_ns = time.time_ns()
         return bool(matching)
+
+    def _listeners(self, topic: str) -> list[Endpoint]:
+        return self._stage.endpoints(Kind.SUBSCRIPTION, topic)
 
     def _await_until(self) -> Ending:
         timeout_s = self._order.limits.timeout_s
@@ -227,7 +292,7 @@ class Cell:
                 return Ending.FAULT
             if self._ending.met(self._order.until, watch) or self._ending.is_over():
                 return Ending.UNTIL
-            if not self._students.poll():
+            if not self._students.poll() and not self._player.keeps_run:
                 return self._last_messages(watch)
             if watch.elapsed_s > timeout_s:
                 return Ending.TIMEOUT
@@ -263,16 +328,18 @@ class Cell:
         watch = Stopwatch(self._meter)
         while True:
             # A message ends the wait at once; only the graph has to be polled.
-            self._probe.spin_once(_TICK_S if self._matched_ns is None else _CALM_TICK_S)
+            tick_s = _TICK_S if self._matched_ns is None else _CALM_TICK_S
+            self._probe.spin_once(self._player.pause_s(tick_s))
             now = time.monotonic()
             leaving = self._leaving()
             if now >= self._next_graph or len(leaving) > self._told:
-                self._next_graph = now + _GRAPH_PERIOD_S
+                settled = self._matched_ns is not None
+                self._next_graph = now + (_SETTLED_GRAPH_PERIOD_S if settled else _GRAPH_PERIOD_S)
                 self._graph.poll()
                 self._find_foreign()
                 _raise_if_abandoned()
             self._let_leave(leaving)
-            self._call_services(now)
+            self._player.tick()
             yield watch
 
     def _leaving(self) -> list[str]:
@@ -283,31 +350,21 @@ class Cell:
         if len(leaving) == self._told:
             return
         nodes = {node.name for node in self._graph.nodes}
-        topics = {endpoint.topic for endpoint in self._graph.endpoints}
+        announced = {
+            (endpoint.kind.value, endpoint.topic)
+            for endpoint in self._graph.endpoints
+            if endpoint.owner is not Owner.PROBE
+        }
         for declaration in self._output.declarations:
             kind, data = declaration.kind, declaration.data
             if kind == "node" and str(data.get("node")) not in nodes:
                 return
-            if kind in ("publisher", "subscription") and str(data.get("topic")) not in topics:
+            is_endpoint = kind in ("publisher", "subscription")
+            if is_endpoint and (kind, str(data.get("topic"))) not in announced:
                 return
         for name in leaving[self._told :]:
             self._students.let_leave(name)
         self._told = len(leaving)
-
-    def _call_services(self, now: float) -> None:
-        every_s = self._order.list_parameters_s
-        if every_s is None or now < self._next_call or not self._is_set_up():
-            return
-        self._next_call = now + every_s
-        for node in self._graph.nodes:
-            if node.owner is Owner.STUDENT and node.vanished_ns is None:
-                self._probe.call_list_parameters(node.name)
-
-    def _is_set_up(self) -> bool:
-        """Whether the student's nodes are past their constructors, as far as it shows."""
-        if self._probe.last_message_ns is not None:
-            return True
-        return (time.time_ns() - self._graph.changed_ns) / NS > _SET_UP_S
 
     def _find_foreign(self) -> None:
         names = sorted({n.name for n in self._graph.nodes if n.owner is Owner.FOREIGN})
@@ -337,11 +394,36 @@ class Cell:
             self._students.note_stop(watch.elapsed_s)
 
 
+def _by_time(calls: Iterable[Call]) -> tuple[Call, ...]:
+    return tuple(sorted(calls, key=lambda call: call.requested_ns))
+
+
 def _raise_if_abandoned() -> None:
     """Standard input ends with the process that ordered the run."""
     readable, _, _ = select.select([0], [], [], 0)
     if readable and not os.read(0, 1):
         raise Abandoned
+
+
+def _reset_signals() -> None:
+    """Let the student's processes inherit the signals that a terminal gives.
+
+    A shell starts background jobs, and `nohup` its command, with some of them ignored; a program
+    that inherits that never sees the Ctrl-C that ends it.
+    """
+    for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+
+
+def _keep_progress_apart() -> None:
+    """Let nothing but our progress go to standard output.
+
+    Fast DDS writes its warnings there, such as one for every message that is too long for the
+    type that the probe reads.
+    """
+    sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
 
 
 def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
@@ -351,23 +433,33 @@ def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
     return {name: concatenated_definition(name, find) for name in types}
 
 
-def main(folder: Path, avoid_domains: tuple[int, ...]) -> int:
+def main(folder: Path, avoid_domains: tuple[int, ...], mounter: Mounter | None = None) -> int:
     """Get ready, wait for the word, run the order in the folder.
 
     Args:
         folder: The cell's own.
         avoid_domains: Domains not to use.
+        mounter: In a sandbox: mounts what the student can write to.
     """
     # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
     gc.disable()
     become_subreaper()
-    with lock_domain(avoid_domains) as domain:
+    _reset_signals()
+    _keep_progress_apart()
+    with DomainLock(0) if mounter else lock_domain(avoid_domains) as domain:
         from grader.run.probe import Probe
 
         probe = Probe(domain.domain_id)
         if os.read(0, len(GO)) != GO:
             return 1
         order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
+        if order.type_support:
+            from grader.run.type_support import add_type_support
+
+            add_type_support(map(Path, order.type_support))
+        if mounter is not None and order.enclosure is not None:
+            bounds = order.enclosure.limits
+            mounter.mount(bounds.disk_bytes, bounds.files, bounds.shared_bytes)
         probe.listen(order.topics, order.limits)
         try:
             recording = Cell(order, domain.domain_id, probe).run()
@@ -375,7 +467,9 @@ def main(folder: Path, avoid_domains: tuple[int, ...]) -> int:
             return 1
         finally:
             kill_descendants(os.getpid())
-        messages = probe.messages
+        # What was written by another definition would be read as something that nobody sent.
+        garbled = {one.topic for one in recording.endpoints if recording.misdefined(one.topic)}
+        messages = [one for one in probe.messages if one.is_sent or one.topic not in garbled]
         probe.close()
     from grader.recording.mcap_writer import write_recording
 

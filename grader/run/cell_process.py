@@ -8,14 +8,13 @@ import os
 import subprocess
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from grader.errors import GraderFault
-from grader.ros import RosInstallation
-from grader.run.descendants import kill_by_variable, kill_tree
-from grader.run.environment import cell_environment
+from grader.run.descendants import kill_by_variable
+from grader.run.nursery import Nursery
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 
 _ENDING_LIMIT_S = 10.0
@@ -33,28 +32,25 @@ class CellProcess:
         folder: Its own; gone after :meth:`close`.
     """
 
-    def __init__(self, ros: RosInstallation) -> None:
-        """Start it; it joins the graph while the order is still being made."""
+    def __init__(self, nursery: Nursery, modules: Sequence[str] = ()) -> None:
+        """Start it; it joins the graph while the order is still being made.
+
+        Args:
+            nursery: What forks it.
+            modules: What it will import besides what every cell does.
+
+        Raises:
+            GraderFault: The nursery has ended.
+        """
+        self._nursery = nursery
         self._closing = threading.Lock()
-        self._temporary = tempfile.TemporaryDirectory(prefix="rosgrade-cell-")
+        self._temporary = tempfile.TemporaryDirectory(prefix="cell-", dir=nursery.cells)
         self.folder = Path(self._temporary.name)
         self._errors = self.folder / "stderr.txt"
         own_domain = os.environ.get("ROS_DOMAIN_ID", "")
         with self._errors.open("wb") as errors:
-            self._popen = subprocess.Popen(
-                [
-                    str(ros.python),
-                    "-m",
-                    "grader.run.cell",
-                    str(self.folder),
-                    *([own_domain] if own_domain.isdigit() else []),
-                ],
-                env=cell_environment(ros),
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=errors,
-                text=True,
-                start_new_session=True,
+            self._forked = nursery.start_cell(
+                self.folder, errors, [own_domain] if own_domain.isdigit() else [], modules
             )
 
     def run(self, order: CellOrder) -> Iterator[Mapping[str, Any]]:
@@ -67,25 +63,25 @@ class CellProcess:
             GraderFault: The cell failed, through no fault of the student's.
         """
         (self.folder / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
-        assert self._popen.stdin is not None and self._popen.stdout is not None
-        watchdog = threading.Timer(_HANGING_S, kill_tree, (self._popen.pid,))
+        self._nursery.give(self.folder)
+        watchdog = threading.Timer(_HANGING_S, self._forked.kill)
         watchdog.daemon = True
         watchdog.start()
         try:
             self._say_go()
-            for line in self._popen.stdout:
+            for line in self._forked.stdout:
                 yield json.loads(line)
         finally:
             watchdog.cancel()
             self._end()
-            if self._popen.returncode:
+            if self._forked.returncode:
                 # Killed, perhaps by the student's process: nobody has cleaned up.
                 kill_by_variable("HOME", str(self.folder / SCRATCH))
-        if self._popen.returncode or not self.recording.exists():
+        if self._forked.returncode or not self.recording.exists():
             told = self._errors.read_text(encoding="utf-8", errors="replace")
             raise GraderFault(
                 f"the cell of scenario {order.scenario!r} ended with status "
-                f"{self._popen.returncode}:\n{told[-_SHOWN_ERROR:].strip()}"
+                f"{self._forked.returncode}:\n{told[-_SHOWN_ERROR:].strip()}"
             )
 
     @property
@@ -93,12 +89,17 @@ class CellProcess:
         """The file that it leaves."""
         return self.folder / RECORDING_FILE
 
+    @property
+    def cpu_s(self) -> float:
+        """CPU time of the cell and of the student in it, known when it has ended."""
+        return self._forked.cpu_s
+
     def abandon(self) -> None:
         """Let it kill what it started and end; returns at once."""
         # Called by whoever interrupts and by the thread that waits, perhaps at the same time.
         with self._closing, contextlib.suppress(OSError):
-            if self._popen.stdin is not None and not self._popen.stdin.closed:
-                self._popen.stdin.close()
+            if not self._forked.stdin.closed:
+                self._forked.stdin.close()
 
     def close(self) -> None:
         """End it and remove its folder."""
@@ -106,10 +107,9 @@ class CellProcess:
         self._temporary.cleanup()
 
     def _say_go(self) -> None:
-        assert self._popen.stdin is not None
         try:
-            self._popen.stdin.write(GO.decode())
-            self._popen.stdin.flush()
+            self._forked.stdin.write(GO.decode())
+            self._forked.stdin.flush()
         except (BrokenPipeError, ValueError):
             # It has died or was abandoned; its status and last words tell more than this.
             return
@@ -117,9 +117,8 @@ class CellProcess:
     def _end(self) -> None:
         self.abandon()
         try:
-            self._popen.wait(_ENDING_LIMIT_S)
+            self._forked.wait(_ENDING_LIMIT_S)
         except subprocess.TimeoutExpired:
-            kill_tree(self._popen.pid)
-            self._popen.wait()
-        assert self._popen.stdout is not None
-        self._popen.stdout.close()
+            self._forked.kill()
+            self._forked.wait()
+        self._forked.stdout.close()

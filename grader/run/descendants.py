@@ -65,6 +65,16 @@ def command_line(pid: int) -> str:
         return f"process {pid}"
 
 
+def is_init(pid: int) -> bool:
+    """Whether a process is the first one of a PID namespace below ours (see proc(5), NSpid)."""
+    try:
+        status = (_PROC / str(pid) / "status").read_text(errors="replace")
+    except OSError:
+        return False
+    numbers = status.partition("NSpid:")[2].partition("\n")[0].split()
+    return len(numbers) > 1 and numbers[-1] == "1"
+
+
 def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:
     """SIGKILL every descendant until none is left.
 

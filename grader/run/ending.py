@@ -13,6 +13,7 @@ from grader.run.stopwatch import Stopwatch
 if TYPE_CHECKING:
     from grader.run.probe import Probe
     from grader.run.simulator import SimulatedRobot
+    from grader.run.stimuli.player import Player
 
 _AFTER_CONTACT_S = 1.0
 
@@ -20,14 +21,22 @@ _AFTER_CONTACT_S = 1.0
 class EndingConditions:
     """Looks at what has been observed so far."""
 
-    def __init__(self, probe: Probe, output: OutputReader, robot: SimulatedRobot | None) -> None:
+    def __init__(
+        self,
+        probe: Probe,
+        output: OutputReader,
+        robot: SimulatedRobot | None,
+        player: Player,
+    ) -> None:
         """Keep what to look at.
 
         Args:
             probe: For messages.
             output: For the timers that the process declared.
             robot: The simulated robot, or None.
+            player: Of the stimuli.
         """
+        self._player = player
         self._probe = probe
         self._output = output
         self._robot = robot
@@ -54,6 +63,8 @@ class EndingConditions:
             conditions.append(self._robot.at_rest_s >= until.at_rest_s)
         if until.travelled_m is not None and self._robot is not None:
             conditions.append(self._robot.travelled_m >= until.travelled_m)
+        if until.stimuli_done:
+            conditions.append(self._player.is_done)
         if until.any:
             conditions.append(any(self.met(item, watch) for item in until.any))
         return bool(conditions) and all(conditions)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 import grader
 from grader.ros import RosInstallation
+from grader.run.enclosure import HOME
 
 _HERE = Path(__file__).resolve().parent
 TRACER = _HERE / "tracer"
@@ -14,22 +16,38 @@ PROFILE = _HERE / "fast_discovery.xml"
 RMW = "rmw_fastrtps_cpp"
 
 _SHARED = {
-    "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     "RMW_IMPLEMENTATION": RMW,
     # NumPy comes with the messages; the idle threads of its BLAS would spin at every start.
     "OPENBLAS_NUM_THREADS": "1",
 }
+_HOST_NETWORK = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+# Shared memory does not reach from one sandbox into another, and nobody says so: publishers are
+# seen, and their messages lost. LOCALHOST would switch it on again; there is only `lo` anyway.
+_OWN_NETWORK = {
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
+    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+}
+_OF_THE_CALLER = ("XDG_RUNTIME_DIR", "USER")
+_INSIDE = {"HOME": "/tmp", "TMPDIR": "/tmp"}
 
 
-def cell_environment(ros: RosInstallation) -> dict[str, str]:
-    """Variables of a cell: ROS, rosgrade itself, and the fast announcement of the probe."""
+def cell_environment(ros: RosInstallation, *, sandboxed: bool = False) -> dict[str, str]:
+    """Variables of a cell: ROS, rosgrade itself, and the fast announcement of the probe.
+
+    Args:
+        ros: The installation.
+        sandboxed: Whether it has a file system and a network of its own.
+    """
     environment = ros.environment(os.environ)
     root = Path(grader.__file__).resolve().parent.parent
     environment.update(
         _SHARED,
         PYTHONPATH=_joined(str(root), environment.get("PYTHONPATH", "")),
         FASTRTPS_DEFAULT_PROFILES_FILE=str(PROFILE),
+        **(_OWN_NETWORK | _INSIDE if sandboxed else _HOST_NETWORK),
     )
+    if sandboxed:
+        environment.pop("XDG_RUNTIME_DIR", None)
     return environment
 
 
@@ -46,6 +64,7 @@ def student_environment(ros: RosInstallation, install: Path, scratch: Path) -> d
     temporary.mkdir(exist_ok=True)
     environment.update(
         _SHARED,
+        **_HOST_NETWORK,
         PYTHONPATH=_joined(str(TRACER), environment.get("PYTHONPATH", "")),
         # What is printed must be dated when it is printed, not when a buffer is full.
         PYTHONUNBUFFERED="1",
@@ -55,6 +74,22 @@ def student_environment(ros: RosInstallation, install: Path, scratch: Path) -> d
         TMPDIR=str(temporary),
     )
     return environment
+
+
+def enclosed_environment(
+    environment: Mapping[str, str], places: Mapping[str, str]
+) -> dict[str, str]:
+    """The same variables of a student's process for one in a sandbox.
+
+    Args:
+        environment: As :func:`student_environment` makes them.
+        places: Path outside -> where it is seen inside.
+    """
+    found = {name: value for name, value in environment.items() if name not in _OF_THE_CALLER}
+    for outside, inside in places.items():
+        found = {name: value.replace(outside, inside) for name, value in found.items()}
+    home = {"HOME": HOME, "USER": "student", "TMPDIR": "/tmp", "ROS_LOG_DIR": f"{HOME}/.ros/log"}
+    return found | _OWN_NETWORK | home
 
 
 def _joined(*paths: str) -> str:

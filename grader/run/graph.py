@@ -9,8 +9,10 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from rclpy.node import Node as RclpyNode
+from rclpy.node import NodeNameNonExistentError
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from grader.recording.interaction import Service
 from grader.recording.model import NS, Endpoint, Kind, Node, Owner, Qos
 
 _INFRASTRUCTURE = ("/rosout", "/parameter_events")
@@ -61,6 +63,8 @@ class GraphObserver:
         node: RclpyNode,
         student_pids: Callable[[], Collection[int]],
         rescan: Callable[[], None],
+        *,
+        private: bool = False,
     ) -> None:
         """Prepare the observer.
 
@@ -68,6 +72,9 @@ class GraphObserver:
             node: The probe's node, to ask through.
             student_pids: Processes of the student known at the moment.
             rescan: Looks for new processes of the student.
+            private: Nobody but us and the student can reach this network: who is here now is
+                ours, and who comes later is the student's. Process ids say nothing there,
+                because a sandbox counts its own.
         """
         self._node = node
         self._student_pids = student_pids
@@ -75,6 +82,10 @@ class GraphObserver:
         self._nodes: dict[tuple[str, str], Node] = {}
         self._endpoints: dict[str, Endpoint] = {}
         self._owners: dict[str, Owner] = {}
+        self._services: dict[tuple[str, str, str], Service] = {}
+        self._private = private
+        if private:
+            self._take_all_as_ours()
         self.changed_ns = 0
 
     @property
@@ -86,6 +97,11 @@ class GraphObserver:
     def endpoints(self) -> tuple[Endpoint, ...]:
         """Every endpoint seen so far except those on /rosout and /parameter_events."""
         return tuple(self._endpoints.values())
+
+    @property
+    def services(self) -> tuple[Service, ...]:
+        """Every service that a node of the student's has offered so far."""
+        return tuple(self._services.values())
 
     def poll(self) -> None:
         """Look at the graph once."""
@@ -104,6 +120,7 @@ class GraphObserver:
                     if topic not in _INFRASTRUCTURE:
                         gids.add(self._see_endpoint(kind, topic, info, now_ns))
         self._note_vanished(nodes, gids, now_ns)
+        self._see_services(now_ns)
 
     def _see_node(self, info: TopicEndpointInfo, now_ns: int) -> tuple[str, str]:
         gid = bytes(info.endpoint_gid)
@@ -122,6 +139,7 @@ class GraphObserver:
                 kind=kind,
                 topic=topic,
                 type=info.topic_type,
+                type_hash=str(info.topic_type_hash) if info.topic_type_hash.version > 0 else "",
                 node=full_name(info.node_namespace, info.node_name),
                 owner=self._owner(gid),
                 qos=qos_of(info.qos_profile),
@@ -139,13 +157,37 @@ class GraphObserver:
             if endpoint.vanished_ns is None and gid not in gids:
                 self._endpoints[gid] = dataclasses.replace(endpoint, vanished_ns=now_ns)
 
+    def _see_services(self, now_ns: int) -> None:
+        seen: set[tuple[str, str, str]] = set()
+        there = [one for one in self._nodes.values() if one.vanished_ns is None]
+        for name in {one.name for one in there if one.owner is Owner.STUDENT}:
+            namespace, _, base = name.rpartition("/")
+            try:
+                found = self._node.get_service_names_and_types_by_node(base, namespace or "/")
+            except NodeNameNonExistentError:
+                continue
+            seen |= {(service, kind, name) for service, kinds in found for kind in kinds}
+        for key in seen - self._services.keys():
+            self._services[key] = Service(*key, appeared_ns=now_ns)
+            self.changed_ns = now_ns
+        for key in self._services.keys() - seen:
+            if self._services[key].vanished_ns is None:
+                self._services[key] = dataclasses.replace(self._services[key], vanished_ns=now_ns)
+
     def _owner(self, gid: bytes) -> Owner:
         participant = gid[:12].hex()
         if participant not in self._owners:
             self._owners[participant] = self._find_owner(process_bits(gid))
         return self._owners[participant]
 
+    def _take_all_as_ours(self) -> None:
+        for topic, _ in self._node.get_topic_names_and_types():
+            for info in self._node.get_publishers_info_by_topic(topic):
+                self._owners[bytes(info.endpoint_gid)[:12].hex()] = Owner.PROBE
+
     def _find_owner(self, bits: int) -> Owner:
+        if self._private:
+            return Owner.STUDENT
         if bits == os.getpid() & 0xFFFF:
             return Owner.PROBE
         for attempt in range(2):

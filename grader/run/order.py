@@ -10,6 +10,9 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
+from grader.run.enclosure import Enclosure
+from grader.run.stimuli.orders import StimulusOrder, from_dict, to_dict
+
 ORDER_FILE = "order.json"
 RECORDING_FILE = "recording.mcap"
 GO = b"go\n"
@@ -85,6 +88,7 @@ class Until:
     elapsed_s: float | None = None
     at_rest_s: float | None = None
     travelled_m: float | None = None
+    stimuli_done: bool = False
     any: tuple[Until, ...] = ()
 
     @classmethod
@@ -121,7 +125,7 @@ class CellOrder:
         environment: Their variables.
         prefixes: ament prefixes, for message definitions.
         topics: What to record.
-        list_parameters_s: Call the parameter services this often, or None.
+        stimuli: What to do besides observing.
         until: When to end early.
         limits: Bounds.
         scratch: Folder of the student: working directory, home and temporary files.
@@ -129,6 +133,8 @@ class CellOrder:
         simulator: The simulated robot, or None.
         values: Random values of the scenario, to go into the recording.
         facts: Environment facts to go into the recording.
+        type_support: Install spaces of ours with interfaces that the probe needs.
+        enclosure: The sandbox of each process of the student, or None.
     """
 
     scenario: str
@@ -137,7 +143,7 @@ class CellOrder:
     environment: dict[str, str]
     prefixes: tuple[str, ...]
     topics: tuple[Topic, ...]
-    list_parameters_s: float | None
+    stimuli: tuple[StimulusOrder, ...]
     until: Until
     limits: Limits
     scratch: str
@@ -145,10 +151,13 @@ class CellOrder:
     simulator: SimulatorOrder | None = None
     values: dict[str, float] = field(default_factory=dict)
     facts: dict[str, str] = field(default_factory=dict)
+    type_support: tuple[str, ...] = ()
+    enclosure: Enclosure | None = None
 
     def to_json(self) -> str:
         """As one line."""
-        return json.dumps(dataclasses.asdict(self))
+        stimuli = [to_dict(order) for order in self.stimuli]
+        return json.dumps({**dataclasses.asdict(self), "stimuli": stimuli})
 
     @classmethod
     def from_json(cls, text: str) -> CellOrder:
@@ -158,9 +167,13 @@ class CellOrder:
             Command(item["name"], tuple(item["argv"])) for item in data["commands"]
         )
         data["topics"] = tuple(Topic(**item) for item in data["topics"])
+        data["stimuli"] = tuple(from_dict(item) for item in data["stimuli"])
         data["until"] = Until.from_dict(data["until"])
         if data["simulator"] is not None:
             data["simulator"] = SimulatorOrder(**data["simulator"])
         data["limits"] = Limits(**data["limits"])
         data["prefixes"] = tuple(data["prefixes"])
+        data["type_support"] = tuple(data["type_support"])
+        if data["enclosure"] is not None:
+            data["enclosure"] = Enclosure.from_dict(data["enclosure"])
         return cls(**data)

@@ -8,7 +8,7 @@ import selectors
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from grader.recording.model import Declaration, LogLine
@@ -20,17 +20,27 @@ _LARGEST_NUMBER = 2**63
 
 
 @dataclass
-class _Kept:
-    """The first and the last lines of one stream, half of the bytes each."""
+class KeptLines:
+    """The first and the last lines of one stream, half of the bytes each.
+
+    Attributes:
+        limit: Bytes that are kept.
+        head: The first lines.
+        tail: The last lines.
+        head_bytes: Size of the first.
+        tail_bytes: Size of the last.
+        dropped_bytes: Size of what came between and was not kept.
+    """
 
     limit: int
-    head: list[LogLine]
-    tail: deque[LogLine]
+    head: list[LogLine] = field(default_factory=list)
+    tail: deque[LogLine] = field(default_factory=deque)
     head_bytes: int = 0
     tail_bytes: int = 0
     dropped_bytes: int = 0
 
     def add(self, line: LogLine) -> None:
+        """Keep a line, perhaps instead of an older one."""
         size = len(line.text) + 1
         if not self.tail and self.head_bytes + size <= self.limit // 2:
             self.head.append(line)
@@ -50,12 +60,23 @@ class _Stream:
     def __init__(self, process: str, name: str, limit: int) -> None:
         self.process = process
         self.name = name
-        self.kept = _Kept(limit, [], deque())
+        self.kept = KeptLines(limit)
+        self.written_bytes = 0
         self._partial = b""
+        self._returned = False
 
     def feed(self, data: bytes) -> None:
-        """Split into lines; a line without end is cut at a bound."""
+        """Split into lines; a line without end is cut at a bound.
+
+        A carriage return ends a line too, so that a line which is written over again and again
+        (a progress bar) counts as many.
+        """
         now_ns = time.time_ns()
+        self.written_bytes += len(data)
+        if self._returned:
+            data = data.removeprefix(b"\n")
+        self._returned = data.endswith(b"\r")
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         *lines, self._partial = (self._partial + data).split(b"\n")
         for line in lines:
             self._add(line, now_ns)
@@ -71,7 +92,7 @@ class _Stream:
 
     def _add(self, line: bytes, now_ns: int) -> None:
         over = max(0, len(line) - _LONGEST_LINE)
-        text = line[:_LONGEST_LINE].rstrip(b"\r").decode(errors="replace")
+        text = line[:_LONGEST_LINE].decode(errors="replace")
         self.kept.dropped_bytes += over
         self.kept.add(LogLine(now_ns, self.process, self.name, text))
 
@@ -140,6 +161,11 @@ class OutputReader:
         ]
         return tuple(sorted(lines, key=lambda line: line.time_ns))
 
+    @property
+    def written_bytes(self) -> int:
+        """How much all processes wrote so far, kept or not."""
+        return sum(stream.written_bytes for stream in list(self._streams))
+
     def dropped_bytes(self, process: str) -> int:
         """How much output of a process was not kept."""
         return sum(s.kept.dropped_bytes for s in self._streams if s.process == process)
@@ -170,7 +196,7 @@ class OutputReader:
     def _take_declarations(self, stream: _Stream) -> None:
         """Turn lines of a tracer into declarations; what is not one is dropped."""
         lines = [*stream.kept.head, *stream.kept.tail]
-        stream.kept = _Kept(self._limit, [], deque())
+        stream.kept = KeptLines(self._limit)
         for line in lines:
             data = _declared(line.text)
             if data is None:

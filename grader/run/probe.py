@@ -20,6 +20,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Call, Endpoint, Kind, Owner
 from grader.run.order import Limits, Topic
+from grader.run.rosout import RosoutLog
 
 NAME = "rosgrade_probe"
 # One lost answer must not end the observation, and a blocked node must not be flooded.
@@ -38,6 +39,16 @@ def import_interface(name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.{kind}"), short)
     except AttributeError as error:
         raise ImportError(f"no interface {name}") from error
+
+
+def qos_profile(reliability: str, durability: str, depth: int) -> QoSProfile:
+    """A profile with history keep_last, in the words of the YAML."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy[reliability.upper()],
+        durability=DurabilityPolicy[durability.upper()],
+    )
 
 
 @dataclass
@@ -74,6 +85,7 @@ class Probe:
         self._clients: dict[str, Any] = {}
         self._calls: dict[str, list[_Pending]] = {}
         self.messages: list[RawMessage] = []
+        self.rosout = RosoutLog()
         self.counts: dict[str, int] = {}
         self._kept: dict[str, int] = {}
         self.last_message_ns: int | None = None
@@ -90,6 +102,7 @@ class Probe:
             ImportError: An interface of a topic does not exist.
         """
         self._limits = limits
+        self.rosout.listen(self.node, limits.output_bytes)
         for topic in topics:
             self._topics[topic.name] = topic
             if not topic.ours:
@@ -105,6 +118,44 @@ class Probe:
         self._executor.shutdown(timeout_sec=1.0)
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
+
+    @property
+    def student_topics(self) -> tuple[str, ...]:
+        """Topics that are recorded and that only the student publishes on."""
+        return tuple(name for name, topic in self._topics.items() if not topic.ours)
+
+    def join(self, name: str, topic: str, type: str, profile: QoSProfile) -> Any:
+        """Subscribe to a topic from now on, and record it under a name of its own.
+
+        Args:
+            name: What to record under.
+            topic: Fully qualified name.
+            type: Interface name.
+            profile: What to request.
+
+        Returns:
+            The subscription.
+
+        Raises:
+            ImportError: The interface does not exist.
+        """
+        heard = 0
+
+        def receive(data: bytes, info: Any) -> None:
+            nonlocal heard
+            heard += 1
+            if not self.recording or self._limits is None or heard > self._limits.messages:
+                return
+            if len(data) <= self._limits.message_bytes:
+                self.messages.append(_raw(topic, type, data, info, join=name))
+
+        return self.node.create_subscription(
+            import_interface(type),
+            topic,
+            receive,  # type: ignore[arg-type]  # with raw=True the info comes too
+            profile,
+            raw=True,
+        )
 
     def matches(self, endpoint: Endpoint) -> bool:
         """Whether an endpoint of the student is one that the scenario is about.
@@ -164,12 +215,7 @@ class Probe:
         return tuple(sorted(found, key=lambda call: call.requested_ns))
 
     def _subscribe(self, topic: Topic, reliability: str, durability: str) -> None:
-        profile = QoSProfile(
-            history=HistoryPolicy.KEEP_LAST,
-            depth=topic.depth,
-            reliability=ReliabilityPolicy[reliability.upper()],
-            durability=DurabilityPolicy[durability.upper()],
-        )
+        profile = qos_profile(reliability, durability, topic.depth)
 
         # rclpy decides by the number of parameters whether a callback gets the message info.
         def receive(data: bytes, info: Any) -> None:
@@ -201,13 +247,16 @@ class Probe:
             return
         if len(data) > self._limits.message_bytes:
             return
-        self.messages.append(
-            RawMessage(
-                topic=topic.name,
-                type=topic.type,
-                cdr=bytes(data),
-                stamp_ns=stamp_ns,
-                received_ns=info["received_timestamp"],
-                sequence=sequence or 0,
-            )
-        )
+        self.messages.append(_raw(topic.name, topic.type, data, info))
+
+
+def _raw(topic: str, type: str, data: bytes, info: Any, join: str = "") -> RawMessage:
+    return RawMessage(
+        topic=topic,
+        type=type,
+        cdr=bytes(data),
+        stamp_ns=info["source_timestamp"],
+        received_ns=info["received_timestamp"],
+        sequence=info["publication_sequence_number"] or 0,
+        join=join,
+    )

@@ -7,8 +7,8 @@ import json
 import shutil
 import sys
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,13 +17,18 @@ from grader.recording.fact import to_json
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
 from grader.run.cell_process import SCRATCH, CellProcess
+from grader.run.enclosing import enclose
 from grader.run.environment import RMW, student_environment
+from grader.run.load import cpu_count
+from grader.run.nursery import SIMULATOR_MODULE, Nursery
 from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
+from grader.run.stimuli.ordering import stimulus_orders
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment, Launch, Scenario
     from grader.assignment.model import Until as UntilModel
+    from grader.sandbox.sandbox import Sandbox
 
 _STARTED_EVENTS = ("matched", "stopping", "recorded")
 
@@ -71,6 +76,27 @@ def ros_arguments(launch: Launch, values: dict[str, float]) -> tuple[str, ...]:
     return (*launch.arguments, *ros_args)
 
 
+def launch_file_program(ros: RosInstallation, package: str, file: str) -> tuple[str, ...]:
+    """What starts a launch file, as `ros2 launch` does.
+
+    Args:
+        ros: What runs it.
+        package: Of the student's, that installs it.
+        file: Its name.
+
+    Raises:
+        GraderFault: This ROS has no `ros2 launch`.
+    """
+    for prefix in ros.prefixes:
+        ros2 = prefix / "bin" / "ros2"
+        if ros2.is_file() and "ros2launch" in ros.packages:
+            return (str(ros.python), str(ros2), "launch", package, file)
+    raise GraderFault(
+        f"{package}/{file} is a launch file, and this ROS ({ros.source}) has no `ros2 launch`: "
+        "source a ROS 2 Jazzy that has the package ros2launch"
+    )
+
+
 def _topics(scenario: Scenario) -> tuple[Topic, ...]:
     """What is recorded: the author's topics, and those of the simulated robot."""
     found = {
@@ -104,6 +130,7 @@ def _until(until: UntilModel) -> Until:
         elapsed_s=until.elapsed,
         at_rest_s=until.at_rest,
         travelled_m=until.travelled,
+        stimuli_done=until.stimuli is not None,
         any=tuple(_until(item) for item in until.any),
     )
 
@@ -130,6 +157,15 @@ def _simulator(
     )
 
 
+def _modules(scenario: Scenario) -> list[str]:
+    """What the cell of a scenario imports."""
+    interfaces = scenario.recorded_types.values()
+    modules = {name.rsplit("/", 1)[0].replace("/", ".") for name in interfaces}
+    if scenario.world is not None:
+        modules.add(SIMULATOR_MODULE)
+    return sorted(modules)
+
+
 @dataclass
 class Runner:
     """Runs scenarios in cells.
@@ -138,21 +174,26 @@ class Runner:
         ros: What builds and runs students' packages.
         admission: Shared bounds on cells.
         progress: Told what happens in each scenario.
+        cpu_s: CPU time of all cells so far, with the students in them.
+        sandbox: What cells and students run in, or None.
     """
 
     ros: RosInstallation
     admission: Admission = field(default_factory=Admission)
     progress: Progress = lambda _scenario, _event: None
+    cpu_s: float = 0.0
+    sandbox: Sandbox | None = None
     _ready: list[CellProcess] = field(default_factory=list)
     _cells: set[CellProcess] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
+    _nursery: Nursery | None = None
     _aborted: bool = False
 
     def get_ready(self) -> None:
         """Start a cell for the next run, while what is to be run is still being prepared."""
         with self._lock:
             if not self._aborted:
-                self._ready.append(CellProcess(self.ros))
+                self._ready.append(self._new_cell(()))
 
     def run(
         self,
@@ -164,6 +205,8 @@ class Runner:
         *,
         seed: int,
         worlds: Path = Path(),
+        underlays: tuple[Path, ...] = (),
+        type_support: tuple[Path, ...] = (),
         alone: bool = False,
     ) -> None:
         """Run one scenario and leave its recording.
@@ -176,16 +219,26 @@ class Runner:
             recording: File to write.
             seed: For everything random.
             worlds: Folder that world files are relative to.
+            underlays: Install spaces of ours that the submission was built with.
+            type_support: Install spaces of ours with interfaces that the probe needs.
             alone: Let no other cell of ours run meanwhile.
 
         Raises:
             GraderFault: The cell failed, through no fault of the student's.
         """
         with self.admission.cell(alone=alone) as ticket:
-            cell = self._take_cell()
+            cell = self._take_cell(scenario)
             try:
                 order = self._order(
-                    assignment, scenario, submission, install, cell.folder, seed, worlds
+                    assignment,
+                    scenario,
+                    submission,
+                    install,
+                    underlays,
+                    type_support,
+                    cell.folder,
+                    seed,
+                    worlds,
                 )
                 for event in cell.run(order):
                     if event["event"] in _STARTED_EVENTS:
@@ -196,7 +249,15 @@ class Runner:
             finally:
                 self._give_back(cell)
 
-    def abort(self) -> None:
+    def __enter__(self) -> Runner:
+        """For ``with``."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leave nothing running."""
+        self.close()
+
+    def close(self) -> None:
         """End every cell; each kills what it started. Nothing can be run any more."""
         with self._lock:
             self._aborted = True
@@ -205,19 +266,30 @@ class Runner:
                 cell.abandon()
         for cell in ready:
             cell.close()
+        if self._nursery is not None:
+            self._nursery.close()
 
-    def _take_cell(self) -> CellProcess:
+    def _take_cell(self, scenario: Scenario) -> CellProcess:
         with self._lock:
             if self._aborted:
                 raise GraderFault("interrupted")
-            cell = self._ready.pop() if self._ready else CellProcess(self.ros)
+            cell = self._ready.pop() if self._ready else self._new_cell(_modules(scenario))
             self._cells.add(cell)
         return cell
+
+    def _new_cell(self, modules: Sequence[str]) -> CellProcess:
+        if self._nursery is not None and not self._nursery.is_alive:
+            self._nursery.close()
+            self._nursery = None
+        if self._nursery is None:
+            self._nursery = Nursery(self.ros, self.sandbox)
+        return CellProcess(self._nursery, modules)
 
     def _give_back(self, cell: CellProcess) -> None:
         cell.close()
         with self._lock:
             self._cells.discard(cell)
+            self.cpu_s += cell.cpu_s
 
     def _order(
         self,
@@ -225,6 +297,8 @@ class Runner:
         scenario: Scenario,
         submission: SubmissionRecord,
         install: Path,
+        underlays: tuple[Path, ...],
+        type_support: tuple[Path, ...],
         folder: Path,
         seed: int,
         worlds: Path,
@@ -234,18 +308,21 @@ class Runner:
         scratch = folder / SCRATCH
         scratch.mkdir()
         values = draw_values(scenario, seed)
-        every = [stimulus.every for stimulus in scenario.stimuli]
-        return CellOrder(
+        ros = replace(self.ros, underlays=underlays or self.ros.underlays)
+        commands = tuple(
+            self.command(launch, assignment.packages[0].name, install, values)
+            for launch in scenario.launch
+        )
+        # A definition of ours comes before one of the student's.
+        definitions = tuple(map(str, (*type_support, *ros.underlays, *ros.prefixes, install)))
+        order = CellOrder(
             scenario=scenario.id,
             seed=seed,
-            commands=tuple(
-                self._command(launch, assignment.packages[0].name, install, values)
-                for launch in scenario.launch
-            ),
-            environment=student_environment(self.ros, install, scratch),
-            prefixes=tuple(str(prefix) for prefix in (install, *self.ros.prefixes)),
+            commands=commands,
+            environment=student_environment(ros, install, scratch),
+            prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),
-            list_parameters_s=min(every) if every else None,
+            stimuli=stimulus_orders(scenario, commands, worlds, definitions, seed, values),
             until=_until(scenario.until),
             limits=Limits(
                 discovery_s=scenario.discovery,
@@ -263,16 +340,34 @@ class Runner:
                 "rmw": RMW,
                 "python": ".".join(map(str, sys.version_info[:3])),
                 "sandbox": "none",
+                # As many threads as rclpy's MultiThreadedExecutor takes by itself.
+                "cpus": str(cpu_count()),
             },
+            type_support=tuple(map(str, type_support)),
         )
+        if self.sandbox is None:
+            return order
+        limits = (scenario.limits or assignment.limits).limits()
+        return enclose(order, folder, self.sandbox, ros, install, limits)
 
-    def _command(
+    def command(
         self, launch: Launch, default_package: str, install: Path, values: dict[str, float]
     ) -> Command:
+        """What to execute for a launch.
+
+        Args:
+            launch: What is launched.
+            default_package: Its package, where it names none.
+            install: The submission's install space.
+            values: Random values of the scenario, for parameters.
+        """
         package = launch.package or default_package
-        program = self._program(install / "lib" / package, launch.executable)
+        if launch.executable is None:
+            program = launch_file_program(self.ros, package, launch.program)
+        else:
+            program = self._program(install / "lib" / package, launch.executable)
         return Command(
-            name=f"{package}/{launch.executable}", argv=(*program, *ros_arguments(launch, values))
+            name=f"{package}/{launch.program}", argv=(*program, *ros_arguments(launch, values))
         )
 
     def _program(self, folder: Path, executable: str) -> tuple[str, ...]:

@@ -15,7 +15,6 @@ from grader.assignment.simulation import read_scenario_world
 from grader.recording.model import NS, Incident, Scene, Truth
 from grader.run.order import SimulatorOrder
 from sim.description import SimulatorOptions
-from sim.motion import Pose
 from sim.node import RosSimulator
 from sim.pacing import Lateness
 from sim.simulation import Simulation, Step, make_simulation
@@ -25,7 +24,6 @@ _REST_RAD_S = 1e-3
 # Drifting odometry and noise never move the robot; this is motion that somebody commanded.
 _MOVED_M = 1e-3
 _MOVED_RAD = 1e-2
-_PLACES_PER_S = 10
 
 
 class SimulatedRobot:
@@ -41,7 +39,7 @@ class SimulatedRobot:
         Raises:
             AssignmentError: World or options are wrong.
         """
-        options = SimulatorOptions.model_validate_json(order.options)
+        options = self._options = SimulatorOptions.model_validate_json(order.options)
         self._world = read_scenario_world(Path(order.world), order.values)
         self._simulation: Simulation = make_simulation(self._world, options, order.seed)
         self._ros = RosSimulator(node, self._simulation, options, self)
@@ -94,23 +92,19 @@ class SimulatedRobot:
         return 0.0 if self._contact_ns is None else (self._stamp_ns - self._contact_ns) / NS
 
     def scene(self) -> Scene:
-        """World and robot, with the places of all that moves until now."""
+        """World and robot."""
         robot = self._simulation.robot.model
-        steps = 1 + self._simulation.time_ns * _PLACES_PER_S // NS
-        times = [number * NS // _PLACES_PER_S for number in range(steps)]
         return Scene(
             radius_m=robot.radius_m,
             max_linear_m_s=robot.limits.speed_m_s,
             max_angular_rad_s=robot.limits.angular_speed_rad_s,
             outlines={shape.label: tuple(shape.capsules) for shape in self._world.shapes},
-            moving={
-                obstacle.label: (
-                    obstacle.reach_m,
-                    tuple(_place(obstacle.pose_at(time)) for time in times),
-                )
-                for obstacle in self._world.moving
-            },
+            moving=self._world.moving,
             began_ns=self._began_ns,
+            lidar=self._options.lidar.pose,
+            command_topic=self._options.topics.command.topic,
+            odometry_topic=self._options.topics.odometry.topic,
+            scan_topic=self._options.topics.scan.topic,
         )
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
@@ -139,7 +133,7 @@ class SimulatedRobot:
         """Note steps that the host did not let us do in time; called by the simulator."""
         late_ms = lateness.late_ns / 1e6
         text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
-        self._incidents.append(Incident(self._stamp_ns, "late", text))
+        self._incidents.append(Incident(self._stamp_ns, "late", text, lateness.late_ns / NS))
 
     def _follow(self, step: Step, stamp_ns: int) -> None:
         if self._truth:
@@ -156,7 +150,3 @@ class SimulatedRobot:
             self._rest_since_ns = stamp_ns
         if step.contact is not None and self._contact_ns is None:
             self._contact_ns = stamp_ns
-
-
-def _place(pose: Pose | None) -> tuple[float, float, float] | None:
-    return None if pose is None else (pose.x_m, pose.y_m, pose.yaw_rad)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -10,8 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.recording.model import Process
-from grader.run.descendants import descendants, kill_descendants, reap
+from grader.recording.model import NS, Process
+from grader.run.descendants import descendants, is_init, kill_descendants, reap
+from grader.run.enclosure import EnclosedProcess, Enclosure
 from grader.run.output import OutputReader
 from grader.run.shared_memory import remove_orphaned_segments
 
@@ -25,16 +27,38 @@ class _Running:
     started_ns: int
     seen_fd: int | None
     exited_ns: int | None = None
+    killed_ns: int | None = None
     stopped_by: str = "itself"
     stop_s: float | None = None
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal to its process group, if that is still there."""
+        with contextlib.suppress(ProcessLookupError):
+            if isinstance(self.popen, EnclosedProcess):
+                self.popen.signal_group(number)
+            else:
+                os.killpg(self.popen.pid, number)
+
+    @property
+    def exit_code(self) -> int | None:
+        """As in :mod:`subprocess`."""
+        if isinstance(self.popen, EnclosedProcess):
+            return self.popen.exit_code
+        return self.popen.returncode
 
 
 class StudentProcesses:
     """All processes that a scenario launches."""
 
-    def __init__(self, output: OutputReader) -> None:
-        """Prepare; nothing is started yet."""
+    def __init__(self, output: OutputReader, enclosure: Enclosure | None = None) -> None:
+        """Prepare; nothing is started yet.
+
+        Args:
+            output: Reads what they write.
+            enclosure: The sandbox that each of them gets, or None.
+        """
         self._output = output
+        self._enclosure = enclosure
         self._running: list[_Running] = []
         self._pids: frozenset[int] = frozenset()
         self._survivors: tuple[str, ...] = ()
@@ -56,21 +80,13 @@ class StudentProcesses:
         tracer_read, tracer_write = os.pipe()
         seen_read, seen_write = os.pipe()
         try:
-            popen = subprocess.Popen(
-                argv,
-                cwd=folder,
-                env={
-                    **environment,
-                    "ROSGRADE_TRACER_FD": str(tracer_write),
-                    "ROSGRADE_TRACER_PIPE": str(os.fstat(tracer_write).st_ino),
-                    "ROSGRADE_SEEN_FD": str(seen_read),
-                },
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                pass_fds=(tracer_write, seen_read),
-                start_new_session=True,
-            )
+            variables = {
+                **environment,
+                "ROSGRADE_TRACER_FD": str(tracer_write),
+                "ROSGRADE_TRACER_PIPE": str(os.fstat(tracer_write).st_ino),
+                "ROSGRADE_SEEN_FD": str(seen_read),
+            }
+            popen = self._popen(argv, variables, folder, (tracer_write, seen_read))
         except OSError:
             os.close(tracer_read)
             os.close(seen_write)
@@ -86,6 +102,36 @@ class StudentProcesses:
         self._output.add(tracer_read, name, "tracer")
         self._pids |= {popen.pid}
 
+    def _popen(
+        self,
+        argv: tuple[str, ...],
+        variables: Mapping[str, str],
+        folder: Path,
+        pass_fds: tuple[int, ...],
+    ) -> subprocess.Popen[bytes]:
+        if self._enclosure is not None:
+            return EnclosedProcess(self._enclosure, argv, variables, pass_fds)
+        return subprocess.Popen(
+            argv,
+            cwd=folder,
+            env=variables,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            pass_fds=pass_fds,
+            start_new_session=True,
+        )
+
+    @property
+    def inits(self) -> tuple[int, ...]:
+        """The first process of each sandbox that still stands."""
+        groups = [
+            process.popen.group
+            for process in self._running
+            if isinstance(process.popen, EnclosedProcess) and process.exited_ns is None
+        ]
+        return tuple(group for group in groups if group is not None)
+
     @property
     def pids(self) -> frozenset[int]:
         """Every process that was launched or descends from one, ended ones too."""
@@ -100,6 +146,8 @@ class StudentProcesses:
         for process in self._running:
             if process.exited_ns is None and process.popen.poll() is not None:
                 process.exited_ns = time.time_ns()
+                if process.killed_ns is not None:
+                    process.stop_s = (process.exited_ns - process.killed_ns) / NS
         return any(process.exited_ns is None for process in self._running)
 
     def let_leave(self, name: str | None = None) -> None:
@@ -109,15 +157,37 @@ class StudentProcesses:
                 os.close(process.seen_fd)
                 process.seen_fd = None
 
+    def is_running(self, name: str) -> bool:
+        """Whether a process of this name runs."""
+        self.poll()
+        return any(item.name == name and item.exited_ns is None for item in self._running)
+
+    def was_killed(self, name: str) -> bool:
+        """Whether the newest process of this name was ended by :meth:`kill`."""
+        named = [item for item in self._running if item.name == name]
+        return bool(named) and named[-1].killed_ns is not None
+
+    def kill(self, name: str, number: signal.Signals) -> bool:
+        """Send a signal to the process group of one process, in the middle of the run.
+
+        Returns:
+            Whether it still ran.
+        """
+        self.let_leave(name)
+        running = self.is_running(name)
+        for process in self._running:
+            if process.name == name and process.exited_ns is None:
+                process.stopped_by = number.name
+                process.killed_ns = process.killed_ns or time.time_ns()
+                process.signal(number)
+        return running
+
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the process group of every process that still runs."""
         for process in self._running:
             if process.exited_ns is None:
                 process.stopped_by = number.name
-                try:
-                    os.killpg(process.popen.pid, number)
-                except ProcessLookupError:
-                    continue
+                process.signal(number)
 
     def note_stop(self, stop_s: float) -> None:
         """Date the end of the processes that ended since the last call.
@@ -137,14 +207,26 @@ class StudentProcesses:
         deadline = time.monotonic() + _AFTERMATH_S
         while not self.poll() and descendants(os.getpid()) and time.monotonic() < deadline:
             time.sleep(0.01)
+        inits = {pid for pid in descendants(os.getpid()) if is_init(pid)}
         self._survivors = tuple(
             command
             for pid, command in kill_descendants(os.getpid()).items()
-            if pid not in {process.popen.pid for process in self._running}
+            if pid not in {process.popen.pid for process in self._running} and pid not in inits
         )
         self.poll()
         reap()
         remove_orphaned_segments()
+
+    def faults(self) -> tuple[str, ...]:
+        """Sandboxes that could not be set up, one sentence each; call after :meth:`clean_up`."""
+        return tuple(
+            f"the sandbox of {process.name} could not be set up: "
+            f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'it said nothing'}"
+            for process in self._running
+            if isinstance(process.popen, EnclosedProcess)
+            and process.stopped_by == "itself"
+            and not process.popen.was_set_up
+        )
 
     def records(self) -> tuple[Process, ...]:
         """What became of each process; call after :meth:`clean_up`."""
@@ -154,7 +236,7 @@ class StudentProcesses:
                 pid=process.popen.pid,
                 started_ns=process.started_ns,
                 exited_ns=process.exited_ns,
-                exit_code=process.popen.returncode,
+                exit_code=process.exit_code,
                 stopped_by=process.stopped_by,
                 stop_s=process.stop_s,
                 survivors=self._survivors if number == 0 else (),

@@ -70,7 +70,8 @@ class Outcome:
 
     Attributes:
         status: Exit status, or minus the signal's number, or None where we ended it.
-        ended_by_us: ``time`` or ``output``, the limit that it passed, or None.
+        ended_by_us: ``time``, ``output`` or what ``excess`` said, the limit that it passed, or
+            None.
         output: What is kept of its standard output and error.
         duration_s: Wall time.
     """
@@ -89,6 +90,7 @@ def run_bounded(
     wall_s: float,
     output: OutputLimits | None = None,
     on_line: Callable[[str], None] | None = None,
+    excess: Callable[[int], str | None] = lambda _: None,
 ) -> Outcome:
     """Run a command and wait until it and everything that it started is gone.
 
@@ -99,6 +101,8 @@ def run_bounded(
         wall_s: It is ended after this time.
         output: How much output is kept and borne.
         on_line: Called with each line while the command runs.
+        excess: Called several times a second with the id of the process that everything
+            descends from; names the limit that was passed, which ends the command.
 
     Raises:
         GraderFault: It could not be started or supervised.
@@ -108,7 +112,7 @@ def run_bounded(
     lines = _Lines(on_line)
     started = time.monotonic()
     with _supervised(command, cwd, environment) as (process, status_read):
-        ended_by_us = _drain(process, kept, lines, limits, started + wall_s)
+        ended_by_us = _drain(process, kept, lines, limits, started + wall_s, excess)
         status = _finish(process, status_read)
     return Outcome(
         status=None if ended_by_us else status,
@@ -160,15 +164,22 @@ def _drain(
     lines: _Lines,
     limits: OutputLimits,
     deadline: float,
+    excess: Callable[[int], str | None],
 ) -> str | None:
     """Take the output until the supervisor has ended; the limit that was passed, or None."""
     assert process.stdout is not None
+    next_look = time.monotonic() + _POLL_S
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
         while True:
             left = deadline - time.monotonic()
             if left <= 0:
                 return "time"
+            if time.monotonic() >= next_look:
+                passed = excess(process.pid)
+                if passed is not None:
+                    return passed
+                next_look = time.monotonic() + _POLL_S
             if selector.select(min(left, _POLL_S)):
                 block = os.read(process.stdout.fileno(), _CHUNK)
                 if not block:

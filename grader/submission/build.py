@@ -12,9 +12,12 @@ import json
 import os
 import re
 import shutil
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
@@ -27,6 +30,9 @@ from grader.submission.locate import Located
 from grader.submission.members import MIB
 from grader.submission.record import BuildRecord
 from grader.submission.rosdistro import PACKAGES
+
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
 
 VERSION = 2
 """Raise it when the same submission would now be built differently."""
@@ -69,6 +75,8 @@ def build(
     limits: BuildLimits | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
     environ: Mapping[str, str] = os.environ,
+    sandbox: Sandbox | None = None,
+    stop: threading.Event | None = None,
 ) -> CachedBuild:
     """Build all packages of a submission, unless just this was built before.
 
@@ -83,6 +91,8 @@ def build(
         limits: What is too much.
         on_progress: Told in a few words what happens.
         environ: The caller's environment.
+        sandbox: What the build runs in, or None.
+        stop: Ends the build from another thread when it is set.
 
     Raises:
         GraderFault: It could not be built here, for no fault of the student: colcon or a
@@ -90,8 +100,10 @@ def build(
     """
     limits = limits or BuildLimits()
     wall_s = limits.python_s if only_python else limits.other_s
-    workshop = _Workshop(located, sources, ros, limits, only_python, wall_s, on_progress, environ)
-    key = build_key(located.sha256, ros)
+    workshop = _Workshop(
+        located, sources, ros, limits, only_python, wall_s, on_progress, environ, sandbox, stop
+    )
+    key = build_key(located.sha256, ros, sandboxed=sandbox is not None)
     on_progress("looking for an earlier build")
     with cache.locked(key, wait_s=wall_s + _COMPILE_S):
         found = cache.find(key)
@@ -104,12 +116,13 @@ def build(
             return cache.store(key, unfinished, record)
 
 
-def build_key(sha256: str, ros: RosInstallation) -> str:
+def build_key(sha256: str, ros: RosInstallation, *, sandboxed: bool = False) -> str:
     """Name a build by everything that it depends on.
 
     Args:
         sha256: The submission's hash.
         ros: Installing or updating a package changes the times of its files.
+        sandboxed: What a sandbox refuses may fail a build.
     """
     watched = [prefix / "share/ament_index/resource_index/packages" for prefix in ros.prefixes]
     watched += [ros.python, *site_packages_of(ros)]
@@ -122,6 +135,7 @@ def build_key(sha256: str, ros: RosInstallation) -> str:
         [str(prefix) for prefix in ros.prefixes],
         [path.stat().st_mtime_ns for path in watched if path.exists()],
         sorted(ros.packages),
+        *(["sandbox"] if sandboxed else []),
     ]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
@@ -143,6 +157,8 @@ class _Workshop:
     wall_s: float
     on_progress: Callable[[str], None]
     environ: Mapping[str, str]
+    sandbox: Sandbox | None = None
+    stop: threading.Event | None = None
 
     def build(self, install: Path) -> BuildRecord:
         # Beside the copy, so that relative paths in the log are the same on every run.
@@ -185,13 +201,13 @@ class _Workshop:
             if failed:
                 command += ["--packages-skip", *sorted(failed | finished)]
                 command += ["--packages-skip-by-dep", *sorted(failed)]
-            outcome = run_bounded(
+            outcome = self._run(
                 command,
-                cwd=scratch,
-                environment=environment,
-                wall_s=self.wall_s - sum(item.duration_s for item in outcomes),
-                output=self.limits.output,
-                on_line=on_line,
+                environment,
+                scratch,
+                install,
+                self.wall_s - sum(item.duration_s for item in outcomes),
+                on_line,
             )
             outcomes.append(outcome)
             # Where setup.py raises before anything is built, colcon's executor stops with the
@@ -223,7 +239,9 @@ class _Workshop:
             # Linters and test frameworks are not there to be found on a small installation.
             command += ["--cmake-args", "-DBUILD_TESTING=OFF"]
             if self.ros.source == "wheels":
-                command += [f"-DCMAKE_PROJECT_INCLUDE={_CMAKE_INCLUDE}"]
+                # Where a sandbox shows it, too.
+                include = shutil.copy(_CMAKE_INCLUDE, scratch)
+                command += [f"-DCMAKE_PROJECT_INCLUDE={include}"]
         return command
 
     def _check_machine(self, outcome: Outcome, scratch: Path, install: Path) -> None:
@@ -285,7 +303,41 @@ class _Workshop:
         folders = [str(path) for path in site_packages(install)]
         if folders:
             command = [str(self.ros.python), "-I", "-S", "-m", "compileall", "-qq", *folders]
-            run_bounded(command, cwd=scratch, environment=environment, wall_s=_COMPILE_S)
+            self._run(command, environment, scratch, install, _COMPILE_S)
+
+    def _run(
+        self,
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        scratch: Path,
+        install: Path,
+        wall_s: float,
+        on_line: Callable[[str], None] | None = None,
+    ) -> Outcome:
+        """Run a part of the build, in the sandbox if there is one."""
+        run = partial(
+            run_bounded, cwd=scratch, wall_s=wall_s, output=self.limits.output, on_line=on_line
+        )
+        if self.sandbox is None:
+            return run(command, environment=environment, excess=self._watched())
+        with self.sandbox.build(self.ros, (scratch, self.located.root, install.parent)) as room:
+            return run(
+                room.command(command, environment),
+                environment=room.environment,
+                excess=self._watched(room.excess),
+            )
+
+    def _watched(
+        self, excess: Callable[[int], str | None] = lambda _: None
+    ) -> Callable[[int], str | None]:
+        """Look for a passed limit, and for whoever wants the build to end."""
+
+        def look(pid: int) -> str | None:
+            if self.stop is not None and self.stop.is_set():
+                raise GraderFault("interrupted")
+            return excess(pid)
+
+        return look
 
 
 def _is_cut_off(output: str) -> bool:
@@ -325,4 +377,6 @@ def _ended_by_us(outcome: Outcome, wall_s: float) -> str | None:
         return f"the build was ended after {wall_s:.0f} s"
     if outcome.ended_by_us == "output":
         return "the build was ended because it wrote too much output"
+    if outcome.ended_by_us is not None:
+        return f"the build was ended because {outcome.ended_by_us}"
     return None

@@ -13,6 +13,10 @@ from pathlib import Path
 
 from grader.submission.entrypoints import EntryPoint, parse_installed
 from grader.submission.paths import is_within
+from grader.submission.record import Definition
+
+MOST_BYTES = 64 * 1024
+"""Largest definition of an interface that is kept."""
 
 _MAX_METADATA_BYTES = 256 * 1024
 _MAX_HASHED_BYTES = 16 * 2**20
@@ -30,6 +34,8 @@ class InstallSpace:
         python: Path of each Python file -> hash of its content; relative to site-packages, or
             ``lib/<package>/...`` for scripts.
         origins: Path of each of them -> the student's file that it is a copy of.
+        definitions: Package -> the interfaces that it generates, such as ``msg/Bot.msg``, with
+            their definitions.
     """
 
     executables: Mapping[str, tuple[str, ...]]
@@ -37,6 +43,7 @@ class InstallSpace:
     entry_points: Mapping[str, tuple[EntryPoint, ...]]
     python: Mapping[str, str]
     origins: Mapping[str, str]
+    definitions: Mapping[str, tuple[Definition, ...]]
 
 
 def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) -> InstallSpace:
@@ -48,6 +55,7 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
         sources: Path of each of the student's Python files -> hash of its content.
     """
     executables = {}
+    definitions = {}
     python: dict[str, str] = {}
     for package in packages:
         folder = install / "lib" / package
@@ -55,6 +63,7 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
         executables[package] = tuple(sorted({path.name for path in found}))
         for path in regular_files(folder):
             python[path.relative_to(install).as_posix()] = _hash(path)
+        definitions[package] = tuple(_definitions(install / "share" / package))
     entry_points = {}
     for site in site_packages(install):
         for path in regular_files(site):
@@ -67,7 +76,12 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
                 entry_points[normalised(match["name"])] = _entry_points(metadata)
     in_bin = sorted(path.name for path in regular_files(install / "bin"))
     return InstallSpace(
-        executables, tuple(in_bin), entry_points, python, match_files(python, sources)
+        executables,
+        tuple(in_bin),
+        entry_points,
+        python,
+        match_files(python, sources),
+        definitions,
     )
 
 
@@ -156,6 +170,16 @@ def in_folder(files: Mapping[str, str], folder: str) -> tuple[tuple[str, str], .
 def hash_of(data: bytes) -> str:
     """The hash by which installed and handed-in files are compared."""
     return sha256(data).hexdigest()
+
+
+def _definitions(share: Path) -> Iterator[Definition]:
+    """Interfaces with generated code: beside each definition lies its description (REP-2011)."""
+    for kind in ("msg", "srv", "action"):
+        for path in regular_files(share / kind):
+            described = path.with_suffix(".json").is_file()
+            if path.suffix == f".{kind}" and described and path.stat().st_size <= MOST_BYTES:
+                text = path.read_text(encoding="utf-8", errors="replace")
+                yield Definition(path.relative_to(share).as_posix(), text)
 
 
 def _likeness(path: str, installed: str) -> int:

@@ -45,12 +45,14 @@ class Manifest:
             broken before it says.
         error: Why colcon does not accept it, or None.
         dependencies: In its order; ``known`` is not yet told.
+        groups: Groups that it is a member of (REP-149).
     """
 
     name: str | None
     build_type: str | None
     error: SourceError | None = None
     dependencies: tuple[Dependency, ...] = ()
+    groups: tuple[str, ...] = ()
 
 
 @dataclass
@@ -103,6 +105,7 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
         build_type=build_types[0] if build_types else default,
         error=SourceError(file, *error) if error else None,
         dependencies=tuple(dependencies[:_MAX_DEPENDENCIES]),
+        groups=tuple(document.texts("member_of_group")[:_MAX_DEPENDENCIES]),
     )
 
 

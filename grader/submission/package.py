@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from grader.ros import RosInstallation
 from grader.submission import source
+from grader.submission.code_facts import Lint, SourceFile
 from grader.submission.dependencies import is_known
 from grader.submission.entrypoints import EntryPoint, Setup, read_setup
 from grader.submission.imports import find_imports, is_code, ros_imports
-from grader.submission.installed import InstallSpace, hash_of, in_folder, normalised
+from grader.submission.installed import MOST_BYTES, InstallSpace, hash_of, in_folder, normalised
+from grader.submission.lint import lint
 from grader.submission.listing import MANIFEST
 from grader.submission.locate import Located
 from grader.submission.manifest import Manifest, read_manifest
+from grader.submission.outline import outline
 from grader.submission.paths import is_within, join, shown
-from grader.submission.record import Dependency, Import, PackageRecord, SourceError
+from grader.submission.record import Definition, Dependency, Import, PackageRecord, SourceError
 from grader.submission.rosdistro import PYTHON_MODULES
 from grader.submission.targets import Modules, missing_target
 
+CMAKE = "CMakeLists.txt"
+
 _INTERFACES = (".msg", ".srv", ".action")
 _MAX_INTERFACE_BYTES = 256 * 1024
+_MOST_DEFINITIONS = 200
+_WORD = re.compile(r"\w+")
 _CONDITIONS = {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
 
 
@@ -35,18 +43,24 @@ class Package:
         folder: In the submission.
         manifest: What package.xml says.
         setup: What setup.py and setup.cfg say.
+        cmake: Its CMakeLists.txt, or None where it has none.
         texts: Lines of setup.py and of the interface files, by path in the submission.
+        definitions: Interface files, and what lies beside them.
         hashes: Hash of each Python file and script, by path in the submission.
         trees: Syntax tree of each, or what is wrong with it.
+        lint: What ruff says of what runs, or None where it was not asked.
     """
 
     name: str
     folder: str
     manifest: Manifest
     setup: Setup
+    cmake: str | None
     texts: Mapping[str, Sequence[str]]
+    definitions: tuple[Definition, ...]
     hashes: Mapping[str, str]
     trees: Mapping[str, ast.Module | SourceError]
+    lint: Lint | None = None
 
     @property
     def build_type(self) -> str:
@@ -61,6 +75,13 @@ class Package:
         """Folder in the submission that holds the package's Python modules."""
         below = self.setup.package_dir
         return self.folder if below == "." else join(self.folder, below)
+
+    @property
+    def named(self) -> set[str]:
+        """Names of packages that its files may need, and of much else."""
+        found = {dependency.name for dependency in self.manifest.dependencies}
+        found |= {item.module for item in _imports(self)}
+        return found | set(_WORD.findall(self.cmake or ""))
 
     def code(self) -> dict[str, ast.Module | SourceError]:
         """Trees of what runs: no tests, launch files, setup.py."""
@@ -92,6 +113,7 @@ def read_package(located: Located, folder: str, ros: RosInstallation) -> Package
     )
     setup_py = _bytes(located, join(folder, "setup.py"))
     setup = read_setup(setup_py, _bytes(located, join(folder, "setup.cfg")), shown(folder))
+    cmake = _bytes(located, join(folder, CMAKE))
     hashes: dict[str, str] = {}
     trees: dict[str, ast.Module | SourceError] = {}
     texts = {join(folder, "setup.py"): _lines(setup_py)} if setup_py is not None else {}
@@ -108,15 +130,18 @@ def read_package(located: Located, folder: str, ros: RosInstallation) -> Package
             hashes[file.path] = hash_of(data)
             trees[file.path] = source.parse(data, shown(file.path))
     folder_name = located.id if folder == "." else folder.rpartition("/")[2]
-    return Package(
+    package = Package(
         name=manifest.name or setup.name or shown(folder_name),
         folder=folder,
         manifest=manifest,
         setup=setup,
+        cmake=None if cmake is None else cmake.decode("utf-8", "replace"),
         texts=texts,
+        definitions=tuple(_definitions(located, folder)),
         hashes=hashes,
         trees=trees,
     )
+    return replace(package, lint=lint(located.root, package.code()))
 
 
 def record_packages(
@@ -166,6 +191,11 @@ def _record(
         syntax_errors=tuple(
             tree for _, tree in sorted(package.trees.items()) if isinstance(tree, SourceError)
         ),
+        groups=package.manifest.groups,
+        cmake=None if package.cmake is None else package.cmake[:MOST_BYTES],
+        definitions=package.definitions,
+        sources=tuple(_sources(package)),
+        lint=package.lint,
     )
     return _with_executables(record, package, set(providers), installed, alone=len(packages) == 1)
 
@@ -182,9 +212,11 @@ def _with_executables(
     modules = package.modules()
     files: dict[str, str] = {}
     executables: tuple[str, ...] = ()
+    generated: tuple[Definition, ...] = ()
     misplaced: list[str] = []
     if installed is not None:
         files = {shown(i): shown(p) for i, p in in_folder(installed.origins, package.folder)}
+        generated = installed.definitions.get(package.name, ())
         executables = installed.executables.get(package.name, ())
         distribution = normalised(package.setup.name or package.name)
         built = installed.entry_points.get(distribution)
@@ -202,6 +234,7 @@ def _with_executables(
         misplaced_executables=tuple(misplaced),
         missing_targets=tuple((name, error) for name, error in missing if error is not None),
         files=tuple(sorted(files.items())),
+        generated=generated[:_MOST_DEFINITIONS],
     )
 
 
@@ -221,6 +254,17 @@ def _imports(package: Package) -> list[Import]:
     return found
 
 
+def _sources(package: Package) -> Iterator[SourceFile]:
+    for path, tree in sorted(package.code().items()):
+        if isinstance(tree, ast.Module):
+            yield outline(tree, shown(path), _module(shown(_below(path, package.module_root))))
+
+
+def _module(path: str) -> str:
+    """The dotted name that a file below the package's Python modules is imported by."""
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
 def _providers(packages: Sequence[Package], ros: RosInstallation) -> dict[str, tuple[str, ...]]:
     """Importable module -> packages of which each provides it."""
     providers: dict[str, tuple[str, ...]] = {name: (name,) for name in ros.python_modules}
@@ -234,6 +278,24 @@ def _providers(packages: Sequence[Package], ros: RosInstallation) -> dict[str, t
 def _told(dependency: Dependency, ros: RosInstallation, submitted: set[str]) -> Dependency:
     known = is_known(dependency.name, installed=ros.packages, submitted=submitted)
     return replace(dependency, name=shown(dependency.name), known=known)
+
+
+def _definitions(located: Located, folder: str) -> Iterator[Definition]:
+    """Files of a package that are definitions of interfaces, or seem to be meant as such."""
+    found = 0
+    for file in located.files:
+        *folders, name = file.path.split("/")
+        suffix = "." + name.rpartition(".")[2]
+        meant = suffix.lower() in _INTERFACES or (
+            folders[-1:] and f".{folders[-1].lower()}" in _INTERFACES
+        )
+        if not meant or not is_within(file.path, folder) or file.size > MOST_BYTES:
+            continue
+        found += 1
+        if found > _MOST_DEFINITIONS:
+            return
+        data = _bytes(located, file.path) or b""
+        yield Definition(shown(file.path), data.decode("utf-8", "replace"))
 
 
 def _below(path: str, folder: str) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import os
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grader.errors import SubmissionError
 from grader.ros import RosInstallation
@@ -21,6 +23,10 @@ from grader.submission.members import MIB, ArchiveLimits
 from grader.submission.package import Package, read_package, record_packages
 from grader.submission.paths import join, shown
 from grader.submission.record import SubmissionRecord
+from grader.submission.underlay import completed
+
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
 
 _MAX_PACKAGES = 200
 _LEFTOVERS = ("build", "install", "log")
@@ -35,10 +41,12 @@ class Prepared:
         record: What is known of it.
         install: Its install space (merged layout), read-only for everybody; also there when
             only some packages were built. None where nothing was.
+        underlays: Install spaces of ours that it was built with, and runs with.
     """
 
     record: SubmissionRecord
     install: Path | None
+    underlays: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,8 @@ def prepare(
     limits: PrepareLimits | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
     environ: Mapping[str, str] = os.environ,
+    sandbox: Sandbox | None = None,
+    stop: threading.Event | None = None,
 ) -> Prepared:
     """Find the packages of a submission, read them, build them.
 
@@ -71,6 +81,8 @@ def prepare(
         limits: What is too much.
         on_progress: Told in a few words what happens.
         environ: The caller's environment; only its locale and time zone are passed on.
+        sandbox: What it is built in, or None.
+        stop: Ends the build from another thread when it is set.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.
@@ -82,10 +94,29 @@ def prepare(
     try:
         with opened(source, limits.archive) as located:
             builds = BuildCache(cache, limits.cache)
-            return _prepare(located, ros, builds, limits, on_progress, environ)
+            return _prepare(located, ros, builds, limits, on_progress, environ, sandbox, stop)
     except SubmissionError as error:
         record = SubmissionRecord(submission_id(source), _hash(source), problem=str(error))
         return Prepared(record, None)
+
+
+def fingerprint(path: Path | str, limits: ArchiveLimits | None = None) -> str:
+    """The hash that :func:`prepare` will give a submission; nothing is built.
+
+    Args:
+        path: A folder or an archive.
+        limits: What is too much.
+
+    Raises:
+        UsageError: Nothing is at ``path``, or it is a URL.
+        GraderFault: It cannot be read here, for no fault of the student.
+    """
+    source = check_path(path)
+    try:
+        with opened(source, limits) as located:
+            return located.sha256
+    except SubmissionError:
+        return _hash(source)
 
 
 def _hash(source: Path) -> str:
@@ -107,12 +138,16 @@ def _prepare(
     limits: PrepareLimits,
     on_progress: Callable[[str], None],
     environ: Mapping[str, str],
+    sandbox: Sandbox | None,
+    stop: threading.Event | None,
 ) -> Prepared:
     packages = [read_package(located, folder, ros) for folder in located.packages[:_MAX_PACKAGES]]
     problem = find_problem(located, packages)
     if problem is not None:
         records = record_packages(packages, ros, None)
         return Prepared(SubmissionRecord(located.id, located.sha256, problem, records), None)
+    named = {name for package in packages for name in package.named}
+    ros = completed(ros, named - {package.name for package in packages}, cache, on_progress)
     sources = Sources(
         files={file.path for file in located.files},
         folders={package.name: package.folder for package in packages},
@@ -133,6 +168,8 @@ def _prepare(
         limits=limits.build,
         on_progress=on_progress,
         environ=environ,
+        sandbox=sandbox,
+        stop=stop,
     )
     installed = None
     if built.install is not None:
@@ -140,7 +177,7 @@ def _prepare(
         installed = inspect(built.install, sources.folders, hashes)
     records = record_packages(packages, ros, installed)
     record = SubmissionRecord(located.id, located.sha256, None, records, built.build)
-    return Prepared(record, built.install)
+    return Prepared(record, built.install, ros.underlays)
 
 
 def find_problem(located: Located, packages: Sequence[Package]) -> str | None:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from grader.submission.code_facts import Lint, SourceFile
+
 
 @dataclass(frozen=True)
 class SourceError:
@@ -68,6 +70,19 @@ class Dependency:
 
 
 @dataclass(frozen=True)
+class Definition:
+    """The definition of an interface, or a file that seems to be meant as one.
+
+    Attributes:
+        file: Path in the submission; of a generated one below ``share/<package>``.
+        text: Its content.
+    """
+
+    file: str
+    text: str
+
+
+@dataclass(frozen=True)
 class PackageRecord:
     """One ament package of a submission.
 
@@ -89,6 +104,12 @@ class PackageRecord:
             with what is wrong.
         files: Python files as installed -> path in the submission; relative to site-packages
             (``bot_publisher/node.py``), or ``lib/<package>/...`` for scripts.
+        groups: Groups that package.xml makes it a member of (REP-149).
+        cmake: Its CMakeLists.txt, or None where it has none.
+        definitions: Its ``.msg``, ``.srv`` and ``.action`` files, and others beside them.
+        generated: Definitions that the build generated code for and installed.
+        sources: What its Python code says; tests, launch files and setup.py left aside.
+        lint: What ruff said of the same files, or None where it was not asked.
     """
 
     name: str
@@ -104,6 +125,16 @@ class PackageRecord:
     misplaced_executables: tuple[str, ...] = ()
     missing_targets: tuple[tuple[str, SourceError], ...] = ()
     files: tuple[tuple[str, str], ...] = ()
+    groups: tuple[str, ...] = ()
+    cmake: str | None = None
+    definitions: tuple[Definition, ...] = ()
+    generated: tuple[Definition, ...] = ()
+    sources: tuple[SourceFile, ...] = ()
+    lint: Lint | None = None
+
+    def file(self, name: str) -> str:
+        """Path in the submission of a file of the package."""
+        return name if self.path in ("", ".") else f"{self.path}/{name}"
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ def test_a_key_unlike_any_other_lists_what_is_allowed() -> None:
     (mistake,) = mistakes("messages: 3\ncolour: red", Until)
     assert mistake == (
         "assignment.yaml:2: colour: unknown key 'colour'. Allowed here: any, at_rest, elapsed, "
-        "messages, quiet, travelled."
+        "messages, quiet, stimuli, travelled."
     )
 
 

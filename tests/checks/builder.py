@@ -22,6 +22,7 @@ from grader.recording.model import (
     Ending,
     Endpoint,
     Incident,
+    Join,
     Kind,
     LogLine,
     Message,
@@ -228,7 +229,46 @@ def declarations(
         )
     if spin:
         found.append(declared("spin", 0.41, name, executor="SingleThreadedExecutor", threads=1))
-    return tuple(found)
+    return (*found, declared("exiting", STOP_S + 0.05, name))
+
+
+def sent(
+    times_s: Iterable[float],
+    topic: str = "/chatter",
+    type: str = "std_msgs/msg/String",
+    values: Iterable[Mapping[str, Any]] | None = None,
+) -> dict[str, tuple[Message, ...]]:
+    """What the probe published on a topic, numbered from 1; see ``Recording.sent``."""
+    times = list(times_s)
+    fields = [{"data": f"message {n}"} for n in range(len(times))] if values is None else values
+    return {
+        topic: tuple(
+            message(t, value, sequence=n, topic=topic, type=type, received_s=t)
+            for n, (t, value) in enumerate(zip(times, fields, strict=True), start=1)
+        )
+    }
+
+
+def stimulus(
+    topic: str = "/chatter", type: str = "std_msgs/msg/String", qos: Qos = RELIABLE
+) -> Endpoint:
+    """The probe's publisher of a stimulus."""
+    return endpoint(topic, type=type, node="/probe", owner=Owner.PROBE, qos=qos, appeared_s=0.0)
+
+
+def join(
+    joined_s: float, topic: str = "/cmd_vel", matched_s: float | None = None, **changes: Any
+) -> Join:
+    """A late joiner called ``late`` that asks for what was before."""
+    healthy = Join(
+        name="late",
+        topic=topic,
+        type=TWIST,
+        qos=Qos("reliable", "transient_local", "keep_last", 100),
+        joined_ns=at(joined_s),
+        matched_ns=at(joined_s + 0.02 if matched_s is None else matched_s),
+    )
+    return replace(healthy, **changes)
 
 
 def call(requested_s: float, answer_s: float | None = 0.002, of: str = NODE) -> Call:
@@ -327,7 +367,7 @@ def nodeless(**changes: Any) -> Recording:
         "calls": (),
         "matched_ns": None,
         "ending": Ending.NO_NODE,
-        "declarations": (declared("started"),),
+        "declarations": (declared("started"), declared("exiting", STOP_S + 0.05)),
     }
     return silent(**{**defaults, **changes})
 
@@ -479,25 +519,15 @@ def simulated(truth: Sequence[Truth], scene: Scene, **changes: Any) -> Recording
 def scene_of(simulation: Simulation) -> Scene:
     """World and robot as a cell records them."""
     model = simulation.robot.model
-    times = range(0, simulation.time_ns + 1, NS // 10)
     return Scene(
         radius_m=model.radius_m,
         max_linear_m_s=model.limits.speed_m_s,
         max_angular_rad_s=model.limits.angular_speed_rad_s,
         outlines={shape.label: tuple(shape.capsules) for shape in simulation.world.shapes},
-        moving={
-            item.label: (
-                item.reach_m,
-                tuple(
-                    None if (pose := item.pose_at(time)) is None
-                    else (pose.x_m, pose.y_m, pose.yaw_rad)
-                    for time in times
-                ),
-            )
-            for item in simulation.world.moving
-        },
+        moving=simulation.world.moving,
         began_ns=at(BEGAN_S),
-    )  # fmt: skip
+        lidar=simulation.lidar.options.pose,
+    )
 
 
 def _record(

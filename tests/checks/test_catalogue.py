@@ -28,6 +28,8 @@ from grader.recording.model import (
     Scene,
     Truth,
 )
+from sim.motion import ORIGIN, Pose
+from sim.script import MovingObstacle, Waypoint
 from tests.checks.builder import (
     LAUNCH_NS,
     TWIST,
@@ -39,12 +41,23 @@ from tests.checks.builder import (
     twist,
 )
 
+INTERFACE = "bot_publisher/msg/BotStatus"
 GOAL = [1.0, 0.0, "0 deg"]
 PARAMETERS = {
     "package.found": {"package": "bot_publisher", "build_type": "ament_python"},
     "package.builds": {"package": "bot_publisher"},
     "package.dependencies": {"package": "bot_publisher"},
     "package.executable": {"package": "bot_publisher", "executable": "bot_pub"},
+    "interface.found": {"interface": INTERFACE},
+    "interface.fields": {"interface": INTERFACE, "definition": "uint8 model"},
+    "interface.constants": {"interface": INTERFACE, "definition": "uint8 ON=1"},
+    "interface.generated": {"interface": INTERFACE},
+    "interface.manifest": {"interface": INTERFACE},
+    "source.class": {"package": "bot_publisher"},
+    "source.docstrings": {"package": "bot_publisher"},
+    "source.type_hints": {"package": "bot_publisher"},
+    "source.no_print": {"package": "bot_publisher"},
+    "source.ruff": {"package": "bot_publisher", "rules": ["F", "E501"]},
     "node.starts": {},
     "node.exists": {"name": "bot_publisher"},
     "node.alive": {"name": "bot_publisher"},
@@ -55,9 +68,29 @@ PARAMETERS = {
     "qos.offered": {"topic": "/cmd_vel", "reliability": "reliable", "deadline": "1 s"},
     "qos.requested": {"topic": "/cmd_vel", "durability": "volatile"},
     "qos.depth": {"topic": "/cmd_vel", "depth": 10},
+    "qos.compatible": {"topic": "/cmd_vel", "kind": "publisher", "reliability": "reliable"},
+    "qos.late_joiner": {"topic": "/cmd_vel", "joiner": "late", "last": 0},
     "messages.count": {"topic": "/cmd_vel", "at_least": 3, "at_most": 20},
     "messages.equal": {"topic": "/cmd_vel", "value": {"linear": {"x": 1.0}, "angular.z": 0.5}},
+    "messages.follows": {
+        "topic": "/cmd_vel",
+        "source": "/odom",
+        "fields": {"linear.x": "twist.twist.linear.x"},
+        "tolerance": 0.01,
+    },
+    "messages.sequence": {"topic": "/cmd_vel", "field": "linear.x", "step": 0, "start": 1},
     "timing.period": {"topic": "/cmd_vel", "period": "300 ms"},
+    "timing.rate": {"topic": "/cmd_vel", "at_least": "3 Hz", "at_most": "4 Hz"},
+    "timing.latency": {"stimulus": "/chatter", "topic": "/cmd_vel", "median": "50 ms"},
+    "callbacks.run": {"topic": "/cmd_vel", "callbacks": ["timer_1"], "period": "1 s"},
+    "callbacks.work": {"topic": "/cmd_vel", "callbacks": ["timer_1"], "duration": "400 ms"},
+    "callbacks.never_overlap": {"topic": "/cmd_vel", "callbacks": ["timer_1"]},
+    "callbacks.overlap": {"topic": "/cmd_vel", "callbacks": ["timer_1"], "others": ["timer_2"]},
+    "rotation.answers": {
+        "question": "/rpy",
+        "answer": "/cmd_vel",
+        "conversion": "rpy_to_quaternion",
+    },
     "executor.responsive": {"within": "1 s"},
     "motion.drives": {"speed": "0.22 m/s", "tolerance": "5 %"},
     "motion.keeps_driving": {"distance": "0.5 m"},
@@ -75,8 +108,51 @@ PARAMETERS = {
     "motion.within_limits": {},
     "topic.untouched": {},
     "log.follows": {"topic": "/cmd_vel", "fields": ["linear.x", "angular.z"]},
+    "log.contains": {"text": "ready", "level": "INFO"},
+    "log.level": {"at_most": "WARN"},
+    "log.rate": {"text": "ready", "rate": "1 Hz"},
+    "service.exists": {"service": "/enable", "type": "std_srvs/srv/SetBool"},
+    "service.responds": {"service": "/enable", "response": {"success": True}},
+    "service.concurrent": {"service": "/enable", "takes": "400 ms"},
+    "action.exists": {"action": "/fibonacci"},
+    "action.rejects": {"action": "/fibonacci", "goal": {"order": -1}},
+    "action.feedback": {"action": "/fibonacci", "at_least": 3, "rate": "10 Hz"},
+    "action.result": {"action": "/fibonacci", "result": {"sequence": [0, 1]}, "within": "2 s"},
+    "action.cancels": {"action": "/fibonacci"},
+    "action.preempts": {"action": "/fibonacci"},
+    "parameter.declared": {"node": "bot_publisher", "name": "speed", "default": 0.5},
+    "parameter.set": {"node": "bot_publisher", "name": "speed", "value": 0.9},
+    "parameter.takes_effect": {
+        "node": "bot_publisher",
+        "name": "speed",
+        "value": 0.9,
+        "topic": "/cmd_vel",
+        "fields": {"linear.x": 0.9},
+    },
+    "lifecycle.state": {"node": "bot_publisher", "states": ["unconfigured", "active"]},
 }
-ABSENT = {"topic.subscribed", "qos.requested", "qos.offered", "log.follows"}
+ABSENT = {
+    "interface.found",
+    "interface.fields",
+    "interface.constants",
+    "interface.generated",
+    "interface.manifest",
+    "messages.follows",
+    "topic.subscribed",
+    "qos.requested",
+    "qos.offered",
+    "log.follows",
+    "timing.latency",
+    "rotation.answers",
+    "qos.late_joiner",
+    "log.contains",
+    "log.rate",
+    "lifecycle.state",
+    *(name for name in PARAMETERS if name.startswith(("service.", "action.", "parameter."))),
+    *(name for name in PARAMETERS if name.startswith("callbacks.")),
+    # A record without source files cannot pass.
+    *(name for name in PARAMETERS if name.startswith("source.")),
+}
 
 
 def subject_of(name):
@@ -139,7 +215,7 @@ def test_the_nearest_name_is_offered():
 
 
 def test_without_a_near_name_all_are_listed():
-    with pytest.raises(ValueError, match=r"There are: executor\.responsive, log\.follows, "):
+    with pytest.raises(ValueError, match=r"There are: action\.cancels, action\.exists, "):
         get("zzz")
 
 
@@ -169,7 +245,9 @@ DECLARATIONS = st.builds(
     Declaration,
     TIMES,
     PROCESSES,
-    st.sampled_from(["started", "init", "node", "publisher", "timer", "spin", "held", "?"]),
+    st.sampled_from(
+        ["started", "init", "node", "publisher", "timer", "spin", "held", "exiting", "?"]
+    ),
     st.dictionaries(
         st.sampled_from(["topic", "depth", "history", "period_s", "node", "matched"]),
         st.one_of(JSON, TOPICS),
@@ -223,8 +301,16 @@ SCENES = st.builds(
     outlines=st.just(
         {"boxes[0]": ((1.0, -1.0, 1.0, 1.0, 0.0),), "circles[0]": ((0, 1, 0, 1, 0.1),)}
     ),
-    moving=st.just({"moving[0]": (0.1, (None, (0.5, 0.0, 0.0)))}),
+    moving=st.just(
+        (
+            MovingObstacle("moving[0]", (Waypoint(0, Pose(0.5, 0.0, 0.0)),), radius_m=0.1),
+            MovingObstacle(
+                "moving[1]", (Waypoint(0, ORIGIN),), size_m=(0.2, 0.1), appears_ns=20_000_000
+            ),
+        )
+    ),
     began_ns=st.just(LAUNCH_NS),
+    lidar=st.sampled_from([ORIGIN, Pose(-0.03, 0.01, 3.0)]),
 )
 SENSED = st.builds(
     lambda topic, value, time: (topic, Message(topic, "x/msg/X", value, time, time, 1)),
@@ -240,6 +326,7 @@ INCIDENTS = st.builds(
     TIMES,
     st.sampled_from(["late", "command_rejected", "contact_began"]),
     st.sampled_from(["3 steps done 25 ms late", "linear nan, angular 0.0", ""]),
+    st.one_of(st.none(), st.floats(0.0, 10.0)),
 )
 LOG = st.builds(
     LogLine,

@@ -199,6 +199,15 @@ def test_a_full_turn_more_is_the_same_heading():
     assert judge("motion.reaches", run, goal=goal, **REACHES).status is Status.PASSED
 
 
+def test_to_turn_on_the_spot_towards_the_goal_is_the_first_phase():
+    """At a constant speed the direction is off by 17 degrees once more when it is 8 cm away."""
+    goal = (0.0, 0.375, 0.0)
+    run = run_to(goal, angular=0.875, spin=1.0, turn_first=0.3, constant=0.2, period_s=0.1)
+    assert judge("motion.two_phases", run, goal=yaml(goal), position="0.1 m").status is (
+        Status.PASSED
+    )
+
+
 class TestMistakes:
     """Each mistake loses the checks that it should, with its own words, and no others."""
 
@@ -290,6 +299,19 @@ class TestMistakes:
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
         assert "still turns at 0.5 rad/s" in said or "not at rest" in said
         assert "still moves after 29.99 s" in failing("motion.settles", run, within="20 s")
+
+    def test_straight_past_the_goal_is_no_second_phase(self):
+        """It drives 5 cm past the goal at (0.6, 0) and aligns there."""
+
+        def law(pose):
+            if pose.x_m < 0.65:
+                return 0.1, 0.0
+            error = wrap(1.5 - pose.yaw_rad)
+            return 0.0, 0.0 if abs(error) < 0.05 else 1.5 * error
+
+        goal = (0.6, 0.0, 1.5)
+        found = lost(drive(on_odometry(law), seconds=20), goal)
+        assert list(found) == ["motion.overshoot"]
 
     def test_far_past_the_goal(self):
         run = run_to(GOAL, constant=0.22, near=0.0, seconds=15)

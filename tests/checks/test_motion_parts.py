@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from grader.checks.finding import Status
-from grader.checks.ground import ahead, nearest
+from grader.checks.ground import ahead, edge_m, nearest
 from grader.checks.law import Law, Sample, examine
 from grader.checks.measure import degrees, metres, point, side, speed
 from grader.checks.reference import (
@@ -19,7 +19,9 @@ from grader.checks.reference import (
     UnknownValue,
     resolve,
 )
-from grader.recording.model import Scene, Truth
+from grader.recording.model import NS, Scene, Truth
+from sim.motion import ORIGIN, Pose
+from sim.script import MovingObstacle, Waypoint
 from tests.checks.builder import (
     at,
     endpoint,
@@ -83,8 +85,8 @@ class TestReferences:
         assert "name of a random value" in properties["far"]["x-words"]
 
 
-def scene(outlines, moving=None):
-    return Scene(0.1, 0.22, 2.84, outlines, moving or {}, at(0))
+def scene(outlines, moving=(), lidar=ORIGIN):
+    return Scene(0.1, 0.22, 2.84, outlines, moving, at(0), lidar)
 
 
 def standing(x=0.0, y=0.0, yaw=0.0, time_s=0.0):
@@ -114,7 +116,8 @@ class TestGround:
             assert sight is None
         else:
             assert sight is not None
-            assert math.isclose(sight.distance_m, distance - math.sqrt(0.04 - aside**2))
+            half_m = math.sqrt(max(0.0, 0.04 - aside**2))
+            assert math.isclose(sight.distance_m, distance - half_m, abs_tol=1e-8)
 
     def test_nothing_behind_counts(self):
         world = scene({"wall": ((-1.0, -1.0, -1.0, 1.0, 0.0),)})
@@ -124,11 +127,39 @@ class TestGround:
         assert side(near.bearing_rad) == "behind it"
 
     def test_what_moves_is_where_it_was_then(self):
-        places = (None, None, (1.0, 0.0, 0.0), (1.2, 0.0, 0.0))
-        world = scene({}, {"m": (0.1, places)})
+        path = (
+            Waypoint(200_000_000, Pose(1.0, 0.0, 0.0)), Waypoint(300_000_000, Pose(1.2, 0.0, 0.0))
+        )  # fmt: skip
+        pillar = MovingObstacle("m", path, radius_m=0.1, appears_ns=200_000_000)
+        world = scene({}, (pillar,))
         assert ahead(world, standing(time_s=0.19)) is None
         found = [ahead(world, standing(time_s=time)) for time in (0.2, 0.25, 0.3)]
         assert [sight and round(sight.distance_m, 6) for sight in found] == [0.9, 1.0, 1.1]
+
+    def test_a_moving_box_is_a_box(self):
+        """A circle around 0.2 m x 1 m would reach 0.51 m; its near side is 0.1 m from its middle.
+
+        Turned by a quarter its ends lie ahead and behind, and it is 0.2 m wide.
+        """
+        path = (
+            Waypoint(0, Pose(1.0, 0.0, 0.0)), Waypoint(NS, Pose(1.0, 0.0, math.pi / 2)),
+            Waypoint(2 * NS, Pose(1.0, 0.3, math.pi / 2)),
+        )  # fmt: skip
+        world = scene({}, (MovingObstacle("m", path, size_m=(0.2, 1.0)),))
+        before, turned, aside = (ahead(world, standing(time_s=time)) for time in (0, 1, 2))
+        assert before is not None and math.isclose(before.distance_m, 0.9)
+        assert turned is not None and math.isclose(turned.distance_m, 0.5)
+        assert aside is None
+        near = nearest(world, standing(time_s=2))
+        assert near is not None and math.isclose(near.distance_m, math.hypot(0.5, 0.2))
+
+    def test_from_the_lidar_along_the_robot_s_heading(self):
+        """The LiDAR sits 5 cm ahead and is turned to the left, as the robot is in the world."""
+        lidar = Pose(0.05, 0.0, math.pi / 2)
+        world = scene({"wall": ((0.0, 1.0, 2.0, 1.0, 0.0),)}, lidar=lidar)
+        sight = ahead(world, standing(1.0, 0.0, math.pi / 2))
+        assert sight is not None and math.isclose(sight.distance_m, 0.95)
+        assert math.isclose(edge_m(world), 0.05)
 
 
 def law(commands, limit=2.84):
@@ -172,6 +203,18 @@ class TestLaw:
         commands = [(0.25 + 0.1 * n, 1.0) for n in range(20, 0, -1)]
         verdict = law([*commands, (0.24, 0.96), (0.15, 0.6), (0.09, 0.36), (0.05, 0.0)])
         assert verdict.law is Law.PROPORTIONAL and math.isclose(verdict.gain, 4.0)
+
+    def test_a_stray_command_between_two_phases_is_left_out(self):
+        """The last turn towards the goal's position answers another error than its heading."""
+        commands = [(-1.74, 0.3), *[(-e / 1.7, -e / 1.7) for e in ERRORS]]
+        verdict = law(commands)
+        assert verdict.law is Law.PROPORTIONAL and verdict.r2 > 0.99
+        assert math.isclose(verdict.gain, 1.0, rel_tol=1e-6)
+
+    def test_strays_by_the_dozen_are_no_law(self):
+        commands = [(e, 1.5 * e if number % 8 else -0.1) for number, e in enumerate(ERRORS)]
+        verdict = law(commands)
+        assert not (verdict.law is Law.PROPORTIONAL and verdict.r2 >= 0.9)
 
     def test_the_wrong_sign(self):
         verdict = law([(e / 1.2, -0.8 * e / 1.2) for e in ERRORS])

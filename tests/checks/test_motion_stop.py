@@ -95,6 +95,39 @@ def test_without_anything_ahead_it_must_not_stop():
     passes("motion.drives", run, speed="0.1 m/s")
 
 
+def test_a_moving_box_is_as_near_as_its_side():
+    """2 m long across the way and 10 cm thick: its near side is at 0.75 m."""
+    world = "{moving: [{box: {size: [0.1, 2.0]}, path: [{at: 0 s, pose: [0.8, 0]}]}]}"
+    run = drive(by_front(), world=world, seconds=20)
+    finding = passes("motion.stops", run, **STOPS)
+    assert "`moving[0]` at 0.1" in finding.observed
+
+
+def test_the_distance_counts_from_the_lidar():
+    run = drive(
+        by_front(), world=WALL, seconds=20, options={"lidar": {"pose": [-0.03, 0, "0 deg"]}}
+    )
+    finding = passes("motion.stops", run, distance="0.2 m", early="0 m", late="3 cm")
+    seen_m = float(finding.observed.split(" at ")[1].removesuffix(" m"))
+    assert math.isclose(seen_m, 1.0 - run.truth[-1].x_m + 0.03, abs_tol=1e-3)
+
+
+class TestKeepsDriving:
+    def test_backwards_is_no_way_ahead(self):
+        run = drive(by_front(-0.1), seconds=5)
+        said = failing("motion.keeps_driving", run, distance="5 cm")
+        assert "the robot drove 0.4" in said and "backwards" in said
+
+    def test_what_is_driven_back_is_taken_off(self):
+        run = drive(lambda s: (0.1 if s.time_s < 4 else -0.1, 0.0), seconds=6)
+        failing("motion.keeps_driving", run, distance="0.3 m")
+        passes("motion.keeps_driving", run, distance="0.15 m")
+
+    def test_a_curve_ahead_counts_along_its_path(self):
+        run = drive(on_scan(lambda _: (0.1, 0.5)), seconds=13)
+        passes("motion.keeps_driving", run, distance="1.2 m")
+
+
 class TestDrives:
     def test_twice_as_fast(self):
         run = drive(by_front(0.2), world=WALL, seconds=20)
@@ -220,7 +253,7 @@ class TestStops:
     def test_late_steps_of_the_simulator_count_as_taken(self):
         run = drive(by_front(0.15, 0.17), world=WALL, seconds=20)
         stopped = next(s for s in run.truth[200:] if abs(s.linear_m_s) < 1e-3)
-        late = Incident(stopped.time_ns, "late", "80 steps done 800 ms late")
+        late = Incident(stopped.time_ns, "late", "80 steps done 800 ms late", 0.8)
         run = simulated(run.truth, run.scene, messages=run.messages, incidents=(late,))
         finding = judge("motion.stops", run, distance="0.2 m", late="2 cm")
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.recording.model import Ending, Owner, Wait
+from grader.recording.model import Ending, Intervention, Owner, Wait
 from grader.submission.record import BuildRecord, SourceError
 from tests.checks.builder import (
     BOT,
@@ -254,6 +254,31 @@ class TestAlive:
         run = recording(processes=(died(0),), ending=Ending.EXITED)
         assert "spin_once() handles one round only" in failing("node.alive", run)
 
+    def test_a_process_that_was_broken_off_did_not_return(self):
+        said = tuple(item for item in declarations() if item.kind != "exiting")
+        run = recording(processes=(died(0),), ending=Ending.EXITED, declarations=said)
+        found = failing("node.alive", run)
+        assert "main() did not return" in found
+        assert "os._exit()" in found
+
+    def test_a_process_that_was_leaving_when_sigint_came_ended_by_itself(self):
+        """Under load the way out takes a while; with exit code -2 it shows no more than SIGINT."""
+        said = (*declarations()[:-1], declared("exiting", 3.0))
+        for exit_code in (0, -2, 1):
+            late = replace(process(exited_s=4.3), exit_code=exit_code)
+            run = recording(processes=(late,), declarations=said)
+            found = failing("node.alive", run)
+            assert "ended 3.00 s after launch" in found
+            assert "main() returned" in found
+
+    def test_the_end_of_a_child_says_nothing_of_its_parent(self):
+        said = (
+            declared("started", pid=7), declared("node", node=NODE), declared("spin"),
+            declared("exiting", pid=8),
+        )  # fmt: skip
+        run = recording(processes=(died(0),), ending=Ending.EXITED, declarations=said)
+        assert "os._exit()" in failing("node.alive", run)
+
     def test_a_node_that_was_destroyed_while_its_process_went_on(self):
         run = recording(nodes=(node(vanished_s=1.5),), messages=messages(every(0.3, 2)), calls=())
         assert "left the ROS graph 1.50 s after launch" in failing("node.alive", run, name=NODE)
@@ -359,3 +384,35 @@ class TestEnds:
 def test_endpoints_of_others_are_not_the_students():
     run = recording(nodes=(node("/probe"),), endpoints=(endpoint(node="/probe"),))
     assert "found the node `/probe`" in text(judge("node.exists", run, name=NODE))
+
+
+class TestKilledByTheScenario:
+    """What a stimulus ends did not end early."""
+
+    def run(self, **changes):
+        killed = process(exited_s=2.1, stopped_by="SIGKILL", exit_code=-9, stop_s=0.1)
+        again = process(started_ns=at(2.5))
+        interventions = (
+            Intervention(at(2.0), BOT, "kill", "SIGKILL"),
+            Intervention(at(2.5), BOT, "restart"),
+        )
+        nodes = (node(vanished_s=2.2), node(appeared_s=2.9))
+        defaults = {
+            "processes": (killed, again), "interventions": interventions, "nodes": nodes
+        }  # fmt: skip
+        return recording(**{**defaults, **changes})
+
+    def test_it_counts_as_alive(self):
+        assert judge("node.alive", self.run()).status is Status.PASSED
+
+    def test_only_the_end_of_its_second_life_counts(self):
+        assert judge("node.ends", self.run(), within="1 s").status is Status.PASSED
+
+    def test_a_restart_that_dies_is_told(self):
+        killed = self.run().processes[0]
+        run = self.run(processes=(killed, died(1, exited_s=3.0)))
+        assert "exit code 1" in failing("node.alive", run)
+
+    def test_without_a_second_life_there_is_nothing_to_judge(self):
+        run = self.run(processes=self.run().processes[:1])
+        assert judge("node.ends", run, within="1 s").status is Status.ERROR

@@ -252,7 +252,7 @@ class TestMistakes:
         assert "3 s is 3." in found
 
     def test_two_timers(self):
-        twice = (*declarations(), *declarations()[-2:])
+        twice = (*declarations(), *declarations()[4:6])
         found = wrong([0.05, 0.25] * 10, declarations=twice)
         assert "messages come twice as often as expected" in found
         assert "declared 2 timers" in found

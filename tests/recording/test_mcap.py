@@ -13,6 +13,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from grader.errors import UsageError
+from grader.recording.interaction import Feedback, Goal, Service
 from grader.recording.mcap_reader import read_recording
 from grader.recording.mcap_writer import RawMessage, write_recording
 from grader.recording.model import (
@@ -21,6 +22,9 @@ from grader.recording.model import (
     Disturbance,
     Ending,
     Endpoint,
+    Incident,
+    Intervention,
+    Join,
     Kind,
     LogLine,
     Node,
@@ -28,9 +32,20 @@ from grader.recording.model import (
     Process,
     Qos,
     Recording,
+    Scene,
+    Truth,
     Wait,
 )
+from grader.submission.code_facts import (
+    Lint,
+    LintFinding,
+    SourceClass,
+    SourceFile,
+    SourceFunction,
+)
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
+from sim.motion import Pose
+from sim.script import MovingObstacle, Waypoint
 
 TWIST = """\
 Vector3  linear
@@ -68,6 +83,17 @@ def a_recording(**changes: object) -> Recording:
                     path="src/bot_publisher",
                     syntax_errors=(SourceError("node.py", 3, "invalid syntax"),),
                     files=(("bot_publisher/node.py", "src/node.py"),),
+                    sources=(
+                        SourceFile(
+                            "src/node.py",
+                            "bot_publisher.node",
+                            classes=(SourceClass("Bot", 3, ("Node",), documented=True),),
+                            functions=(SourceFunction("Bot.go", 5, unannotated=("x",)),),
+                            names=(("Node", "rclpy.node.Node"),),
+                            prints=(7,),
+                        ),
+                    ),
+                    lint=Lint(None, (LintFinding("F401", "src/node.py", 1, "unused"),)),
                 ),
             ),
             build=BuildRecord(succeeded=True, duration_s=0.9, log="ok"),
@@ -89,10 +115,59 @@ def a_recording(**changes: object) -> Recording:
         processes=(Process("p/e", 42, 1_000, 9_400, -2, "SIGINT", 0.06, ("sleep 99",), 5),),
         log=(LogLine(3_000, "p/e", "stdout", "<b>\x1b[31mred\u202e"),),
         declarations=(Declaration(1_700, "p/e", "timer", {"period_s": 0.3, "group": {"id": 1}}),),
-        calls=(Call("/bot_publisher/list_parameters", "srv", 2_500, None),),
+        calls=(
+            Call("/bot_publisher/list_parameters", "srv", 2_500, None),
+            Call("/go", "x/srv/Go", 2_600, 2_700, {"to": [1.5]}, {"done": True}),
+            Call("/gone", "x/srv/Go", 2_800, request={}, error="no server"),
+        ),
+        services=(Service("/go", "x/srv/Go", "/bot_publisher", 1_650, 9_100),),
+        goals=(
+            Goal(
+                "/fib",
+                "x/action/Fib",
+                {"order": 2},
+                3_000,
+                accepted=True,
+                answered_ns=3_010,
+                feedback=(Feedback(3_100, {"sequence": [0, 1]}),),
+                statuses=((3_020, "executing"),),
+                canceled_ns=3_200,
+                status="canceled",
+                result={"sequence": []},
+                result_ns=3_300,
+                preempted=True,
+            ),
+        ),
         waits=(Wait("a node", 10.0, 1_000, 1_500),),
+        joins=(Join("late", "/cmd_vel", "geometry_msgs/msg/Twist", Qos("reliable"), 4_000, 4_500),),
+        interventions=(Intervention(5_000, "p/e", "kill", "SIGINT"),),
+        sent={"/chatter": ()},
+        answers={"/chatter": "/cmd_vel"},
         disturbance=(Disturbance(2_000, 30, 40),),
         faults=("not alone",),
+        truth=(Truth(2_010, 0.1, -0.2, 3.0, 0.1, 0.0, 0.2, -0.1, "moving[0]"),),
+        incidents=(
+            Incident(2_010, "contact_began", "moving[0]"),
+            Incident(2_020, "late", "3 steps done 25 ms late", 0.025),
+        ),
+        scene=Scene(
+            radius_m=0.1,
+            max_linear_m_s=0.22,
+            max_angular_rad_s=2.84,
+            outlines={"boxes[0]": ((1.0, -1.0, 1.0, 1.0, 0.0),)},
+            moving=(
+                MovingObstacle(
+                    "moving[0]",
+                    (Waypoint(0, Pose(1.0, 2.0, 0.5)), Waypoint(10, Pose(1.0, 2.5, 0.5))),
+                    size_m=(0.4, 0.2),
+                    appears_ns=5,
+                    line=7,
+                ),
+            ),
+            began_ns=2_000,
+            lidar=Pose(-0.03, 0.0, 3.14),
+            command_topic="/bot/cmd_vel",
+        ),
         environment={"rmw": "rmw_fastrtps_cpp"},
     )
     return dataclasses.replace(recording, **changes)  # type: ignore[arg-type]
@@ -127,6 +202,25 @@ def test_messages_come_back_decoded_in_the_order_of_their_source_stamps(tmp_path
         "angular": {"x": 3.0, "y": 4.0, "z": 5.0},
     }
     assert second.value["angular"]["z"] == 0.5
+
+
+def test_what_was_sent_and_what_joined_late_stay_apart_from_what_was_heard(tmp_path: Path) -> None:
+    heard, kept = raw(3_000, 1, 0, 0, 0, 0, 0), raw(3_000, 1, 0, 0, 0, 0, 0)
+    ours = dataclasses.replace(raw(2_500, 2, 0, 0, 0, 0, 0), topic="/goal", is_sent=True)
+    late = dataclasses.replace(kept, received_ns=4_600, join="late")
+    later = dataclasses.replace(raw(2_000, 3, 0, 0, 0, 0, 0), received_ns=4_700, join="late")
+    recording = a_recording(sent={"/chatter": (), "/goal": ()})
+    again = read_recording(written(tmp_path, recording, heard, ours, late, later))
+    assert [message.value["linear"]["x"] for message in again.on("/cmd_vel")] == [1.0]
+    assert again.on("/goal") == ()
+    assert again.sent["/chatter"] == ()
+    (sent,) = again.sent["/goal"]
+    assert (sent.topic, sent.stamp_ns, sent.value["linear"]["x"]) == ("/goal", 2_500, 2.0)
+    # In the order of their reception, which tells what came of the past.
+    assert [message.received_ns for message in again.joined["late"]] == [4_600, 4_700]
+    assert {message.topic for message in again.joined["late"]} == {"/cmd_vel"}
+    assert again.carried("/goal") == (sent,)
+    assert again.carried("/cmd_vel") == again.on("/cmd_vel")
 
 
 @settings(max_examples=50, deadline=None)

@@ -12,7 +12,7 @@ class Page(HTMLParser):
 
     Attributes:
         elements: Tag and attributes of each start tag, in order.
-        text: All text between the tags, style sheets left aside.
+        text: All text between the tags, style sheets and scripts left aside.
         problems: Tags that are not closed or not opened.
     """
 
@@ -59,5 +59,5 @@ class Page(HTMLParser):
             self._text.append(" ")
 
     def handle_data(self, data):
-        if "style" not in self._open:
+        if not {"style", "script"} & set(self._open):
             self._text.append(data)

@@ -29,6 +29,7 @@ def test_the_keys_of_the_contract():
         "graded",
         "first_to_fix",
         "checks",
+        "withheld",
         "scenarios",
         "build",
         "environment",

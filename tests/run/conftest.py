@@ -73,4 +73,4 @@ def run_node(tmp_path: Path) -> Iterator[RunNode]:
         return read_recording(file)
 
     yield run
-    runner.abort()
+    runner.close()

@@ -27,7 +27,8 @@ def main(folder: Path, value: str, forever: bool) -> None:
     runner = Runner(ros.find(), progress=progress)
     source = nodes.timed(value=float(value))
     file = folder / "run.mcap"
-    runner.run(course, course.scenarios[0], SUBMISSION, install(folder, source), file, seed=1)
+    with runner:
+        runner.run(course, course.scenarios[0], SUBMISSION, install(folder, source), file, seed=1)
     recording = read_recording(file)
     print(*sorted({str(m.value["linear"]["x"]) for m in recording.on("/cmd_vel")}))
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
+import time
 
 from grader.run.admission import Admission
+from grader.run.load import Load, cpu_count
 
 LIMIT_S = 10.0
 
@@ -72,3 +76,40 @@ def test_alone_waits_for_the_others_and_keeps_them_out() -> None:
     lonely.go()
     assert later.is_inside()
     later.go()
+
+
+class Busy(Load):
+    """A machine with so many runnable threads."""
+
+    def __init__(self, threads: float) -> None:
+        super().__init__()
+        self.threads = threads
+
+    def runnable(self) -> float:
+        return self.threads
+
+
+def test_a_busy_machine_takes_one_cell_for_each_cpu() -> None:
+    load = Busy(100.0)
+    admission = Admission(starts=100, load=load)
+    inside = [Visitor(admission) for _ in range(cpu_count())]
+    assert all(visitor.is_inside() for visitor in inside)
+    one_more = Visitor(admission)
+    assert not one_more.inside.wait(0.2)
+    load.threads = 0.0
+    assert one_more.is_inside()
+    for visitor in (*inside, one_more):
+        visitor.go()
+
+
+def test_the_load_counts_threads_of_the_whole_machine() -> None:
+    load = Load()
+    burner = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    try:
+        deadline = time.monotonic() + LIMIT_S
+        while load.runnable() < 0.5:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+    finally:
+        burner.kill()
+        burner.wait()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import signal
 import subprocess
 import sys
 import time
@@ -152,6 +153,18 @@ def test_a_gigabyte_of_output_is_drained_and_bounded(run_node: RunNode) -> None:
     assert recording.processes[0].exit_code == 0
     assert kept < 2**18
     assert recording.processes[0].dropped_bytes + kept > 2**30 - 2**20
+
+
+def test_a_grader_in_the_background_interrupts_as_a_terminal_does(run_node: RunNode) -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        recording = run_node(
+            nodes.timed(before_spin="rclpy.shutdown()\nwhile True: time.sleep(0.1)"),
+            until={"elapsed": "1 s"},
+        )
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert recording.processes[0].stopped_by == "SIGINT"
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.recording.model import LogLine
-from grader.run.output import OutputReader
+from grader.run.output import OutputReader, _Stream
 
 
 def read(*chunks: bytes, stream: str = "stdout", limit: int = 1 << 16) -> tuple[LogLine, ...]:
@@ -32,6 +32,16 @@ def test_lines_keep_their_order_and_lose_their_ends() -> None:
         "three",
         "four",
     ]
+
+
+def test_a_carriage_return_ends_a_line_too() -> None:
+    """A progress bar writes its line again and again; a line end may be cut between reads."""
+    stream = _Stream("p/e", "stdout", 1 << 16)
+    for chunk in (b"10 %\r20 %\r", b"\n30 %\r", b"40 %\r\n\nend"):
+        stream.feed(chunk)
+    stream.finish()
+    texts = [line.text for line in stream.kept.head]
+    assert texts == ["10 %", "20 %", "30 %", "40 %", "", "end"]
 
 
 def test_bytes_that_are_not_text_are_replaced() -> None:

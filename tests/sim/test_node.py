@@ -351,6 +351,7 @@ def test_a_command_of_the_other_type_does_not_match(bench: Bench) -> None:
     bench.wait(lambda: right.get_subscription_count() == 1, "match")
     bench.wait(lambda: len(bench.node.get_publishers_info_by_topic("/cmd_vel")) == 2, "discovery")
     assert wrong.get_subscription_count() == 0
+    assert simulator.unheard == ("geometry_msgs/msg/TwistStamped",)
     wrong.publish(TwistStamped())
     right.publish(command(0.1, 0.0))
     bench.wait(lambda: bench.step(simulator) or simulator.commands == 1, "command")

@@ -54,6 +54,7 @@ def test_commands_that_are_not_finite_are_counted() -> None:
     for speed in (math.nan, 0.1, math.inf):
         screen.on_step(simulation.advance(Twist(speed, 0.0)), 0)
     assert screen.rejected == 2
+    assert screen.line().endswith("2 commands not finite: the robot stops instead")
 
 
 def test_without_a_terminal_it_is_a_line_for_every_second() -> None:

@@ -139,6 +139,23 @@ def test_a_constant_command_draws_the_arc_of_the_closed_form() -> None:
         assert abs(complex(pose.x_m, pose.y_m) - centre) == pytest.approx(0.4, abs=1e-12)
 
 
+def test_the_robot_obeys_its_own_drives_at_their_times() -> None:
+    drives = [
+        {"at": "500 ms", "linear": "0.1 m/s"},
+        {"at": "100 ms", "angular": "1 rad/s"},
+    ]
+    steps = run(simulation(robot={"drives": drives}), 100)
+    asked = [(step.command.linear_m_s, step.command.angular_rad_s) for step in steps]
+    # The step that begins at 100 ms is the eleventh.
+    assert asked == [(0.0, 0.0)] * 10 + [(0.0, 1.0)] * 40 + [(0.1, 0.0)] * 50
+
+
+def test_a_command_that_comes_with_a_drive_counts_more() -> None:
+    subject = simulation(robot={"drives": [{"at": 0, "linear": "0.1 m/s"}]})
+    assert subject.advance(Twist(0.2, 0.0)).command == Twist(0.2, 0.0)
+    assert subject.advance().command == Twist(0.2, 0.0)
+
+
 def test_the_last_command_holds_for_ever_without_a_timeout() -> None:
     steps = run(simulation(), 1000, lambda i: Twist(0.1, 0.0) if i == 0 else None)
     assert steps[-1].twist == Twist(0.1, 0.0)

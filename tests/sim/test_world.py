@@ -151,7 +151,7 @@ def test_all_mistakes_are_reported_at_once() -> None:
 def test_an_absurd_number_of_walls_is_refused() -> None:
     boxes = MAX_SEGMENTS // 4 + 1
     text = "boxes:\n" + "  - {centre: [0, 0], size: [1, 1]}\n" * boxes
-    with pytest.raises(AssignmentError, match=f"{4 * boxes} walls and circles: at most 5000 are"):
+    with pytest.raises(AssignmentError, match=f"{4 * boxes} walls and circles: at most 3000 are"):
         parse_world(text)
 
 

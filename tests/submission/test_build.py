@@ -14,7 +14,7 @@ from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.submission.build import BuildLimits, build_key
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
-from grader.submission.record import BuildRecord, PackageRecord
+from grader.submission.record import BuildRecord, Definition, PackageRecord
 
 from .samples import MANIFEST, NODE, SETUP_PY, Tree, zip_bytes
 
@@ -319,6 +319,13 @@ def test_messages_are_generated_and_used_by_another_package(
     assert build_of(found).succeeded
     assert "model=1" in run(found, real_ros, "bot_publisher/bot_pub")
     assert package_of(found).ros_imports[0].module == "bot_msgs"
+    messages = found.record.package("bot_msgs")
+    assert messages is not None
+    text = INTERFACES["src/bot_msgs/msg/Bot.msg"]
+    assert messages.definitions == (Definition("src/bot_msgs/msg/Bot.msg", text),)
+    assert messages.generated == (Definition("msg/Bot.msg", text),)
+    assert messages.groups == ("rosidl_interface_packages",)
+    assert messages.cmake == INTERFACES["src/bot_msgs/CMakeLists.txt"]
 
 
 @pytest.mark.slow

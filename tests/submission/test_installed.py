@@ -14,6 +14,7 @@ from grader.submission.installed import (
     normalised,
     tidy,
 )
+from grader.submission.record import Definition
 
 from .samples import Tree
 
@@ -68,7 +69,17 @@ def test_links_pipes_and_giant_metadata_are_not_read(tree: Tree) -> None:
 
 
 def test_an_empty_install_space_has_nothing(tmp_path: Path) -> None:
-    assert inspect(tmp_path, ["bot"], {}) == InstallSpace({"bot": ()}, (), {}, {}, {})
+    nothing = InstallSpace({"bot": ()}, (), {}, {}, {}, {"bot": ()})
+    assert inspect(tmp_path, ["bot"], {}) == nothing
+
+
+def test_definitions_count_where_code_was_generated_from_them(tmp_path: Path) -> None:
+    for file in ("msg/Bot.msg", "msg/Bot.json", "msg/Bot.idl", "msg/Other.msg", "srv/Add.srv"):
+        path = tmp_path / "share/bot" / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(file)
+    found = inspect(tmp_path, ["bot"], {}).definitions
+    assert found == {"bot": (Definition("msg/Bot.msg", "msg/Bot.msg"),)}
 
 
 def test_of_equal_files_the_one_with_the_most_similar_path_is_the_origin() -> None:

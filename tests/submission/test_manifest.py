@@ -36,6 +36,13 @@ def test_name_build_type_and_dependencies_are_read() -> None:
     )
 
 
+def test_the_groups_of_a_package_are_read() -> None:
+    tag = "<member_of_group>rosidl_interface_packages</member_of_group>"
+    found = changed("</license>", f"</license>{tag}")
+    assert found.error is None
+    assert found.groups == ("rosidl_interface_packages",)
+
+
 @pytest.mark.parametrize(
     "tag",
     [

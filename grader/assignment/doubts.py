@@ -1,0 +1,48 @@
+"""What is valid in an assignment but looks like a slip: told by ``rosgrade validate``. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from grader.assignment.load import LoadedAssignment
+from grader.assignment.model import Scenario
+from grader.assignment.mutant import Mutant
+from grader.assignment.stimulus import Join, Publish
+from grader.nearest import did_you_mean
+
+
+def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterator[str]:
+    """Find what an author should look at once more.
+
+    Args:
+        loaded: The assignment.
+        mutants: Its mutants, or None where it has no such file.
+    """
+    yield from _unknown_topics(loaded)
+    if mutants is None:
+        yield "there is no mutants.yaml: nothing shows that the checks notice mistakes"
+        return
+    lost = {name for mutant in mutants for name in mutant.loses}
+    for bound in loaded.checks:
+        if bound.spec.id not in lost:
+            yield f"no mutant loses the check {bound.spec.id!r}: nothing shows that it can fail"
+
+
+def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
+    for bound in loaded.checks:
+        topic = getattr(bound.parameters, "topic", None)
+        if not isinstance(topic, str):
+            continue
+        for scenario in loaded.scenarios_of(bound):
+            known = _topics(scenario)
+            if topic not in known:
+                yield (
+                    f"the check {bound.spec.id!r} is about {topic!r}, which the scenario "
+                    f"{scenario.id!r} neither records nor sends.{did_you_mean(topic, known)}"
+                )
+
+
+def _topics(scenario: Scenario) -> set[str]:
+    sent = {one.publish for one in scenario.stimuli if isinstance(one, Publish)}
+    joined = {one.join for one in scenario.stimuli if isinstance(one, Join)}
+    return {*scenario.recorded_types, *sent, *joined}

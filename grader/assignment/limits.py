@@ -1,0 +1,59 @@
+"""How much of the machine a submission may take, as an author writes it."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from grader.assignment.quantity import Duration, Size
+from grader.assignment.source import Model
+from grader.sandbox.limits import Limits
+
+_DEFAULTS = Limits()
+
+
+class LimitOptions(Model):
+    """What the processes of a student may take in a sandbox.
+
+    Without a sandbox nothing is bounded but time. How long a run lasts is bounded by
+    `discovery`, `timeout` and `shutdown`.
+    """
+
+    memory: Size = Field(
+        _DEFAULTS.memory_bytes, description="Of all processes together.", validate_default=False
+    )
+    processes: int = Field(
+        _DEFAULTS.processes,
+        ge=16,
+        le=4096,
+        description="Processes and threads together; a node of rclpy has 14 threads.",
+    )
+    cpu_time: Duration = Field(
+        _DEFAULTS.cpu_s, description="CPU time of one process.", validate_default=False
+    )
+    file_size: Size = Field(
+        _DEFAULTS.file_bytes, description="Size of one file.", validate_default=False
+    )
+    disk: Size = Field(
+        _DEFAULTS.disk_bytes,
+        description="Everything in home and /tmp; it is kept in memory.",
+        validate_default=False,
+    )
+    files: int = Field(_DEFAULTS.files, ge=100, description="Files and folders in home and /tmp.")
+    output: Size = Field(
+        _DEFAULTS.output_bytes,
+        description="What is written to the terminal; whoever writes more is ended.",
+        validate_default=False,
+    )
+
+    def limits(self) -> Limits:
+        """For the sandbox."""
+        return Limits(
+            memory_bytes=int(self.memory),
+            processes=self.processes,
+            cpu_s=max(1, round(self.cpu_time)),
+            file_bytes=int(self.file_size),
+            disk_bytes=int(self.disk),
+            files=self.files,
+            output_bytes=int(self.output),
+            address_bytes=max(_DEFAULTS.address_bytes, 4 * int(self.memory)),
+        )

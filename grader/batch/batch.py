@@ -1,0 +1,198 @@
+"""A class's submissions, graded one beside the other, each once, whatever happens meanwhile."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from grader.assignment.load import LoadedAssignment
+from grader.batch.crew import Crew
+from grader.batch.files import write_graded
+from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
+from grader.batch.intake import HandedIn
+from grader.batch.ledger import Entry, Ledger
+from grader.batch.regrading import find, regrade
+from grader.errors import RosgradeError, UsageError
+from grader.recording.fact import to_json
+from grader.report.facts import Clock
+from grader.report.files import write_whole
+from grader.report.result_model import Result
+from grader.submission.prepare import fingerprint
+
+FAULTS_FILE = "faults.log"
+RETRY_ALL, RETRY_ERRORS = "all", "errors"
+
+
+@dataclass(frozen=True)
+class Done:
+    """A row that is finished.
+
+    Attributes:
+        entry: The row.
+        result: Its result; None where nothing could be graded.
+        fresh: Whether it was graded now, and not by an earlier batch.
+    """
+
+    entry: Entry
+    result: Result | None
+    fresh: bool
+
+
+@dataclass
+class Batch:
+    """Grades the rows of a class into a folder.
+
+    Attributes:
+        loaded: The assignment.
+        ledger: The folder, opened.
+        retry: Keys to grade again, or ``all``, or ``errors``.
+    """
+
+    loaded: LoadedAssignment
+    ledger: Ledger
+    retry: frozenset[str] = frozenset()
+    _entries: dict[str, Entry] = field(default_factory=dict)
+
+    def read(
+        self, rows: Sequence[HandedIn], on_read: Callable[[str], None] = lambda _: None
+    ) -> tuple[list[Entry], dict[str, Path]]:
+        """Read what was handed in, and find the same among it.
+
+        Args:
+            rows: The class.
+            on_read: Told the key of each row.
+
+        Returns:
+            The rows, and what is to be graded by key: of the same submissions only the first.
+
+        Raises:
+            UsageError: A key to grade again is not there, or results are of another assignment.
+        """
+        unknown = self.retry - {RETRY_ALL, RETRY_ERRORS} - {row.key for row in rows}
+        if unknown:
+            raise UsageError(f"--retry: there is no submission called {', '.join(sorted(unknown))}")
+        paths: dict[str, Path] = {}
+        first: dict[str, str] = {}
+        for row in rows:
+            on_read(row.key)
+            entry = Entry(row.key, row.name, row.late, problem=row.problem)
+            if row.path is not None:
+                entry = self._identified(entry, row.path)
+                original = first.setdefault(entry.sha256, row.key) if entry.sha256 else row.key
+                if original != row.key:
+                    entry = replace(entry, same_as=original)
+                elif not entry.fault:
+                    paths[row.key] = row.path
+            self._entries[row.key] = entry
+        to_do = {key: path for key, path in paths.items() if not self._is_done(key)}
+        self._write()
+        return list(self._entries.values()), to_do
+
+    def grade(self, to_do: dict[str, Path], crew: Crew | None) -> Iterator[Done]:
+        """Grade, and put each result into place as soon as it is there.
+
+        Args:
+            to_do: What to grade, by key.
+            crew: Who does it; needed where there is anything to do.
+
+        Yields:
+            Every row, in the order in which they are finished; at first those that were.
+        """
+        for key, entry in self._entries.items():
+            if key not in to_do and not entry.same_as:
+                yield from self._finished(key, fresh=False)
+        waiting = list(to_do.items())[::-1]
+        running: dict[Future[None], tuple[str, Path]] = {}
+        try:
+            while crew is not None and (waiting or running):
+                while waiting and len(running) < crew.capacity:
+                    key, path = waiting.pop()
+                    partial = self.ledger.partial(key)
+                    running[crew.submit(key, path, partial)] = (key, partial)
+                finished, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    key, partial = running.pop(future)
+                    self._take(key, partial, future)
+                    yield from self._finished(key, fresh=True)
+        finally:
+            self._write()
+
+    def _identified(self, entry: Entry, path: Path) -> Entry:
+        try:
+            return replace(entry, sha256=fingerprint(path))
+        except RosgradeError as error:
+            return replace(entry, fault=str(error))
+
+    def _is_done(self, key: str) -> bool:
+        result = self.ledger.result(key)
+        if result is None or result.submission.sha256 != self._entries[key].sha256:
+            return False
+        if key in self.retry or RETRY_ALL in self.retry:
+            return False
+        if RETRY_ERRORS in self.retry and not result.graded:
+            return False
+        if result.assignment.sha256 != self.loaded.sha256:
+            raise UsageError(
+                f"{self.ledger.out}: was graded with another version of "
+                f"{result.assignment.id}; `rosgrade regrade {self.ledger.out}` judges its "
+                "recordings again, `--retry all` runs everything again"
+            )
+        return True
+
+    def _take(self, key: str, partial: Path, future: Future[None]) -> None:
+        try:
+            future.result()
+            self.ledger.put(key, partial)
+        except Exception as error:
+            told = str(error) if isinstance(error, RosgradeError) else f"{type(error).__name__}"
+            with (self.ledger.out / FAULTS_FILE).open("a", encoding="utf-8") as log:
+                log.write(f"{key}\n{''.join(traceback.format_exception(error))}\n")
+            self._entries[key] = replace(self._entries[key], fault=told.partition("\n")[0])
+
+    def _finished(self, key: str, *, fresh: bool) -> Iterable[Done]:
+        entry = self._entries[key]
+        result = None if entry.fault else self.ledger.result(key)
+        yield Done(entry, result, fresh)
+        for twin in [item for item in self._entries.values() if item.same_as == key]:
+            if result is not None:
+                self._copy(key, twin)
+            yield Done(twin, self.ledger.result(twin.key) if result else None, fresh)
+
+    def _copy(self, key: str, twin: Entry) -> None:
+        """Give the same submission of somebody else the same result, under its own name."""
+        known, original = self.ledger.result(twin.key), self.ledger.result(key)
+        if known and original and _verdict(known) == _verdict(original):
+            return
+        found = find(self.ledger.folder(key))
+        record = replace(found.submission, id=twin.key)
+        partial = self.ledger.partial(twin.key)
+        recordings = partial / RECORDINGS_FOLDER
+        recordings.mkdir()
+        for file in found.files.values():
+            _link(file, recordings / file.name)
+        write_whole(recordings / SUBMISSION_FILE, to_json(record))
+        graded = regrade(self.loaded, replace(found, submission=record))
+        files = {scenario: recordings / file.name for scenario, file in found.files.items()}
+        write_graded(replace(graded, files=files), partial, Clock())
+        self.ledger.put(twin.key, partial)
+
+    def _write(self) -> None:
+        assignment = self.loaded.assignment.id
+        self.ledger.write(self._entries.values(), assignment, self.loaded.sha256)
+
+
+def _verdict(result: Result) -> tuple[object, ...]:
+    checks = tuple((check.id, check.status, check.points) for check in result.checks)
+    return (result.assignment.sha256, result.submission.sha256, checks)
+
+
+def _link(file: Path, target: Path) -> None:
+    try:
+        os.link(file, target)
+    except OSError:
+        shutil.copyfile(file, target)

@@ -1,0 +1,82 @@
+"""The files about a whole class: the gradebook and the overview."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from grader.batch.batch import Done
+from grader.batch.files import REPORT_FILE
+from grader.batch.ledger import Ledger
+from grader.report.files import write_whole
+from grader.report.gradebook import cell, plain_csv
+from grader.report.overview import OverviewRow, render_overview
+
+GRADES_FILE = "grades.csv"
+OVERVIEW_FILE = "index.html"
+
+
+def note(done: Done) -> str:
+    """What an instructor should know of a row, in a few words; empty for an ordinary one."""
+    entry = done.entry
+    parts = [entry.fault or entry.problem]
+    if entry.same_as:
+        parts.append(f"the same submission as {entry.same_as}")
+    if done.result is not None and not done.result.graded:
+        parts.append("not graded: see the report")
+    return "; ".join(part for part in parts if part)
+
+
+def grades_csv(done: Sequence[Done]) -> str:
+    """The gradebook: a row for everybody, graded or not.
+
+    Returns:
+        The columns of :func:`grader.report.gradebook.plain_csv`, with name, late and note.
+    """
+    results = [item.result for item in done if item.result is not None]
+    rows = list(csv.reader(io.StringIO(plain_csv(results)))) if results else [["submission"]]
+    header, *graded = rows
+    by_key = {row[0]: row for row in graded}
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([header[0], "name", "late", *header[1:], "note"])
+    for item in done:
+        entry = item.entry
+        row = by_key.get(cell(entry.key)) if item.result is not None else None
+        rest = row[1:] if row else [""] * (len(header) - 1)
+        late = "yes" if entry.late else ""
+        writer.writerow([cell(entry.key), cell(entry.name), late, *rest, cell(note(item))])
+    return stream.getvalue()
+
+
+def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
+    """Write the gradebook and the overview.
+
+    Args:
+        done: Every row.
+        ledger: Where to.
+
+    Returns:
+        The overview.
+    """
+    rows = sorted(done, key=lambda item: item.entry.key)
+    write_whole(ledger.out / GRADES_FILE, grades_csv(rows))
+    overview = ledger.out / OVERVIEW_FILE
+    shown = [
+        OverviewRow(
+            id=item.entry.key,
+            name=item.entry.name,
+            note=note(item),
+            late=item.entry.late,
+            report=os.path.relpath(ledger.folder(item.entry.key) / REPORT_FILE, ledger.out)
+            if item.result is not None
+            else None,
+            result=item.result,
+        )
+        for item in rows
+    ]
+    write_whole(overview, render_overview(shown))
+    return overview

@@ -1,0 +1,74 @@
+"""Judging the recordings of a whole class again; nothing is run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from grader.assignment.load import LoadedAssignment
+from grader.batch.batch import Done
+from grader.batch.files import write_graded
+from grader.batch.ledger import Entry, Ledger, keep_earlier
+from grader.batch.regrading import compare, find, regrade
+from grader.errors import RosgradeError
+from grader.report.facts import Clock
+from grader.report.result_model import Result
+
+
+@dataclass(frozen=True)
+class Regraded:
+    """A row that was judged again.
+
+    Attributes:
+        done: The row with its result as it is now.
+        before: Its result until now, or None.
+        changes: What changed, a line each.
+    """
+
+    done: Done
+    before: Result | None
+    changes: tuple[str, ...] = ()
+
+    @property
+    def gained(self) -> float:
+        """Points more than before, or fewer."""
+        after = self.done.result
+        if self.before is None or after is None:
+            return 0.0
+        return (after.score or 0.0) - (self.before.score or 0.0)
+
+
+def regrade_class(loaded: LoadedAssignment, ledger: Ledger) -> Iterator[Regraded]:
+    """Judge every row of a batch with the assignment as it is now.
+
+    A result that changes is kept beside the new one, in ``earlier/``.
+
+    Args:
+        loaded: The assignment.
+        ledger: The batch, opened.
+
+    Yields:
+        Every row.
+    """
+    _, entries = ledger.read()
+    for entry in entries:
+        before = ledger.result(entry.key)
+        if before is None:
+            yield Regraded(Done(entry, None, fresh=False), None)
+        else:
+            yield _regrade(loaded, ledger, entry, before)
+    ledger.write(entries, loaded.assignment.id, loaded.sha256)
+
+
+def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Result) -> Regraded:
+    folder = ledger.folder(entry.key)
+    try:
+        found = find(folder)
+    except RosgradeError as error:
+        return Regraded(Done(entry, before, fresh=False), before, (f"not judged again: {error}",))
+    graded = regrade(loaded, found)
+    changes = tuple(compare(before, graded.grade))
+    if changes or before.assignment.sha256 != loaded.sha256:
+        keep_earlier(folder)
+        write_graded(graded, folder, Clock())
+    return Regraded(Done(entry, ledger.result(entry.key), fresh=True), before, changes)

@@ -1,0 +1,118 @@
+"""Who grades the submissions of a batch: threads here, or the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, Protocol
+
+from grader.batch.grading import Grading
+from grader.batch.worker import Order, Parcel, grade_into, grade_remotely, unpack
+from grader.errors import GraderFault, UsageError
+
+_CONNECT_S = "15s"
+_EACH_WORKER = 2
+"""Submissions on their way to a thread of a worker: one is graded, one waits."""
+
+
+class Crew(Protocol):
+    """Grades submissions.
+
+    Attributes:
+        capacity: So many are worth handing over at once.
+    """
+
+    capacity: int
+
+    def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+        """Grade what is at a path, and leave report, result and recordings in a folder."""
+
+    def close(self) -> None:
+        """End what is being graded and let nothing of it run on."""
+
+
+class LocalCrew:
+    """Threads of this process; the cells and builds below them are what takes the CPUs."""
+
+    def __init__(self, grading: Grading, jobs: int) -> None:
+        """Start.
+
+        Args:
+            grading: Of the assignment.
+            jobs: Submissions at once.
+        """
+        self.capacity = jobs
+        self._grading = grading
+        self._pool = ThreadPoolExecutor(max_workers=jobs, thread_name_prefix="submission")
+
+    def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+        """See :class:`Crew`."""
+        return self._pool.submit(self._grade, key, path, folder)
+
+    def close(self) -> None:
+        """See :class:`Crew`."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._grading.close()
+        self._pool.shutdown()
+
+    def _grade(self, key: str, path: Path, folder: Path) -> None:
+        grade_into(self._grading, key, path, folder)
+
+
+class DaskCrew:
+    """Workers of a cluster: one task for each submission.
+
+    A worker that dies loses no submission: the scheduler gives its tasks to others.
+    """
+
+    def __init__(self, address: str, order: Order) -> None:
+        """Connect.
+
+        Args:
+            address: Of the scheduler, such as ``tcp://host:8786``.
+            order: What workers need to know.
+
+        Raises:
+            UsageError: Dask is not installed, or no scheduler answers.
+        """
+        try:
+            import distributed
+        except ImportError as error:
+            raise UsageError(
+                "--scheduler needs Dask; install it with: pip install 'rosgrade[cluster]'"
+            ) from error
+        try:
+            connect: Any = distributed.Client
+            self._client = connect(address, timeout=_CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise UsageError(f"no Dask scheduler answers at {address}: {error}") from error
+        threads = sum(self._client.nthreads().values())
+        if not threads:
+            self._client.close()
+            raise UsageError(f"the Dask scheduler at {address} has no workers")
+        self.capacity = _EACH_WORKER * threads
+        self._order = order
+
+    def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+        """See :class:`Crew`."""
+        task = self._client.submit(
+            grade_remotely, self._order, Parcel.of(key, path), pure=False, retries=2
+        )
+        done: Future[None] = Future()
+
+        def finish(finished: Any) -> None:
+            try:
+                unpack(finished.result(), folder)
+            except GraderFault as fault:
+                done.set_exception(fault)
+            except Exception as error:
+                done.set_exception(GraderFault(f"the cluster could not grade it: {error}"))
+            else:
+                done.set_result(None)
+
+        task.add_done_callback(finish)
+        return done
+
+    def close(self) -> None:
+        """See :class:`Crew`."""
+        self._client.close()

@@ -1,0 +1,300 @@
+"""Who handed in what: from a folder, an archive or a roster to a row for each student."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from grader.batch.roster import Roster, Student, name_forms, normal
+from grader.errors import RosgradeError, UsageError
+from grader.submission.archive import SUFFIXES, unpack
+from grader.submission.listing import MANIFEST
+from grader.submission.members import MIB, ArchiveLimits
+from grader.submission.paths import shown
+
+GRADESCOPE_METADATA = "submission_metadata.yml"
+# How Canvas names what it lets a teacher download: name, perhaps LATE, user, attachment, file.
+_CANVAS = re.compile(
+    r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<user>\d+)_(?P<attachment>\d+)_(?P<file>.+)", re.DOTALL
+)
+# What Canvas adds to the name of a file that was handed in again: ws-1.zip.
+_AGAIN = re.compile(r"-\d+(?=(\.tar)?\.[^.]+$)")
+_IGNORED = ("__MACOSX",)
+_REPOSITORY = re.compile(r"(https?|ssh|git|file)://|[\w.-]+@[\w.-]+:")
+_CLONE_LIMIT_S = 120.0
+# A class's archive holds what many students handed in.
+_CLASS_LIMITS = ArchiveLimits(total_bytes=8192 * MIB, members=500_000)
+
+
+@dataclass(frozen=True)
+class HandedIn:
+    """A row of the class.
+
+    Attributes:
+        key: What the student is called in results; unique.
+        path: What was handed in, or None for nothing.
+        name: The student's, as people write it, or empty.
+        late: Whether the learning platform says so.
+        problem: Why there is nothing to grade, or what the instructor should look at.
+    """
+
+    key: str
+    path: Path | None
+    name: str = ""
+    late: bool = False
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """Something in the folder, with the names that it has for its author."""
+
+    key: str
+    path: Path
+    names: tuple[str, ...]
+    name: str = ""
+    late: bool = False
+
+
+def take_in(source: Path, staging: Path, roster: Roster | None = None) -> list[HandedIn]:
+    """Find out who handed in what.
+
+    Args:
+        source: A folder of folders and archives, as a learning platform gives it, or an archive
+            of such a folder.
+        staging: An empty folder for what has to be unpacked, copied together or cloned.
+        roster: Who should have handed in; without one everybody who did is a row.
+
+    Returns:
+        The rows, sorted by key; those of the roster that handed in nothing are among them.
+
+    Raises:
+        UsageError: There is nothing, or it is one submission and not a folder of them.
+    """
+    folder = _opened(source, staging)
+    _refuse_single(folder, source)
+    entries = list(_entries(folder, staging))
+    if not entries:
+        raise UsageError(f"{source}: holds no submission; expected a folder or an archive of each")
+    rows = _matched(entries, roster) if roster is not None else [_row(item) for item in entries]
+    return _unique(rows)
+
+
+def take_in_roster(roster: Roster, base: Path, staging: Path) -> list[HandedIn]:
+    """Take in what a roster itself names, as paths or URLs of git repositories.
+
+    Args:
+        roster: With a column ``submission``.
+        base: Folder that its paths are relative to.
+        staging: An empty folder for clones.
+
+    Raises:
+        UsageError: No row names a submission.
+    """
+    if not any(student.submission for student in roster.students):
+        raise UsageError(
+            "the roster names no submissions; give it a column `submission` with paths or URLs, "
+            "or name the folder of submissions"
+        )
+    return _unique([_from_roster(student, base, staging) for student in roster.students])
+
+
+def _from_roster(student: Student, base: Path, staging: Path) -> HandedIn:
+    row = HandedIn(student.key, None, student.name)
+    if not student.submission:
+        return replace(row, problem="handed in nothing")
+    if _REPOSITORY.match(student.submission):
+        target = staging / f"clone-{student.row}"
+        problem = _clone(student.submission, target)
+        return replace(row, problem=problem) if problem else replace(row, path=target)
+    path = base / student.submission
+    if not path.exists():
+        return replace(row, problem=f"{shown(student.submission)} does not exist")
+    return replace(row, path=path)
+
+
+def _clone(url: str, target: Path) -> str:
+    """Clone a repository; says what went wrong, or nothing."""
+    command = ["git", "-c", "core.hooksPath=/dev/null", "-c", "protocol.ext.allow=never"]
+    command += ["clone", "--quiet", "--depth", "1", "--no-recurse-submodules", "--", url]
+    try:
+        done = subprocess.run(
+            [*command, str(target)],
+            env={**os.environ, "GIT_TERMINAL_PROMPT": "0", "GIT_LFS_SKIP_SMUDGE": "1"},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_CLONE_LIMIT_S,
+            check=False,
+        )
+    except FileNotFoundError:
+        return "git is not installed"
+    except subprocess.TimeoutExpired:
+        return f"git clone took longer than {_CLONE_LIMIT_S:.0f} s"
+    if done.returncode == 0:
+        return ""
+    last = done.stderr.strip().rpartition("\n")[2]
+    return f"git clone failed: {shown(last)}"
+
+
+def _opened(source: Path, staging: Path) -> Path:
+    if source.is_dir():
+        return source
+    if not source.is_file():
+        raise UsageError(f"{source}: does not exist")
+    if not source.name.lower().endswith(SUFFIXES):
+        raise UsageError(f"{source}: is neither a folder nor an archive ({', '.join(SUFFIXES)})")
+    target = staging / "class"
+    target.mkdir()
+    try:
+        unpack(source, target, _CLASS_LIMITS)
+    except RosgradeError as error:
+        raise UsageError(str(error)) from error
+    # An archive of a folder holds that folder alone.
+    inside = [item for item in target.iterdir() if not _is_ignored(item)]
+    alone = len(inside) == 1 and inside[0].is_dir() and not _looks_like_one(inside[0])
+    return inside[0] if alone else target
+
+
+def _refuse_single(folder: Path, source: Path) -> None:
+    if _looks_like_one(folder):
+        raise UsageError(
+            f"{source}: looks like one submission ({MANIFEST} is right in it); name the folder "
+            "that holds those of the class, or use `rosgrade check`"
+        )
+
+
+def _looks_like_one(folder: Path) -> bool:
+    return (folder / MANIFEST).is_file() or any((folder / "src").glob(f"*/{MANIFEST}"))
+
+
+def _is_ignored(item: Path) -> bool:
+    return item.name.startswith(".") or item.name in _IGNORED
+
+
+def _entries(folder: Path, staging: Path) -> Iterator[_Entry]:
+    metadata = _gradescope(folder / GRADESCOPE_METADATA)
+    canvas: dict[str, list[tuple[Path, re.Match[str]]]] = {}
+    for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
+        if _is_ignored(item) or item.name == GRADESCOPE_METADATA:
+            continue
+        match = _CANVAS.fullmatch(item.name) if item.is_file() else None
+        if item.name in metadata:
+            yield _of_gradescope(item, metadata[item.name])
+        elif match:
+            canvas.setdefault(match["user"], []).append((item, match))
+        elif item.is_dir() or item.name.lower().endswith(SUFFIXES):
+            stem = _stem(item)
+            yield _Entry(shown(stem), item, (stem,))
+    for files in canvas.values():
+        yield _of_canvas(files, staging)
+
+
+def _stem(item: Path) -> str:
+    suffix = next((s for s in SUFFIXES if item.is_file() and item.name.lower().endswith(s)), "")
+    return item.name[: len(item.name) - len(suffix)] or item.name
+
+
+def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> _Entry:
+    """One student's files: the only one, or all of them in a folder."""
+    first, match = files[0]
+    path = first
+    if len(files) > 1 or not first.name.lower().endswith(SUFFIXES):
+        path = staging / f"canvas-{match['user']}"
+        path.mkdir()
+        for file, named in files:
+            shutil.copyfile(file, path / _AGAIN.sub("", named["file"]), follow_symlinks=False)
+    late = any(named["late"] for _, named in files)
+    return _Entry(
+        f"{match['name']}_{match['user']}", path, (match["user"], match["name"]), late=late
+    )
+
+
+def _gradescope(file: Path) -> Mapping[str, Any]:
+    """What Gradescope's export says of each submission, by folder."""
+    if not file.is_file():
+        return {}
+    try:
+        data = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise UsageError(f"{file}: cannot be read: {error}") from error
+    return data if isinstance(data, dict) else {}
+
+
+def _of_gradescope(item: Path, about: Any) -> _Entry:
+    """An exported folder; Gradescope writes its keys as Ruby does, with a colon in front."""
+    submitters = about.get(":submitters") if isinstance(about, dict) else None
+    people = [person for person in submitters or () if isinstance(person, dict)]
+    names = tuple(
+        str(person[field])
+        for person in people
+        for field in (":sid", ":email", ":name")
+        if person.get(field)
+    )
+    name = ", ".join(str(person[":name"]) for person in people if person.get(":name"))
+    key = str(people[0].get(":sid") or people[0].get(":email")) if people else item.name
+    return _Entry(shown(key), item, names or (item.name,), name)
+
+
+def _row(entry: _Entry) -> HandedIn:
+    return HandedIn(entry.key, entry.path, entry.name, entry.late)
+
+
+def _matched(entries: list[_Entry], roster: Roster) -> list[HandedIn]:
+    """Give each entry to the student of the roster that it names."""
+    known: dict[str, set[str]] = {}
+    students = {student.key: student for student in roster.students}
+    for student in roster.students:
+        for form in student.identifiers:
+            known.setdefault(form, set()).add(student.key)
+    rows: list[HandedIn] = []
+    handed: dict[str, str] = {}
+    for entry in entries:
+        keys = _owners(entry, known)
+        if len(keys) != 1:
+            why = "not in the roster" if not keys else f"may be {' or '.join(sorted(keys))}"
+            rows.append(replace(_row(entry), problem=why))
+            continue
+        (key,) = keys
+        row = HandedIn(key, entry.path, students[key].name, entry.late)
+        if key in handed:
+            row = replace(row, problem=f"handed in twice: {handed[key]} too")
+        handed.setdefault(key, entry.path.name)
+        rows.append(row)
+    missing = [student for student in roster.students if student.key not in handed]
+    rows += [HandedIn(s.key, None, s.name, problem="handed in nothing") for s in missing]
+    return rows
+
+
+def _owners(entry: _Entry, known: Mapping[str, set[str]]) -> set[str]:
+    """Students that an entry names; the first of its names that anybody has decides."""
+    for name in entry.names:
+        for form in name_forms(name):
+            if normal(form) in known:
+                return known[normal(form)]
+    # GitHub Classroom: <assignment>-<login>, where both may contain hyphens.
+    parts = entry.path.name.split("-")
+    for first in range(1, len(parts)):
+        owners = known.get(normal("-".join(parts[first:])))
+        if owners:
+            return owners
+    return set()
+
+
+def _unique(rows: list[HandedIn]) -> list[HandedIn]:
+    """Rows sorted by key, with a number behind a key that is there already."""
+    counts: dict[str, int] = {}
+    found = []
+    for row in sorted(rows, key=lambda item: item.key):
+        count = counts[row.key] = counts.get(row.key, 0) + 1
+        found.append(row if count == 1 else replace(row, key=f"{row.key} ({count})"))
+    return found

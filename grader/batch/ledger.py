@@ -1,0 +1,182 @@
+"""The folder of a batch: what is in it is graded, what is not is still to do.
+
+``OUT/submissions/<key>/`` is moved into place when all of it is written, so after Ctrl-C, a
+killed process or a power cut every submission is either there as a whole or not at all.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from urllib.parse import quote
+
+from grader.batch.files import RESULT_FILE
+from grader.errors import RosgradeError, UsageError
+from grader.report.files import write_whole
+from grader.report.result import read_result
+from grader.report.result_model import Result
+
+BATCH_FILE = "batch.json"
+SUBMISSIONS = "submissions"
+_PARTIAL = ".partial"
+_LOCK = ".lock"
+_EARLIER = "earlier"
+_LONGEST_NAME = 120
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What is known of a row, beside its result.
+
+    Attributes:
+        key: Of the row; names its folder.
+        name: The student's, or empty.
+        late: Whether it was handed in late.
+        sha256: Of the submission, or empty where there is none.
+        problem: What the instructor should look at, or why there is nothing to grade.
+        same_as: Key of the row with the same submission that was graded for both, or empty.
+        fault: Why it could not be graded, where not even a result could be written.
+    """
+
+    key: str
+    name: str = ""
+    late: bool = False
+    sha256: str = ""
+    problem: str = ""
+    same_as: str = ""
+    fault: str = ""
+
+
+class Ledger:
+    """The folder of a batch."""
+
+    def __init__(self, out: Path) -> None:
+        """Name the folder; nothing is made yet."""
+        self.out = out
+
+    @contextmanager
+    def opened(self) -> Iterator[Ledger]:
+        """Hold the folder for this process, with nothing half-written in it.
+
+        Raises:
+            UsageError: Another batch writes to it, it holds something else, or it cannot be made.
+        """
+        try:
+            self.out.mkdir(parents=True, exist_ok=True)
+            known = {BATCH_FILE, SUBMISSIONS, _PARTIAL, _LOCK}
+            inside = {item.name for item in self.out.iterdir()}
+            if inside and not inside & known:
+                raise UsageError(f"{self.out}: holds something else; name a new folder")
+            lock = (self.out / _LOCK).open("w")
+        except OSError as error:
+            raise UsageError(f"{self.out}: cannot be written: {error.strerror}") from error
+        with lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                raise UsageError(f"{self.out}: another batch is writing to it") from error
+            shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
+            (self.out / _PARTIAL).mkdir()
+            try:
+                yield self
+            finally:
+                shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
+
+    def folder(self, key: str) -> Path:
+        """Folder of a row's result."""
+        return self.out / SUBMISSIONS / folder_name(key)
+
+    def partial(self, key: str) -> Path:
+        """A new folder to write a result in before it is moved into place."""
+        folder = self.out / _PARTIAL / folder_name(key)
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        return folder
+
+    def put(self, key: str, partial: Path) -> None:
+        """Move a result into place; the one that was there is kept beside its files."""
+        target = self.folder(key)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists():
+            _carry_over(target, partial)
+            old = partial.with_name(partial.name + ".old")
+            target.rename(old)
+            partial.rename(target)
+            shutil.rmtree(old, ignore_errors=True)
+        else:
+            partial.rename(target)
+        _sync(target.parent)
+
+    def result(self, key: str) -> Result | None:
+        """A row's result, or None where it is not graded yet or was damaged."""
+        file = self.folder(key) / RESULT_FILE
+        if not file.is_file():
+            return None
+        try:
+            return read_result(file)
+        except RosgradeError:
+            return None
+
+    def write(self, entries: Iterable[Entry], assignment: str, assignment_sha256: str) -> None:
+        """Write down what the batch consists of."""
+        data = {
+            "assignment": {"id": assignment, "sha256": assignment_sha256},
+            "rows": [asdict(entry) for entry in entries],
+        }
+        write_whole(self.out / BATCH_FILE, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
+
+    def read(self) -> tuple[str, tuple[Entry, ...]]:
+        """Read what :meth:`write` wrote: the assignment's id and the rows.
+
+        Raises:
+            UsageError: It is no folder of a batch, or damaged.
+        """
+        file = self.out / BATCH_FILE
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            return str(data["assignment"]["id"]), tuple(Entry(**row) for row in data["rows"])
+        except FileNotFoundError as error:
+            raise UsageError(f"{self.out}: is not the folder of a batch") from error
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise UsageError(f"{file}: is damaged: {error}; run the batch again") from error
+
+
+def folder_name(key: str) -> str:
+    """A folder's name for a key: readable, safe, and another one for every key."""
+    name = quote(key, safe=" @+,()=").strip(" ").replace(".", "%2E", key.startswith(".")) or "_"
+    # Case must not matter where the results are copied to, nor may a name be too long there.
+    if len(name) > _LONGEST_NAME or name != key:
+        name = f"{name[:_LONGEST_NAME]}-{hashlib.sha256(key.encode()).hexdigest()[:8]}"
+    return name
+
+
+def keep_earlier(folder: Path) -> None:
+    """Keep a result beside the one that is about to replace it."""
+    file = folder / RESULT_FILE
+    if file.is_file():
+        stamp = datetime.fromtimestamp(file.stat().st_mtime, timezone.utc)
+        kept = folder / _EARLIER / f"result-{stamp:%Y%m%dT%H%M%S.%fZ}.json"
+        write_whole(kept, file.read_bytes())
+
+
+def _carry_over(old: Path, new: Path) -> None:
+    keep_earlier(old)
+    if (old / _EARLIER).is_dir():
+        shutil.copytree(old / _EARLIER, new / _EARLIER, dirs_exist_ok=True)
+
+
+def _sync(folder: Path) -> None:
+    """Let a rename survive a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

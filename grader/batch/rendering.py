@@ -1,0 +1,79 @@
+"""Rendering a report again, as it was graded; nothing is run and no grade changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader.assignment.load import load_assignment
+from grader.assignment.selection import select, visible_part
+from grader.batch.files import RESULT_FILE, Written, write_report
+from grader.batch.regrading import find, regrade
+from grader.errors import UsageError
+from grader.grade import Grade
+from grader.report.facts import RunFacts
+from grader.report.result import read_result
+from grader.report.result_model import Result
+
+
+def find_reports(out: Path) -> tuple[Path, ...]:
+    """The report folders at a path: itself, or those of a class in it, sorted.
+
+    Raises:
+        UsageError: There is none.
+    """
+    if (out / RESULT_FILE).is_file():
+        return (out,)
+    found = tuple(sorted(file.parent for file in out.rglob(RESULT_FILE)))
+    if not found:
+        raise UsageError(f"{out}: there is no {RESULT_FILE} in it, nor in a folder below it")
+    return found
+
+
+def read_results(out: Path) -> tuple[Result, ...]:
+    """The results at a path: one, or those of a class.
+
+    Raises:
+        UsageError: There is none, or one cannot be read.
+    """
+    return tuple(read_result(folder / RESULT_FILE) for folder in find_reports(out))
+
+
+def render_again(folder: Path, assignment: str | None = None) -> Written:
+    """Render the report of one submission again from its result and its recordings.
+
+    Args:
+        folder: The report's folder.
+        assignment: Id or folder; by default the one that the result names.
+
+    Raises:
+        UsageError: Something is missing, or the assignment is no longer the one that was graded
+            with: then only a regrade gives a report that fits.
+    """
+    result = read_result(folder / RESULT_FILE)
+    loaded = load_assignment(assignment or result.assignment.id)
+    if loaded.sha256 != result.assignment.sha256:
+        raise UsageError(
+            f"{folder}: the assignment has changed since this was graded: `rosgrade regrade "
+            f"{folder}` judges again with it as it is now"
+        )
+    shown = visible_part(loaded) if result.withheld.checks else loaded
+    graded = regrade(select(shown, tuple(check.id for check in result.checks)), find(folder))
+    changed = _changed(result, graded.grade)
+    if changed:
+        raise UsageError(
+            f"{folder}: judged again it is not what the result says ({', '.join(changed)}): "
+            f"`rosgrade regrade {folder}` writes both anew"
+        )
+    facts = RunFacts(
+        started=result.started,
+        duration_s=result.duration_s,
+        environment=result.environment,
+        rosgrade_version=result.rosgrade_version,
+        recordings={one.id: one.recording for one in result.scenarios if one.recording},
+    )
+    return Written(write_report(graded, folder, facts), result)
+
+
+def _changed(result: Result, grade: Grade) -> list[str]:
+    before = {check.id: check.status for check in result.checks}
+    return [one.id for one in grade.results if before.get(one.id) is not one.status]

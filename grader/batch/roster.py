@@ -1,0 +1,164 @@
+"""The roster of a class: who should have handed in, and under which names they may appear."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.errors import UsageError
+
+_MOST_BYTES = 16 * 2**20
+# Column headers, as Canvas, Gradescope, GitHub Classroom and people write them.
+_COLUMNS = {
+    "id": ("id", "student id", "student_id", "sid", "sis user id", "number", "matriculation"),
+    "login": ("login", "username", "user", "sis login id", "github", "github username"),
+    "email": ("email", "e-mail", "mail"),
+    "name": ("name", "student", "student name", "full name"),
+    "submission": ("submission", "path", "file", "folder", "repository", "repo", "url"),
+}
+_POINTS_POSSIBLE = "points possible"
+
+
+@dataclass(frozen=True)
+class Student:
+    """One row of a roster.
+
+    Attributes:
+        row: Number of its line in the file, the header being 1.
+        id: Or empty, as all that follow.
+        login: Login or GitHub name.
+        email: Address.
+        name: As people write it.
+        submission: Path or URL of what was handed in.
+    """
+
+    row: int
+    id: str = ""
+    login: str = ""
+    email: str = ""
+    name: str = ""
+    submission: str = ""
+
+    @property
+    def key(self) -> str:
+        """What the student is called in results."""
+        return self.login or self.id or self.email or self.name
+
+    @property
+    def identifiers(self) -> frozenset[str]:
+        """Every form in which the student may be named, normalised."""
+        local = self.email.partition("@")[0]
+        return frozenset(
+            normal(form)
+            for form in (self.id, self.login, self.email, local, *name_forms(self.name))
+            if form
+        )
+
+
+@dataclass(frozen=True)
+class Roster:
+    """A class.
+
+    Attributes:
+        students: In the order of the file.
+        problems: Rows that cannot be used, and why.
+    """
+
+    students: tuple[Student, ...]
+    problems: tuple[str, ...] = ()
+
+
+def normal(text: str) -> str:
+    """A name as it is compared: letters and digits only, in lower case."""
+    return re.sub(r"[\W_]+", "", text).casefold()
+
+
+def name_forms(name: str) -> tuple[str, ...]:
+    """First and last name in both orders: ``Lopez, Ana`` is ``Ana Lopez``."""
+    last, comma, first = name.partition(",")
+    if comma:
+        return (name, f"{first} {last}")
+    words = name.split()
+    return (name, " ".join((words[-1], *words[:-1]))) if len(words) > 1 else (name,)
+
+
+def read_roster(file: Path) -> Roster:
+    """Read a roster.
+
+    Args:
+        file: CSV with commas or semicolons and a header; a Canvas export will do.
+
+    Raises:
+        UsageError: It cannot be read, or no column names a student.
+    """
+    try:
+        if file.stat().st_size > _MOST_BYTES:
+            raise UsageError(f"{file}: is larger than {_MOST_BYTES // 2**20} MiB; is it a roster?")
+        text = file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise UsageError(f"{file}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{file}: is not UTF-8; save it as “CSV UTF-8”") from error
+    return parse_roster(text, str(file))
+
+
+def parse_roster(text: str, source: str) -> Roster:
+    """Read the text of a roster.
+
+    Args:
+        text: CSV.
+        source: What to call it in messages.
+
+    Raises:
+        UsageError: No column names a student.
+    """
+    first = text.partition("\n")[0]
+    delimiter = ";" if first.count(";") > first.count(",") else ","
+    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
+    try:
+        header = next(reader, [])
+        rows = [(reader.line_num, row) for row in reader]
+    except csv.Error as error:
+        raise UsageError(f"{source}:{reader.line_num}: is not CSV: {error}") from error
+    columns = _columns(header)
+    if not set(columns) - {"submission"}:
+        raise UsageError(
+            f"{source}:1: no column says who a student is; name one of them id, login, email or "
+            f"name (there are: {', '.join(header) or 'none'})"
+        )
+    return _collect(columns, rows)
+
+
+def _columns(header: Sequence[str]) -> dict[str, int]:
+    found: dict[str, int] = {}
+    lowered = [cell.strip().casefold() for cell in header]
+    for field, names in _COLUMNS.items():
+        for name in names:
+            if name in lowered and field not in found:
+                found[field] = lowered.index(name)
+    return found
+
+
+def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) -> Roster:
+    students: list[Student] = []
+    problems: list[str] = []
+    seen: dict[str, int] = {}
+    for number, row in rows:
+        cells = [cell.strip() for cell in row]
+        if not any(cells) or cells[0].casefold().startswith(_POINTS_POSSIBLE):
+            continue
+        values = {field: cells[column] for field, column in columns.items() if column < len(cells)}
+        student = Student(number, **values)
+        if not student.key:
+            problems.append(f"row {number}: names nobody")
+            continue
+        known = seen.setdefault(normal(student.key) or student.key, number)
+        if known != number:
+            problems.append(f"row {number}: {student.key} is in row {known} already")
+            continue
+        students.append(student)
+    return Roster(tuple(students), tuple(problems))

@@ -1,0 +1,59 @@
+"""The interface packages that an assignment needs beside those of ROS."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from grader.assignment.load import LoadedAssignment
+from grader.ros import RosInstallation
+from grader.submission.build_cache import BuildCache
+from grader.submission.underlay import completed, install_prefix
+
+INTERFACES_FOLDER = "interfaces"
+"""Beside ``assignment.yaml``: our copy of the interface packages that the student writes."""
+
+_WORD = re.compile(r"\w+")
+
+
+class TypeSupport:
+    """What the probe imports to hear and send messages of an assignment."""
+
+    def __init__(self, loaded: LoadedAssignment, ros: RosInstallation, cache: Path) -> None:
+        """Set up; nothing is built yet.
+
+        Args:
+            loaded: The assignment.
+            ros: Builds with this installation.
+            cache: Folder of cached builds.
+        """
+        self._loaded = loaded
+        self._ros = ros
+        self._cache = cache
+        self._lock = threading.Lock()
+        self._prefixes: tuple[Path, ...] | None = None
+
+    def prefixes(self, on_build: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
+        """Install spaces of ours for the cell; built at the first call, unless cached.
+
+        Args:
+            on_build: Told the progress of the build.
+
+        Raises:
+            GraderFault: They cannot be built here.
+        """
+        with self._lock:
+            if self._prefixes is None:
+                self._prefixes = self._built(on_build)
+            return self._prefixes
+
+    def _built(self, on_build: Callable[[str], None]) -> tuple[Path, ...]:
+        cache = BuildCache(self._cache)
+        named = _WORD.findall(self._loaded.assignment.model_dump_json())
+        ros = completed(self._ros, named, cache, on_build)
+        own = self._loaded.folder / INTERFACES_FOLDER
+        if not own.is_dir():
+            return ros.underlays
+        return (install_prefix(own, ros, cache, on_build), *ros.underlays)

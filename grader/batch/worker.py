@@ -1,0 +1,176 @@
+"""Grading one submission of a batch: what a worker does, here or on another machine."""
+
+from __future__ import annotations
+
+import functools
+import io
+import os
+import tarfile
+import tempfile
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader import ros
+from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.batch.files import write_graded
+from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
+from grader.errors import GraderFault
+from grader.report.facts import Clock
+from grader.resources import cache_folder
+from grader.run.admission import Admission
+from grader.run.runner import Runner
+from grader.sandbox.choice import Choice
+from grader.sandbox.trial import choose
+from grader.submission.locate import opened
+
+
+@dataclass(frozen=True)
+class Order:
+    """What every worker of a batch needs to know.
+
+    Attributes:
+        assignment: Id of the assignment, or its folder.
+        sha256: Of the assignment; another one on a worker is a fault.
+        seed: Base of all seeds, or None.
+        sandbox: What was asked for.
+    """
+
+    assignment: str
+    sha256: str
+    seed: int | None
+    sandbox: Choice
+
+
+def grade_into(grading: Grading, key: str, path: Path, folder: Path) -> Graded:
+    """Grade a submission and write report, result and recordings.
+
+    Args:
+        grading: Of its assignment.
+        key: What to call it.
+        path: What was handed in.
+        folder: For everything; exists.
+
+    Raises:
+        GraderFault: Not even the reading or the building could be tried.
+    """
+    clock = Clock()
+    graded = grading.grade(path, folder / RECORDINGS_FOLDER, name=key)
+    write_graded(graded, folder, clock)
+    return graded
+
+
+def pack(folder: Path) -> bytes:
+    """A folder as an uncompressed tar: recordings are compressed already."""
+    stream = io.BytesIO()
+    with tarfile.open(fileobj=stream, mode="w") as tar:
+        for item in sorted(folder.rglob("*")):
+            tar.add(item, item.relative_to(folder).as_posix(), recursive=False)
+    return stream.getvalue()
+
+
+def unpack(packed: bytes, folder: Path) -> None:
+    """Write the files of a tar that :func:`pack` made; it comes from a worker of ours."""
+    with tarfile.open(fileobj=io.BytesIO(packed)) as tar:
+        for member in tar:
+            target = folder / member.name
+            if not target.resolve().is_relative_to(folder.resolve()):
+                raise GraderFault(f"a worker sent a file that leads out: {member.name}")
+            if member.isdir():
+                target.mkdir(parents=True, exist_ok=True)
+            elif member.isfile():
+                target.parent.mkdir(parents=True, exist_ok=True)
+                stream = tar.extractfile(member)
+                target.write_bytes(stream.read() if stream is not None else b"")
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A submission on its way to a worker.
+
+    Attributes:
+        key: What to call it.
+        name: Of the folder or archive that was handed in.
+        content: The archive, or the folder as :func:`pack` makes it.
+        is_folder: Which of the two.
+    """
+
+    key: str
+    name: str
+    content: bytes
+    is_folder: bool
+
+    @classmethod
+    def of(cls, key: str, path: Path) -> Parcel:
+        """Pack what was handed in."""
+        if not path.is_dir():
+            return cls(key, path.name, path.read_bytes(), False)
+        with opened(path) as located:
+            return cls(key, path.name, pack(located.root), True)
+
+
+def grade_remotely(order: Order, parcel: Parcel) -> bytes:
+    """Grade on a worker of a cluster.
+
+    Args:
+        order: Of the batch.
+        parcel: The submission.
+
+    Returns:
+        Report, result and recordings, packed.
+
+    Raises:
+        GraderFault: The worker has another version of the assignment.
+    """
+    grading = _grading(order)
+    with tempfile.TemporaryDirectory(prefix="rosgrade-worker-") as temporary:
+        path = Path(temporary, "in", parcel.name)
+        folder = Path(temporary, "out")
+        folder.mkdir()
+        path.parent.mkdir()
+        if parcel.is_folder:
+            path.mkdir()
+            unpack(parcel.content, path)
+        else:
+            path.write_bytes(parcel.content)
+        grade_into(grading, parcel.key, path, folder)
+        return pack(folder)
+
+
+_held = threading.Lock()
+
+
+def _grading(order: Order) -> Grading:
+    """The one of this process: its builds, cells and limits are shared by all of its tasks."""
+    with _held:
+        return _make_grading(order)
+
+
+@functools.cache
+def _make_grading(order: Order) -> Grading:
+    loaded = load_assignment(order.assignment)
+    if loaded.sha256 != order.sha256:
+        raise GraderFault(
+            f"the worker on {os.uname().nodename} has another version of the assignment "
+            f"{order.assignment}; install the same one there"
+        )
+    return make_grading(order, loaded)
+
+
+def make_grading(
+    order: Order, loaded: LoadedAssignment, admission: Admission | None = None
+) -> Grading:
+    """Set up grading on this machine.
+
+    Args:
+        order: Of the batch.
+        loaded: Its assignment.
+        admission: Of cells; by default the machine's load decides.
+
+    Raises:
+        GraderFault: There is no sandbox here, and not having one was not asked for.
+    """
+    wanted = Choice.BWRAP if order.sandbox is Choice.AUTO else order.sandbox
+    sandbox, _ = choose(wanted, cache_folder())
+    runner = Runner(ros.find(), admission or Admission(), sandbox=sandbox)
+    return Grading(loaded, runner, cache_folder(), seed=order.seed)

@@ -1,0 +1,196 @@
+"""Checks of actions whose goals do not come to their own end: canceled, or preempted."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from grader.assignment.quantity import Duration, format_duration
+from grader.checks.action import OfGoals, cannot, type_of
+from grader.checks.cause import Cause
+from grader.checks.check import Subject, check
+from grader.checks.fields import words as fields_words
+from grader.checks.finding import Finding
+from grader.checks.goals import evidence, judged_goals, why_no_result, why_raised_in, why_rejected
+from grader.checks.unanswered import why_taken
+from grader.checks.value import NoSuchField
+from grader.recording.interaction import Goal
+from grader.recording.model import NS, Recording
+
+
+class Cancels(OfGoals):
+    """Parameters of action.cancels."""
+
+    within: Duration = Field(
+        1.0,
+        description="How soon after it was asked the goal must be canceled, by default 1 s.",
+        validate_default=False,
+    )
+
+
+@check("action.cancels", Subject.RECORDING, Cancels)
+def cancels(recording: Recording, parameters: Cancels) -> Finding:
+    """A goal can be canceled while it is worked on.
+
+    Judged by the goals that the probe asked to cancel (`cancel_after`): the server agrees, and
+    the goal ends as canceled in time.
+
+    Explains a server that refuses to cancel (no cancel_callback: rclpy refuses by default), one
+    that agrees but goes on, one that ends without `goal_handle.canceled()`, and an executor
+    that cannot take in the request while the execute callback runs.
+    """
+    expected = f"{parameters.words} is canceled within {format_duration(parameters.within)}"
+    try:
+        goals = judged_goals(
+            recording, parameters.action, parameters.goal, lambda g: g.canceled_ns is not None
+        )
+    except NoSuchField as error:
+        return cannot(type_of(recording, parameters.action), error, expected)
+    if isinstance(goals, Cause):
+        return goals.finding(expected)
+    for goal in goals:
+        cause = why_rejected(recording, goal) or _why_not_canceled(
+            recording, goal, parameters.within
+        )
+        if cause is not None:
+            return cause.finding(expected)
+    return Finding.passed(
+        expected,
+        f"canceled {format_duration(_end_s(goals[0]))} after it was asked",
+        evidence(recording, goals[0]),
+    )
+
+
+def _end_s(goal: Goal) -> float:
+    return ((goal.result_ns or 0) - (goal.canceled_ns or 0)) / NS
+
+
+def _why_not_canceled(recording: Recording, goal: Goal, within_s: float) -> Cause | None:
+    asked_ns = goal.canceled_ns or 0
+    shown = evidence(recording, goal)
+    if goal.result_ns is not None and goal.result_ns < asked_ns:
+        return Cause("the goal had ended before it was asked to cancel", ours=True)
+    if goal.status == "canceled" and _end_s(goal) <= within_s:
+        return None
+    if goal.cancel_accepted is False and not _answered_too_late(goal):
+        return Cause(
+            "the server refused to cancel the goal",
+            "Give the ActionServer a cancel_callback that returns CancelResponse.ACCEPT; without "
+            "one rclpy refuses.",
+            shown,
+        )
+    if goal.cancel_answered_ns is None or goal.status != "canceled":
+        return _why_other_end(recording, goal, within_s)
+    seen = f"the goal was canceled only {format_duration(_end_s(goal))} after it was asked"
+    taken = why_taken(recording, seen, asked_ns, goal.result_ns or 0, within_s)
+    return taken or Cause(
+        seen, "Look at goal_handle.is_cancel_requested in every round of the loop.", shown
+    )
+
+
+def _answered_too_late(goal: Goal) -> bool:
+    """Whether the server took in that it should cancel only when the goal had ended."""
+    if goal.result_ns is None:
+        return False
+    return goal.cancel_answered_ns is None or goal.cancel_answered_ns >= goal.result_ns
+
+
+def _why_other_end(recording: Recording, goal: Goal, within_s: float) -> Cause:
+    """It was not canceled: it ended otherwise, or never."""
+    shown = evidence(recording, goal)
+    asked_ns = goal.canceled_ns or 0
+    if goal.result_ns is None:
+        seen = "the goal was asked to cancel, but neither canceled nor ended"
+        taken = why_taken(recording, seen, asked_ns, recording.stop_ns, within_s)
+        late = why_no_result(recording, goal, (recording.stop_ns - goal.sent_ns) / NS)
+        if taken or (goal.cancel_accepted is None and late):
+            return taken or late or Cause(seen)
+        return Cause(
+            f"{seen}: it goes on",
+            "In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
+            "goal_handle.canceled() and return the result.",
+            shown,
+        )
+    raised = why_raised_in(recording, goal, f"the goal {goal.status} instead of being canceled")
+    if raised is not None:
+        return raised
+    if _answered_too_late(goal):
+        return Cause(
+            f"the goal {goal.status} before the server took in that it should cancel: its "
+            "executor cannot while the execute callback runs",
+            "Spin with a MultiThreadedExecutor, and give the ActionServer a "
+            "ReentrantCallbackGroup.",
+            shown,
+        )
+    return Cause(
+        f"the server agreed to cancel, but the goal {goal.status}",
+        "In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
+        "goal_handle.canceled() and return the result.",
+        shown,
+    )
+
+
+class Preempts(OfGoals):
+    """Parameters of action.preempts."""
+
+    within: Duration = Field(
+        1.0,
+        description="How soon after the new goal the old one must end, by default 1 s.",
+        validate_default=False,
+    )
+
+
+@check("action.preempts", Subject.RECORDING, Preempts)
+def preempts(recording: Recording, parameters: Preempts) -> Finding:
+    """A new goal ends the one that is worked on.
+
+    Judged by the goals that the probe sent while another one was active (`preempt: true`): the
+    new one is accepted, and the old one ends in time, canceled or aborted, without success.
+
+    Explains a server that rejects the new goal, that works on both, or that lets the old one
+    succeed first.
+    """
+    expected = (
+        f"{parameters.words} ends the goal before it within {format_duration(parameters.within)}"
+    )
+    try:
+        goals = judged_goals(recording, parameters.action, parameters.goal, lambda g: g.preempts)
+    except NoSuchField as error:
+        return cannot(type_of(recording, parameters.action), error, expected)
+    if isinstance(goals, Cause):
+        return goals.finding(expected)
+    sent = [goal for goal in recording.goals if goal.action == parameters.action]
+    for goal in goals:
+        before = sent[sent.index(goal) - 1] if sent.index(goal) else None
+        cause = (
+            Cause("there is no goal before it that it could end", ours=True)
+            if before is None
+            else why_rejected(recording, goal) or _why_goes_on(recording, before, goal, parameters)
+        )
+        if cause is not None:
+            return cause.finding(expected)
+    return Finding.passed(expected, "the old goal ended", evidence(recording, goals[0]))
+
+
+def _why_goes_on(
+    recording: Recording, before: Goal, goal: Goal, parameters: Preempts
+) -> Cause | None:
+    shown = evidence(recording, before)
+    hint = (
+        "Keep the current goal handle, and call its abort() when a new goal comes "
+        "(handle_accepted_callback); look at is_active in every round of the loop."
+    )
+    if before.result_ns is not None and before.result_ns < goal.sent_ns:
+        return Cause("the old goal had ended before the new one was sent", ours=True)
+    which = f"the old goal ({fields_words(before.goal)})"
+    if before.result_ns is None:
+        seen = f"{which} was still worked on at the end"
+        taken = why_taken(recording, seen, goal.sent_ns, recording.stop_ns, parameters.within)
+        return taken or Cause(seen, hint, shown)
+    took_s = (before.result_ns - goal.sent_ns) / NS
+    if before.status == "succeeded":
+        return Cause(f"{which} was worked on to its end, and succeeded", hint, shown)
+    if took_s <= parameters.within:
+        return None
+    seen = f"{which} ended only {format_duration(took_s)} after the new one was sent"
+    taken = why_taken(recording, seen, goal.sent_ns, before.result_ns, parameters.within)
+    return taken or Cause(seen, hint, shown)

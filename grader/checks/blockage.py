@@ -1,0 +1,56 @@
+"""Whether something keeps an executor from coming round, as the node's own services tell."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from grader.checks import testimony
+from grader.checks.failure import interrupted_place
+from grader.checks.finding import Evidence, Moment
+from grader.recording.model import NS, Call, Recording
+
+# What was asked for later than this before the end may be unanswered for that reason.
+_ANSWER_NS = NS
+
+HINT = (
+    "A callback must return soon. Look for `while True`, time.sleep() or input() in a callback, in "
+    "the constructor or in main(), and for a node that is not given to rclpy.spin()."
+)
+
+
+def first_unanswered(recording: Recording, nodes: Collection[str], since_ns: int) -> Call | None:
+    """The first call that a blocked node left unanswered; None if it answered one in time.
+
+    A node's parameter services answer only while its executor spins.
+
+    Args:
+        recording: The run.
+        nodes: Fully qualified names of the nodes in question.
+        since_ns: An answer before this says nothing.
+    """
+    calls = [
+        call
+        for call in recording.calls
+        if call.service.rpartition("/")[0] in nodes
+        and not call.error
+        and call.requested_ns <= recording.stop_ns - _ANSWER_NS
+    ]
+    unanswered = [call for call in calls if call.answered_ns is None]
+    if not unanswered or any((call.answered_ns or 0) >= since_ns for call in calls):
+        return None
+    return unanswered[0]
+
+
+def where_blocked(recording: Recording, node: str, call: Call) -> tuple[str, Evidence]:
+    """The place at which the node's process was when it was interrupted, if it told.
+
+    Returns:
+        The place in words, with a space before it, or an empty text; and the evidence.
+    """
+    process = testimony.process_of(recording, node)
+    place = interrupted_place(recording, process.name) if process is not None else None
+    moment = Moment("first call that was not answered", recording.since_launch_s(call.requested_ns))
+    return (
+        f" ({place.file}:{place.line})" if place else "",
+        Evidence(moments=(moment,), places=(place,) if place else ()),
+    )

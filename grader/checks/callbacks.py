@@ -1,0 +1,262 @@
+"""Checks of callbacks that report when they start and end: how often, how long, at once or not."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from statistics import median
+
+from pydantic import Field, model_validator
+
+from grader.assignment.model import TopicName
+from grader.assignment.quantity import Duration, format_duration
+from grader.checks.callback_run import Reports, read_reports, spans
+from grader.checks.check import Subject, check
+from grader.checks.death import cause_of_death, dead
+from grader.checks.finding import Evidence, Finding
+from grader.checks.period import Interval, Limits, forgiven, judge
+from grader.checks.tolerance import TimeTolerance, Tolerance
+from grader.checks.unreported import SECONDS_HINT, Reported, why_unreported
+from grader.checks.wording import code, codes, counted, listing
+from grader.recording.model import NS, Recording
+
+# Between two callbacks of a busy executor.
+_PAUSE_S = 0.1
+
+
+class Runs(Reported):
+    """Parameters of callbacks.run."""
+
+    period: Duration | None = Field(
+        None, description="Expected time between two starts of each callback."
+    )
+    messages: TopicName | None = Field(
+        None, description="Topic of a stimulus: each message on it must be worked on once."
+    )
+    tolerance: Tolerance = Field(
+        TimeTolerance(0.10, relative=True),
+        description="How far the median of the times between starts may be from the period: a "
+        "share of it or a time.",
+    )
+    at_least: int = Field(3, ge=2, description="How often each callback must have run.")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Runs:
+        if (self.period is None) == (self.messages is None):
+            raise ValueError("say what calls them: give either 'period' or 'messages'")
+        return self
+
+
+@check("callbacks.run", Subject.RECORDING, Runs)
+def run(recording: Recording, parameters: Runs) -> Finding:
+    """Callbacks run, and as often as they should.
+
+    A timer's callback starts once in each `period` (the median of the times between its starts);
+    a subscription's callback runs once for each message that the probe sent; messages that still
+    wait at the end because other callbacks work without a pause do not count. Each run must have
+    reported its start and its end.
+
+    Explains reports in another form or with other names, periods in milliseconds, callbacks that
+    never end or never run, messages that were dropped, and a callback that is registered twice.
+    """
+    expected = _run_words(parameters)
+    reports = read_reports(recording.on(parameters.topic))
+    cause = why_unreported(recording, parameters.topic, parameters.callbacks, reports)
+    if cause is not None:
+        return cause.finding(expected)
+    for callback in parameters.callbacks:
+        if parameters.period is not None:
+            finding = _judge_period(recording, parameters, reports, callback, parameters.period)
+        else:
+            finding = _judge_messages(recording, parameters, reports, callback)
+        if finding is not None:
+            return finding
+    return Finding.passed(
+        expected,
+        listing(
+            f"{code(name)} ran {counted(len(reports.of(name)), 'time')}"
+            for name in parameters.callbacks
+        ),
+        Evidence(spans=spans(recording, reports)),
+    )
+
+
+def _run_words(parameters: Runs) -> str:
+    names = codes(parameters.callbacks)
+    each = "each " if len(parameters.callbacks) > 1 else ""
+    if parameters.period is not None:
+        return (
+            f"{names} {each}start every {format_duration(parameters.period)} (median within "
+            f"{parameters.tolerance}), and report start and end on {code(parameters.topic)}"
+        )
+    return (
+        f"{names} {each}run once for each message on {code(parameters.messages or '')}, and report "
+        f"start and end on {code(parameters.topic)}"
+    )
+
+
+def _judge_period(
+    recording: Recording, parameters: Runs, reports: Reports, callback: str, period_s: float
+) -> Finding | None:
+    """The finding of a callback that does not run at its period, or None."""
+    expected = _run_words(parameters)
+    begins = [item.begin_ns for item in reports.of(callback)]
+    measured = [
+        Interval(a, b, (b - a) / NS, begins[max(0, index - 1)])
+        for index, (a, b) in enumerate(pairwise(begins))
+    ]
+    limits = Limits(period_s, parameters.tolerance.of(period_s), math.inf, 0.0)
+    seconds = [item.seconds for item in measured]
+    good = bool(seconds) and judge(seconds, limits).good
+    if good and len(reports.ended([callback])) >= parameters.at_least:
+        return None
+    evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))
+    if seconds and not good:
+        middle_s = median(seconds)
+        observed = f"{code(callback)} starts every {format_duration(middle_s)} (median)"
+        if judge(forgiven(recording, measured, limits), limits).good:
+            return Finding.error(
+                expected,
+                f"{observed}, but the machine took the time from the process",
+                disturbed=True,
+            )
+        return Finding.failed(
+            expected, observed, _period_hint(recording, middle_s, period_s), evidence
+        )
+    cause = why_unreported(
+        recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
+    )
+    return None if cause is None else cause.finding(expected)
+
+
+def _period_hint(recording: Recording, found_s: float, wanted_s: float) -> str:
+    if found_s < 0.75 * wanted_s:
+        return f"{SECONDS_HINT} A callback that is given to two timers runs twice as often."
+    return (
+        f"{SECONDS_HINT} While a callback works, no other callback of its executor or group "
+        "begins: several that work longer than a period together are late."
+    )
+
+
+def _judge_messages(
+    recording: Recording, parameters: Runs, reports: Reports, callback: str
+) -> Finding | None:
+    """The finding of a callback that does not run once for each message, or None."""
+    expected = _run_words(parameters)
+    sent = recording.sent.get(parameters.messages or "", ())
+    if not sent:
+        return Finding.error(
+            expected, f"nothing was sent on {code(parameters.messages or '')}", disturbed=True
+        )
+    begun, ended = len(reports.of(callback)), len(reports.ended([callback]))
+    evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))
+    observed = (
+        f"{code(callback)} started {counted(begun, 'time')} and ended {counted(ended, 'time')} for "
+        f"{counted(len(sent), 'message')}"
+    )
+    if begun > len(sent):
+        return Finding.failed(
+            expected,
+            observed,
+            "Create one subscription, and report the start and the end once in its callback.",
+            evidence,
+        )
+    if ended == len(sent) or (ended >= parameters.at_least and _busy(recording, reports, callback)):
+        return None
+    dying = dead(recording)
+    if dying:
+        return cause_of_death(recording, dying[0]).after(observed).finding(expected)
+    work_s = max((item.seconds or 0.0 for item in reports.ended([callback])), default=0.0)
+    missing_s = (len(sent) - ended) * work_s
+    if recording.taken_s(sent[0].stamp_ns, recording.stop_ns) >= missing_s > 0.0:
+        return Finding.error(
+            expected, f"{observed}, but the machine took the time from the process", disturbed=True
+        )
+    return Finding.failed(
+        expected,
+        observed,
+        "A queue size of 10 keeps the messages that come while the callback works. Look for a "
+        "callback that works too long, and for one that keeps the executor from coming round.",
+        evidence,
+    )
+
+
+def _busy(recording: Recording, reports: Reports, callback: str) -> bool:
+    """Whether callbacks worked without a pause from the newest run of one until the end.
+
+    What waits then is in a queue; whether callbacks should have run at the same time is judged
+    elsewhere.
+    """
+    mine = reports.of(callback)
+    free_ns = max(item.end_ns or recording.stop_ns for item in mine)
+    for item in reports.runs:
+        if item.begin_ns - free_ns > _PAUSE_S * NS:
+            return False
+        free_ns = max(free_ns, item.end_ns or recording.stop_ns)
+    return recording.stop_ns - free_ns <= _PAUSE_S * NS
+
+
+class Work(Reported):
+    """Parameters of callbacks.work."""
+
+    duration: Duration = Field(description="How long each run of them must last.")
+    tolerance: Tolerance = Field(
+        TimeTolerance(0.15, relative=True),
+        description="How far the median may be from it: a share of it or a time.",
+    )
+
+
+@check("callbacks.work", Subject.RECORDING, Work)
+def work(recording: Recording, parameters: Work) -> Finding:
+    """Callbacks work as long as they should.
+
+    The time between the report of the start and that of the end, by source timestamps: the
+    median of each callback's runs must be the duration within `tolerance`. What the machine took
+    from the process never costs a point.
+
+    Explains milliseconds that were taken for seconds, and a start and an end that are published
+    without the work between them.
+    """
+    expected = (
+        f"{codes(parameters.callbacks)} working {format_duration(parameters.duration)} in each run "
+        f"(median within {parameters.tolerance})"
+    )
+    reports = read_reports(recording.on(parameters.topic))
+    cause = why_unreported(recording, parameters.topic, parameters.callbacks, reports)
+    if cause is not None:
+        return cause.finding(expected)
+    allowed_s = parameters.tolerance.of(parameters.duration)
+    told = []
+    for callback in parameters.callbacks:
+        found = reports.ended([callback])
+        seconds = [item.seconds or 0.0 for item in found]
+        middle_s = median(seconds)
+        told.append(f"{code(callback)} works {format_duration(middle_s)}")
+        if abs(middle_s - parameters.duration) <= allowed_s:
+            continue
+        excused_s = median(
+            value - recording.taken_s(item.begin_ns, item.end_ns or item.begin_ns)
+            for value, item in zip(seconds, found, strict=True)
+        )
+        if middle_s > parameters.duration and excused_s <= parameters.duration + allowed_s:
+            return Finding.error(
+                expected,
+                f"{told[-1]}, but the machine took the time from the process",
+                disturbed=True,
+            )
+        return Finding.failed(
+            expected,
+            f"{told[-1]} (median of {counted(len(seconds), 'run')})",
+            _work_hint(middle_s, parameters.duration),
+            Evidence(spans=spans(recording, reports, found)),
+        )
+    return Finding.passed(expected, listing(told), Evidence(spans=spans(recording, reports)))
+
+
+def _work_hint(found_s: float, wanted_s: float) -> str:
+    if found_s < 0.01 * wanted_s:
+        return (
+            "Report the start, then work with time.sleep, then report the end. A start and an end "
+            "that are published one right after the other show no work."
+        )
+    return f"Work with time.sleep({wanted_s:g}) between the two reports. {SECONDS_HINT}"

@@ -1,0 +1,88 @@
+"""What the process declared of its executor and its callback groups: supporting evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from grader.checks.wording import code, codes, listing
+from grader.recording.model import Recording
+
+_EXCLUSIVE = "MutuallyExclusiveCallbackGroup"
+
+
+def executors(recording: Recording) -> tuple[tuple[str, int], ...]:
+    """Executors that were spun, each with its number of threads."""
+    found = []
+    for item in recording.declared("spin"):
+        name, number = item.data.get("executor"), item.data.get("threads")
+        if isinstance(name, str) and isinstance(number, int):
+            found.append((name, number))
+    return tuple(dict.fromkeys(found))
+
+
+def threads(recording: Recording) -> int:
+    """Threads of the largest executor that was spun; 0 if none was declared."""
+    return max((number for _, number in executors(recording)), default=0)
+
+
+def declared_words(recording: Recording) -> str:
+    """The executor and the callback groups in words, or an empty text."""
+    told = [
+        f"a {code(name)}" + (f" with {number} threads" if number > 1 else "")
+        for name, number in executors(recording)
+    ]
+    words = [listing(told)] if told else []
+    groups = _groups(recording, "timer")
+    if len(groups) > 1:
+        words.append(f"its timers in {_group_words(groups)}")
+    groups = _groups(recording, "subscription")
+    if groups:
+        words.append(f"its subscription in {_group_words(groups)}")
+    return f"the process declared {', '.join(words)}" if words else ""
+
+
+def single(recording: Recording) -> bool:
+    """Whether only executors with one thread were spun."""
+    found = executors(recording)
+    return bool(found) and all(number == 1 for _, number in found)
+
+
+def one_thread_for_one_cpu(recording: Recording) -> bool:
+    """Whether a multi-threaded executor has one thread because the machine has one CPU."""
+    return recording.environment.get("cpus") == "1" and any(
+        name == "MultiThreadedExecutor" and number == 1 for name, number in executors(recording)
+    )
+
+
+def allows(recording: Recording) -> bool:
+    """Whether the process declared what lets its timers run at the same time."""
+    return (
+        threads(recording) > 1
+        and len(_groups(recording, "timer")) > 1
+        and not shares_exclusive_group(recording)
+    )
+
+
+def shares_exclusive_group(recording: Recording) -> bool:
+    """Whether the timers are all in one mutually exclusive group."""
+    groups = _groups(recording, "timer")
+    return (
+        len(groups) > 1 and {kind for kind, _ in groups} == {_EXCLUSIVE} and len(set(groups)) == 1
+    )
+
+
+def _groups(recording: Recording, kind: str) -> list[tuple[str, Any]]:
+    found = []
+    for item in recording.declared(kind):
+        group = item.data.get("group")
+        if isinstance(group, Mapping) and isinstance(group.get("type"), str):
+            found.append((str(group["type"]), str(group.get("id"))))
+    return found
+
+
+def _group_words(groups: list[tuple[str, Any]]) -> str:
+    kinds = [kind for kind, _ in dict.fromkeys(groups)]
+    if len(kinds) == 1:
+        return f"one {code(kinds[0])}"
+    return codes(kinds) if len(set(kinds)) > 1 else f"{len(kinds)} {code(kinds[0] + 's')}"

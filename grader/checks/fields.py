@@ -1,0 +1,62 @@
+"""Fields that an assignment expects of a request, a response, a goal or a result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from grader.checks.finding import Table
+from grader.checks.value import Difference, differences, expected_leaves
+from grader.checks.wording import value_text
+
+TOLERANCE = 1e-9
+"""Largest difference of two numbers that are meant to be the same."""
+
+
+def has_fields(value: Mapping[str, Any], wanted: Mapping[str, Any] | None) -> bool:
+    """Whether a value has the wanted fields; other fields do not matter.
+
+    Raises:
+        NoSuchField: It cannot have such a field.
+    """
+    return not wanted or not unlike(value, wanted, TOLERANCE)
+
+
+def unlike(
+    value: Mapping[str, Any], wanted: Mapping[str, Any], tolerance: float
+) -> tuple[Difference, ...]:
+    """The wanted fields that a value has not.
+
+    Raises:
+        NoSuchField: It cannot have such a field.
+    """
+    leaves = expected_leaves(wanted, value)
+    return differences(leaves, value, rest_zero=False, tolerance=tolerance)
+
+
+def words(value: Mapping[str, Any]) -> str:
+    """Write fields as ``a = 2, b = 3``; ``nothing`` for none."""
+    return ", ".join(f"{path} = {value_text(item)}" for path, item in _plain(value)) or "nothing"
+
+
+def difference_words(found: Sequence[Difference]) -> str:
+    """Write differences as ``sum = 4 instead of 5``."""
+    return ", ".join(
+        f"{item.field} = {value_text(item.observed)} instead of {value_text(item.expected)}"
+        for item in found[:4]
+    )
+
+
+def difference_table(title: str, found: Sequence[Difference]) -> Table:
+    """The same as a table."""
+    rows = ((item.field, value_text(item.expected), value_text(item.observed)) for item in found)
+    return Table(title, ("field", "expected", "observed"), tuple(rows)[:50])
+
+
+def _plain(value: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for key, item in value.items():
+        name = f"{path}.{key}" if path else str(key)
+        if isinstance(item, Mapping):
+            yield from _plain(item, name)
+        else:
+            yield name, item

@@ -1,0 +1,217 @@
+"""What a subscription that comes late gets of what was published before it."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from grader.assignment.name import Id, TopicName
+from grader.assignment.quantity import format_duration
+from grader.checks import testimony
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.compatibility import compatibility_table, refusals
+from grader.checks.death import cause_of_death, dead
+from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.silence import why_few
+from grader.checks.wording import code, counted
+from grader.recording.model import NS, Join, Kind, Message, Recording
+
+# The match is noted in the round after it.
+_NOTED_NS = NS // 10
+_SHOWN = 50
+
+
+class LateJoiner(Parameters):
+    """Parameters of qos.late_joiner."""
+
+    topic: TopicName = Field(description="Fully qualified topic name; it is recorded, too.")
+    joiner: Id = Field(description="The `name` of a `join` among the stimuli.")
+    last: int = Field(
+        ge=0, description="So many of the messages before it joined it must get, and no more."
+    )
+
+
+@check("qos.late_joiner", Subject.RECORDING, LateJoiner)
+def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
+    """Who joins late gets the last messages, and no more.
+
+    Judged by behaviour: a subscription of the probe joins in the middle of the run, and gets the
+    last messages that were published before (`last` of them, or none for 0), as the durability
+    and depth of the publisher make it. Messages that were published just while it was matched
+    may count on either side.
+
+    Explains a publisher that is volatile, a queue that is too short or too long, a history of
+    keep_all, and a publisher that had not published enough.
+    """
+    expected = _expected_words(parameters)
+    join = next((item for item in recording.joins if item.name == parameters.joiner), None)
+    before = [] if join is None else _before(recording.on(parameters.topic), join.joined_ns)
+    if join is None or len(before) <= parameters.last:
+        return _not_judged(recording, parameters, join, before, expected)
+    got = recording.joined.get(parameters.joiner, ())
+    history = _before(got, join.joined_ns)
+    evidence = _evidence(recording, join, before, history)
+    meanwhile = sum(
+        join.joined_ns < item.stamp_ns <= (join.matched_ns or join.joined_ns) + _NOTED_NS
+        for item in recording.on(parameters.topic)
+    )
+    least = max(0, parameters.last - meanwhile)
+    if least <= len(history) <= parameters.last and _is_newest(history, before):
+        return Finding.passed(expected, _seen(history, before), evidence)
+    if len(history) > parameters.last:
+        return Finding.failed(
+            expected,
+            _seen(history, before) + _why_many(recording, parameters, history, before),
+            _hint(parameters),
+            evidence,
+        )
+    if not _is_newest(history, before):
+        return Finding.error(
+            expected,
+            f"{_seen(history, before)}, but not the newest ones: some were lost on their way",
+            disturbed=True,
+        )
+    return _too_few(recording, parameters, join, history, before, evidence, expected)
+
+
+def _expected_words(parameters: LateJoiner) -> str:
+    if parameters.last == 0:
+        return f"a late joiner on {code(parameters.topic)} gets nothing of what was before it"
+    return (
+        f"a late joiner on {code(parameters.topic)} gets the last "
+        f"{counted(parameters.last, 'message')} of those before it, and no more"
+    )
+
+
+def _before(messages: tuple[Message, ...], time_ns: int) -> list[Message]:
+    return sorted(
+        (item for item in messages if item.stamp_ns <= time_ns),
+        key=lambda item: (item.stamp_ns, item.sequence),
+    )
+
+
+def _is_newest(history: list[Message], before: list[Message]) -> bool:
+    """Whether what came is the newest of what was published, without a gap."""
+    if not history:
+        return True
+    stamps = {item.stamp_ns for item in history}
+    expected = {item.stamp_ns for item in before[-len(history) :]}
+    return stamps == expected
+
+
+def _seen(history: list[Message], before: list[Message]) -> str:
+    return f"it got {len(history)} of the {counted(len(before), 'message')} before it"
+
+
+def _not_judged(
+    recording: Recording,
+    parameters: LateJoiner,
+    join: Join | None,
+    before: list[Message],
+    expected: str,
+) -> Finding:
+    """Nobody joined, or too little had been published to see what is kept of it."""
+    needed = parameters.last + 1
+    if len(recording.on(parameters.topic)) < needed:
+        return why_few(recording, parameters.topic, needed).finding(expected)
+    seen = (
+        "the run ended before it joined"
+        if join is None
+        else f"when it joined, only {counted(len(before), 'message')} had been published of the "
+        f"{needed} that are needed to judge"
+    )
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0]).after(seen).finding(expected)
+    return Finding.error(expected, seen)
+
+
+def _why_many(
+    recording: Recording, parameters: LateJoiner, history: list[Message], before: list[Message]
+) -> str:
+    queues = testimony.queues(recording, Kind.PUBLISHER, parameters.topic)
+    if any(queue.history == "keep_all" for queue in queues):
+        return ": the publisher's history is keep_all, declared by the process"
+    depths = [queue.depth for queue in queues if queue.depth is not None]
+    if depths and depths[0] != parameters.last:
+        return f": the publisher's depth is {depths[0]}, declared by the process"
+    if len(history) == len(before):
+        return ": all that there were"
+    return f": the publisher keeps {len(history)}"
+
+
+def _too_few(
+    recording: Recording,
+    parameters: LateJoiner,
+    join: Join,
+    history: list[Message],
+    before: list[Message],
+    evidence: Evidence,
+    expected: str,
+) -> Finding:
+    publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
+    for publisher in publishers:
+        refused = refusals(publisher.qos, join.qos)
+        if refused:
+            return Finding.failed(
+                expected,
+                f"it got nothing at all: {', '.join(refused)}",
+                f"{_hint(parameters)} A subscription receives nothing from a publisher that offers "
+                "less than it requests.",
+                Evidence(
+                    evidence.moments,
+                    tables=(compatibility_table(publisher.qos, join.qos), *evidence.tables),
+                ),
+            )
+    taken_s = recording.taken_s(join.joined_ns, recording.stop_ns)
+    if join.matched_ns is None and publishers:
+        return Finding.error(
+            expected,
+            f"the late joiner was not matched within "
+            f"{format_duration((recording.stop_ns - join.joined_ns) / NS)}"
+            + (f"; the machine took {format_duration(taken_s)} meanwhile" if taken_s else ""),
+            disturbed=True,
+        )
+    depths = [
+        queue.depth
+        for queue in testimony.queues(recording, Kind.PUBLISHER, parameters.topic)
+        if queue.depth is not None
+    ]
+    why = f": the publisher's depth is {depths[0]}, declared by the process" if depths else ""
+    if depths and depths[0] >= parameters.last:
+        return Finding.error(
+            expected,
+            f"{_seen(history, before)}, although the publisher's depth is {depths[0]}: the rest "
+            "was lost on its way",
+            disturbed=True,
+        )
+    return Finding.failed(expected, _seen(history, before) + why, _hint(parameters), evidence)
+
+
+def _hint(parameters: LateJoiner) -> str:
+    if parameters.last == 0:
+        return "A volatile publisher keeps nothing for late joiners: that is the default."
+    return (
+        "Give create_publisher a profile that keeps messages for late joiners: QoSProfile("
+        f"history=HistoryPolicy.KEEP_LAST, depth={parameters.last}, "
+        "durability=DurabilityPolicy.TRANSIENT_LOCAL)."
+    )
+
+
+def _evidence(
+    recording: Recording, join: Join, before: list[Message], history: list[Message]
+) -> Evidence:
+    got = {item.stamp_ns for item in history}
+    rows = tuple(
+        (
+            str(number),
+            f"{recording.since_launch_s(item.stamp_ns):.2f} s",
+            "yes" if item.stamp_ns in got else "no",
+        )
+        for number, item in enumerate(before, start=1)
+    )
+    title = f"Messages before {join.name} joined"
+    moments = [Moment(f"{join.name} joined", recording.since_launch_s(join.joined_ns))]
+    if join.matched_ns is not None:
+        moments.append(Moment(f"{join.name} matched", recording.since_launch_s(join.matched_ns)))
+    header = ("message", "published after launch", "got by the late joiner")
+    return Evidence(tuple(moments), tables=(Table(title, header, rows[-_SHOWN:]),))

@@ -1,0 +1,196 @@
+"""Services and actions that the student's nodes offer, and why one of them is not there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from grader.checks.cause import Cause
+from grader.checks.death import cause_of_death, dead
+from grader.checks.finding import Evidence, Moment, Table
+from grader.checks.node_absence import why_no_node
+from grader.checks.wording import code, codes
+from grader.nearest import nearest
+from grader.recording.interaction import Service
+from grader.recording.model import Recording
+
+_SEND_GOAL = "/_action/send_goal"
+_ACTION = "/_action/"
+_OF_GOALS = "_SendGoal"
+_MOST_ROWS = 50
+
+# Every node has these by itself; they say nothing of what the student wrote.
+_OWN = frozenset(
+    {
+        "describe_parameters",
+        "get_parameter_types",
+        "get_parameters",
+        "get_type_description",
+        "list_parameters",
+        "set_parameters",
+        "set_parameters_atomically",
+    }
+)
+
+
+@dataclass(frozen=True)
+class Word:
+    """How a thing that is offered is called, and made.
+
+    Attributes:
+        noun: ``service`` or ``action``.
+        create: The code that makes one; ``{type}`` and ``{name}`` stand for its own.
+        folder: Module of its interfaces.
+    """
+
+    noun: str
+    create: str
+    folder: str
+
+
+SERVICE = Word("service", "self.create_service({type}, '{name}', self.callback)", "srv")
+ACTION = Word("action", "ActionServer(self, {type}, '{name}', self.execute_callback)", "action")
+
+
+def services(recording: Recording) -> tuple[Service, ...]:
+    """Services that the student wrote, without those that every node has."""
+    return tuple(
+        item
+        for item in recording.services
+        if _ACTION not in item.name and not _is_own(item.name, item.node)
+    )
+
+
+def actions(recording: Recording) -> tuple[Service, ...]:
+    """Actions, each with its own name and type."""
+    return tuple(
+        Service(
+            item.name.removesuffix(_SEND_GOAL),
+            item.type.removesuffix(_OF_GOALS),
+            item.node,
+            item.appeared_ns,
+            item.vanished_ns,
+        )
+        for item in recording.services
+        if item.name.endswith(_SEND_GOAL)
+    )
+
+
+def _is_own(name: str, node: str) -> bool:
+    prefix, _, base = name.rpartition("/")
+    return prefix == node and base in _OWN
+
+
+def why_not_offered(
+    recording: Recording, word: Word, name: str, interface: str | None = None
+) -> Cause | None:
+    """Why no node of the student offers a service or action, or None if one does.
+
+    Args:
+        recording: The run.
+        word: What it is.
+        name: Fully qualified.
+        interface: Its type, or None where any will do.
+    """
+    there = services(recording) if word is SERVICE else actions(recording)
+    own = [item for item in there if item.name == name]
+    if any(interface in (None, item.type) for item in own):
+        return None
+    cause = why_no_node(recording)
+    if cause is not None:
+        return cause
+    evidence = _evidence(recording, there, word)
+    if own and interface is not None:
+        return _other_type(own[0], word, interface, evidence)
+    near = _near_miss(there, word, name, evidence)
+    if near is not None:
+        return near
+    ended = [process for process in dead(recording) if process.exit_code != 0]
+    if ended:
+        return cause_of_death(recording, ended[0])
+    other = actions(recording) if word is SERVICE else services(recording)
+    if any(item.name == name for item in other):
+        wrong = ACTION if word is SERVICE else SERVICE
+        return Cause(
+            f"{code(name)} is there, but as an {wrong.noun}"
+            if wrong is ACTION
+            else f"{code(name)} is there, but as a {wrong.noun}",
+            f"Make it with {_create(word, name, interface)}.",
+            evidence,
+        )
+    nodes = codes(item.name for item in recording.student_nodes)
+    there_words = codes(item.name for item in there)
+    return Cause(
+        f"{nodes} offers {there_words} only" if there else f"{nodes} offers no {word.noun}",
+        f"Call {_create(word, name, interface)} in the node's constructor.",
+        evidence,
+    )
+
+
+def _other_type(item: Service, word: Word, interface: str, evidence: Evidence) -> Cause:
+    package, _, short = interface.split("/")
+    return Cause(
+        f"the {word.noun} {code(item.name)} has the type {code(item.type)}",
+        f"A client and a server meet only if their types are the same: "
+        f"`from {package}.{word.folder} import {short}`.",
+        evidence,
+    )
+
+
+def _near_miss(
+    there: tuple[Service, ...], word: Word, name: str, evidence: Evidence
+) -> Cause | None:
+    base = name.rpartition("/")[2]
+    for item in there:
+        found = f"found the {word.noun} {code(item.name)}"
+        if item.name.lower() == name.lower():
+            return Cause(
+                f"{found}: upper and lower case differ",
+                f"Names in ROS are case-sensitive: write '{base}'.",
+                evidence,
+            )
+        if item.name == item.node + name:
+            return Cause(
+                f"{found}: a private name, below the node's own name",
+                f"`~/{base}` puts the node's name in front: write '{base}', without `~/`.",
+                evidence,
+            )
+        if item.name.endswith(name):
+            prefix = item.name[: -len(name)]
+            return Cause(
+                f"{found}: {code(prefix)} stands in front of the name",
+                f"Create the node without namespace, or write the absolute name '{name}'.",
+                evidence,
+            )
+        if name.endswith(item.name):
+            return Cause(
+                f"{found}: an absolute name, which stays outside of the node's namespace",
+                f"Begin the name without `/`: '{item.name.lstrip('/')}' is relative.",
+                evidence,
+            )
+    match = nearest(name, [item.name for item in there])
+    if match is None:
+        return None
+    return Cause(
+        f"found the {word.noun} {code(match)} instead of {code(name)}",
+        f"Write its name as '{base}'.",
+        evidence,
+    )
+
+
+def _create(word: Word, name: str, interface: str | None) -> str:
+    short = interface.rpartition("/")[2] if interface else "Type"
+    return code(word.create.format(type=short, name=name.lstrip("/")))
+
+
+def _evidence(recording: Recording, there: tuple[Service, ...], word: Word) -> Evidence:
+    rows = tuple((item.node, item.name, item.type) for item in there[:_MOST_ROWS])
+    table = Table(
+        f"{word.noun.capitalize()}s of the student's nodes", ("node", "name", "type"), rows
+    )
+    return Evidence(
+        moments=tuple(
+            Moment(f"{word.noun} {item.name} appeared", recording.since_launch_s(item.appeared_ns))
+            for item in there[:5]
+        ),
+        tables=(table,) if rows else (),
+    )

@@ -1,0 +1,326 @@
+"""Checks of rotations: whether a node converts them rightly."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from grader.assignment.model import TopicName
+from grader.assignment.quantity import Dimension, QuantityOf
+from grader.checks.cause import Cause
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.conversion import (
+    CONVERSIONS,
+    Group,
+    WrongMessage,
+    degrees,
+)
+from grader.checks.death import cause_of_death, dead
+from grader.checks.delivery import why_not_delivered
+from grader.checks.finding import Evidence, Finding
+from grader.checks.messages import published
+from grader.checks.rotation_case import Case, Limits, cases
+from grader.checks.rotation_evidence import evidence_of, right_words, shown
+from grader.checks.rotation_slip import explain
+from grader.checks.silence import why_silent
+from grader.checks.unanswered import why_raised
+from grader.checks.wording import code, counted, listing
+from grader.recording.model import NS, Recording
+
+# An answer takes a callback of some microseconds; a question that was sent later than this
+# before the end may be unanswered.
+_TIME_TO_ANSWER_S = 0.25
+# Share of the answers that must belong to the question before to say so.
+_STALE = 0.8
+_AT_ONCE_S = 0.05
+# One that publishes a first message when it is created does no harm.
+_GREETINGS = 2
+
+Tolerance = Annotated[float, QuantityOf(Dimension.ANGLE, minimum=0.0, exclusive=True)]
+
+
+class Answers(Parameters):
+    """Parameters of rotation.answers."""
+
+    question: TopicName = Field(description="Topic on which the probe sends what to convert.")
+    answer: TopicName = Field(description="Topic on which the node answers.")
+    conversion: Literal["axis_angle_to_quaternion", "rpy_to_quaternion", "quaternion_to_rpy"] = (
+        Field(
+            description="What is asked. `axis_angle_to_quaternion`: `data` = [x, y, z, angle] to a "
+            "Quaternion; `rpy_to_quaternion`: a Vector3 of roll, pitch and yaw about fixed axes to "
+            "a Quaternion; `quaternion_to_rpy`: the reverse."
+        )
+    )
+    tolerance: Tolerance = Field(
+        math.radians(0.01),
+        description="Largest angle between the answer's rotation and the right one, by default "
+        "0.01 deg.",
+        validate_default=False,
+    )
+    length: float = Field(
+        1e-6, gt=0, description="How far the length of a quaternion may be from 1."
+    )
+    cases: tuple[Group, ...] = Field(
+        (),
+        description="Which cases are judged: `ordinary`, `scaled` (an axis or a quaternion whose "
+        "length is not 1), `gimbal_lock`, `zero` (an axis or a quaternion of length 0); by "
+        "default all.",
+    )
+    at_least: int = Field(1, ge=1, description="How many such cases must have been sent.")
+
+    @property
+    def words(self) -> str:
+        """What is expected, in words."""
+        which = f" ({listing((group.words for group in self.cases), 'or')})" if self.cases else ""
+        unit = (
+            "" if self.conversion == "quaternion_to_rpy" else f", length 1 within {self.length:g}"
+        )
+        return (
+            f"each message on {code(self.question)}{which} answered on {code(self.answer)} with "
+            f"the same rotation, within {degrees(self.tolerance)}{unit}"
+        )
+
+    def judges(self, case: Case) -> bool:
+        """Whether a case is judged."""
+        return not self.cases or case.group in self.cases
+
+
+@check("rotation.answers", Subject.RECORDING, Answers)
+def answers(recording: Recording, parameters: Answers) -> Finding:
+    """Rotations are converted rightly.
+
+    The probe sends what to convert, and the node answers. An answer is right if its rotation is
+    the right one within `tolerance`, as scipy computes it, and if a quaternion has length 1.
+    `q` and `-q` are the same rotation; angles are compared as the rotation that they make, so
+    at gimbal lock any roll and yaw that make it are right. A zero axis or a zero quaternion may
+    be answered by no rotation at all (the identity) or by nothing, but not by NaN. Answers may
+    come late or twice: each is paired with the question that it answers, and one that is missing
+    does not shift the others.
+
+    Names the mistake where the wrong answers are what it gives: the angle not halved, the axis
+    not normalized, w first instead of last, degrees, roll and yaw swapped, axes that turn with
+    the body instead of fixed ones, the inverse rotation, answers that belong to the message
+    before. Explains answers that are missing (a process that died, a callback that is never
+    called), and messages that nobody asked for.
+    """
+    expected = parameters.words
+    sent = recording.sent.get(parameters.question, ())
+    received = recording.on(parameters.answer)
+    if not sent:
+        return _not_asked(recording, parameters).finding(expected)
+    if not received:
+        return why_silent(recording, parameters.answer).finding(expected)
+    limits = Limits(parameters.tolerance, parameters.length)
+    try:
+        found = cases(parameters.conversion, sent, received, limits)
+    except WrongMessage as error:
+        return Finding.error(expected, f"the messages are not what the check converts: {error}")
+    judged = [case for case in found if parameters.judges(case) and _answerable(recording, case)]
+    wrong = [case for case in judged if case.answers and not case.good]
+    missing = [case for case in judged if not case.answers and not case.optional]
+    evidence = evidence_of(
+        recording, parameters.conversion, parameters.answer, parameters.tolerance, judged
+    )
+    if _is_behind(found):
+        return _behind(parameters, found, evidence)
+    if wrong:
+        return _wrong(parameters, judged, wrong, evidence)
+    if missing:
+        return _missing(recording, parameters, judged, missing, evidence)
+    unasked = sum(message.stamp_ns < sent[0].stamp_ns for message in received)
+    if unasked > _GREETINGS:
+        return _unasked(parameters, unasked, evidence)
+    if len(judged) < parameters.at_least:
+        return _too_few(recording, parameters, judged).finding(expected)
+    return Finding.passed(expected, _summary(judged), evidence)
+
+
+def _not_asked(recording: Recording, parameters: Answers) -> Cause:
+    cause = why_not_delivered(recording, parameters.question)
+    return cause or Cause(
+        f"nothing was sent on {code(parameters.question)}", ours=True, disturbed=True
+    )
+
+
+def _answerable(recording: Recording, case: Case) -> bool:
+    """Whether there is an answer, or was time for one."""
+    left_s = (recording.stop_ns - case.asked_ns) / NS
+    return bool(case.answers) or case.optional or left_s >= _TIME_TO_ANSWER_S
+
+
+def _summary(judged: list[Case]) -> str:
+    errors = [answer.error_rad for case in judged for answer in case.answers]
+    unanswered = sum(not case.answers for case in judged)
+    silent = f", {unanswered} without an answer, as allowed" if unanswered else ""
+    worst = f", largest error {degrees(max(errors))}" if errors else ""
+    return f"all of {counted(len(judged), 'case')} right{worst}{silent}"
+
+
+def _is_behind(found: tuple[Case, ...]) -> bool:
+    """Whether each answer comes at once with the next question, and the last question has none.
+
+    A slow node has late answers too, but not at once.
+    """
+    answered = [case for case in found if case.answers]
+    prompt = sum(case.behind_s is not None and case.behind_s < _AT_ONCE_S for case in answered)
+    return (
+        len(answered) == len(found) - 1 > 1
+        and not found[-1].answers
+        and prompt >= _STALE * len(answered)
+    )
+
+
+def _behind(parameters: Answers, found: tuple[Case, ...], evidence: Evidence) -> Finding:
+    return Finding.failed(
+        parameters.words,
+        f"each answer belongs to the message before: that to case 1 came after case 2 had been "
+        f"sent, and so on; case {len(found)}, the last, has none",
+        "Compute from the message that the callback is called with, then publish. What an "
+        "earlier call stored is one message old.",
+        evidence,
+    )
+
+
+def _wrong(
+    parameters: Answers, judged: list[Case], wrong: list[Case], evidence: Evidence
+) -> Finding:
+    conversion = CONVERSIONS[parameters.conversion]
+    first = wrong[0]
+    answer = first.answers[0]
+    observed = f"{len(wrong)} of {counted(len(judged), 'case')} wrong"
+    words, hint = _explanation(parameters, judged, wrong)
+    observed += f": {words}" if words else ""
+    observed += (
+        f"; case {first.number}, {conversion.shown(first.row)}, gave {shown(answer)}"
+        f" instead of {right_words(parameters.conversion, first)}"
+    )
+    return Finding.failed(parameters.words, observed, hint, evidence)
+
+
+def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> tuple[str, str]:
+    """What went wrong, in words, and what to try."""
+    infinite = [case for case in wrong if not case.answers[0].finite]
+    if 2 * len(infinite) >= len(wrong):
+        return (
+            "the answer is not a number",
+            "Look for a division by zero, such as by the length of a zero axis, and for math.asin "
+            "or numpy.arcsin of more than 1, which rounding can give: limit it to [-1, 1].",
+        )
+    bad = [(case.row, case.answers[0].row) for case in wrong if case.answers[0].finite]
+    if len({case.answers[0].row for case in judged if case.answers}) == 1 and len(bad) > 1:
+        return (
+            "every answer is the same",
+            "Compute the answer in the callback from the message that it is called with, and set "
+            "the fields before you publish; a new Quaternion has w = 1, all else is 0.",
+        )
+    if all(case.group is Group.GIMBAL_LOCK for case in wrong):
+        # There, several mistakes give the same, and so does the usual formula by rounding errors.
+        return _by_kind(wrong)
+    questions = np.array([question for question, _ in bad])
+    found = explain(
+        parameters.conversion,
+        questions,
+        np.array([answer for _, answer in bad]),
+        parameters.tolerance,
+    )
+    if found is not None:
+        slip, share = found
+        of = f"all {len(bad)}" if share == 1.0 else f"{round(share * len(bad))} of {len(bad)}"
+        return f"{slip.words} (that gives {of} of these answers)", slip.hint
+    return _by_kind(wrong)
+
+
+def _by_kind(wrong: list[Case]) -> tuple[str, str]:
+    if all(case.answers[0].error_rad < 1e-3 for case in wrong):
+        lengths = [case.answers[0].length for case in wrong if case.answers[0].length]
+        return (
+            f"the rotation is right, but the quaternion's length is not 1 (it is "
+            f"{min(lengths):.6g} to {max(lengths):.6g})"
+            if lengths
+            else "the rotation is a little off",
+            "Normalize what you compute with, and compute in double precision.",
+        )
+    hints = {
+        Group.GIMBAL_LOCK: "At a pitch of 90 deg, roll and yaw turn about the same axis, and the "
+        "usual formulas divide 0 by 0. Test for it with a margin, such as abs(sin_pitch) > "
+        "0.999999, set roll to 0 and take the whole turn as yaw.",
+        Group.SCALED: "Divide by the length first: the axis and the quaternion need not have "
+        "length 1.",
+        Group.ZERO: "Test the length before you divide by it, and answer with no rotation "
+        "(x = y = z = 0, w = 1) or with nothing.",
+        Group.ORDINARY: "Work the first wrong case out by hand and compare term by term.",
+    }
+    groups = {case.group for case in wrong}
+    group = groups.pop() if len(groups) == 1 else Group.ORDINARY
+    return "", hints[group]
+
+
+def _unasked(parameters: Answers, unasked: int, evidence: Evidence) -> Finding:
+    return Finding.failed(
+        parameters.words,
+        f"{counted(unasked, 'message')} on {code(parameters.answer)} before anything was asked on "
+        f"{code(parameters.question)}",
+        "Publish in the callback of the subscription, once for each message, and not in a timer.",
+        evidence,
+    )
+
+
+def _missing(
+    recording: Recording,
+    parameters: Answers,
+    judged: list[Case],
+    missing: list[Case],
+    evidence: Evidence,
+) -> Finding:
+    expected = parameters.words
+    conversion = CONVERSIONS[parameters.conversion]
+    observed = (
+        f"{len(missing)} of {counted(len(judged), 'case')} without an answer, the first: case "
+        f"{missing[0].number}, {conversion.shown(missing[0].row)}"
+    )
+    ended = dead(recording)
+    if ended:
+        cause = cause_of_death(recording, ended[0])
+        return cause.after(observed).finding(expected)
+    received = recording.on(parameters.answer)
+    lost = published(received) - len(received)
+    if len(missing) <= lost:
+        return Finding.error(
+            expected, f"{observed}; {counted(lost, 'answer')} got lost on the way", disturbed=True
+        )
+    if any(_starved(recording, case) for case in missing):
+        return Finding.error(
+            expected, f"{observed}, but the machine took the time from the process", disturbed=True
+        )
+    for process in recording.processes:
+        raised = why_raised(recording, observed, process, missing[0].asked_ns)
+        if raised is not None:
+            return raised.finding(expected)
+    return Finding.failed(
+        expected,
+        observed,
+        "Publish once in every call of the callback. Look for an exception that is caught, and "
+        "for a condition that leaves cases out.",
+        evidence,
+    )
+
+
+def _starved(recording: Recording, case: Case) -> bool:
+    left_s = (recording.stop_ns - case.asked_ns) / NS
+    return left_s - recording.taken_s(case.asked_ns, recording.stop_ns) < _TIME_TO_ANSWER_S
+
+
+def _too_few(recording: Recording, parameters: Answers, judged: list[Case]) -> Cause:
+    seen = f"only {counted(len(judged), 'case')} of {parameters.at_least} could be sent"
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0]).after(seen)
+    if any(case.behind_s is not None for case in judged):
+        return Cause(
+            f"{seen}, because the answers come late",
+            "A callback must return soon: no time.sleep() and no loop that waits.",
+        )
+    return Cause(seen, ours=True, disturbed=True)

@@ -1,0 +1,340 @@
+"""The classic mistakes in converting rotations, each as the formula that it makes.
+
+Where the answers of wrong cases are what such a formula gives, the mistake has a name.
+Formulas: https://en.wikipedia.org/wiki/Conversion_between_quaternions_and_Euler_angles
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grader.checks.conversion import (
+    Rows,
+    angles_between,
+    oracle,
+    rotations_of_answers,
+    rotations_of_rpy,
+    unit_quaternions,
+)
+
+Flags = NDArray[np.bool_]
+
+# Share of the wrong answers that a mistake must explain to be named.
+_EXPLAINS = 0.9
+# Of a component of a quaternion, in addition to the tolerance.
+_COMPONENT = 1e-5
+_HALF_HINT = (
+    "A quaternion holds half of the angle: vector part = sin(angle / 2) times the unit axis, "
+    "w = cos(angle / 2)."
+)
+_AXIS_HINT = "Divide the axis by its length, math.sqrt(x**2 + y**2 + z**2), before you use it."
+_ORDER_HINT = (
+    "ROS writes a quaternion as x, y, z, w; many books and libraries put w first. Name the "
+    "fields: Quaternion(x=..., y=..., z=..., w=...)."
+)
+_RADIANS_HINT = "Angles in ROS are in radians, and so are those of math.sin and math.atan2."
+_FIXED_HINT = (
+    "Fixed axes: turn about x first (roll), then about the x-y-z axes that stood still, y "
+    "(pitch) and z (yaw); that is q = q_yaw * q_pitch * q_roll, in this order."
+)
+_INVERSE_HINT = "The vector part of the quaternion has the wrong sign, so it turns backwards."
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A mistake.
+
+    Attributes:
+        words: Clause that says what is wrong.
+        hint: What to try.
+        formula: From questions, shape (n, k), to the answers that it gives, shape (n, l).
+    """
+
+    words: str
+    hint: str
+    formula: Callable[[Rows], Rows]
+
+
+def explain(
+    conversion: str, questions: Rows, answers: Rows, tolerance_rad: float
+) -> tuple[Slip, float] | None:
+    """The mistake that gives these answers.
+
+    Args:
+        conversion: Its name.
+        questions: Of the wrong cases, shape (n, k).
+        answers: The wrong answers, finite, shape (n, l).
+        tolerance_rad: How far an answer may be from what the mistake gives.
+
+    Returns:
+        The mistake that explains the most, with the share that it explains; None if none
+        explains enough.
+    """
+    if not len(questions):
+        return None
+    best: tuple[Slip, float] | None = None
+    right = oracle(conversion, questions)
+    for slip in SLIPS[conversion]:
+        with np.errstate(all="ignore"):
+            given = slip.formula(questions)
+        # Where the mistake does no harm, it explains nothing.
+        explained = _same(given, answers, tolerance_rad) & ~_right(given, right, tolerance_rad)
+        share = float(np.mean(explained))
+        if share >= _EXPLAINS and (best is None or share > best[1]):
+            best = (slip, share)
+    return best
+
+
+def _same(given: Rows, answers: Rows, tolerance_rad: float) -> Flags:
+    """Which answers are those that are given, row by row."""
+    if answers.shape[1] != 4:
+        return _apart(given, rotations_of_answers(answers)) <= tolerance_rad
+    # Component by component: the length of the quaternion may be part of the mistake.
+    size = np.maximum(1.0, np.linalg.norm(given, axis=1))
+    off = np.minimum(np.abs(given - answers).max(axis=1), np.abs(given + answers).max(axis=1))
+    return np.asarray(off <= (0.5 * tolerance_rad + _COMPONENT) * size)
+
+
+def _right(given: Rows, right: Rows, tolerance_rad: float) -> Flags:
+    """Which of the given answers are right ones."""
+    good = _apart(given, right) <= tolerance_rad
+    if given.shape[1] == 4:
+        good &= np.abs(np.linalg.norm(given, axis=1) - 1.0) <= _COMPONENT
+    return np.asarray(good)
+
+
+def _apart(given: Rows, rotations: Rows) -> Rows:
+    """Angle between given answers and rotations, row by row; infinite where none is given."""
+    known = np.isfinite(given).all(axis=1)
+    result = np.full(len(given), np.inf)
+    for index in np.flatnonzero(known):
+        one = rotations_of_answers(given[index : index + 1])
+        result[index] = angles_between(one, rotations[index : index + 1])[0, 0]
+    return result
+
+
+# --- Axis and angle to quaternion -----------------------------------------------------------
+
+
+def _turn(axis: Rows, sine_of: Rows, cosine_of: Rows) -> Rows:
+    """Quaternion with these two angles (radians) as they stand, no half taken."""
+    return np.column_stack((axis * np.sin(sine_of)[:, None], np.cos(cosine_of)))
+
+
+def _axis(rows: Rows) -> Rows:
+    with np.errstate(all="ignore"):
+        return np.asarray(rows[:, :3] / np.linalg.norm(rows[:, :3], axis=1, keepdims=True))
+
+
+def _half(rows: Rows) -> Rows:
+    return np.asarray(0.5 * rows[:, 3])
+
+
+def _right_quaternion(rows: Rows) -> Rows:
+    return _turn(_axis(rows), _half(rows), _half(rows))
+
+
+def _angle_first(rows: Rows) -> Rows:
+    return _right_quaternion(rows[:, [1, 2, 3, 0]])
+
+
+def _angle_scaled(factor: float) -> Callable[[Rows], Rows]:
+    def formula(rows: Rows) -> Rows:
+        return _right_quaternion(np.column_stack((rows[:, :3], factor * rows[:, 3])))
+
+    return formula
+
+
+def _length(rows: Rows) -> Rows:
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+
+
+def _w_first(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
+    """w, x, y, z in the fields x, y, z, w."""
+    return lambda rows: formula(rows)[:, [3, 0, 1, 2]]
+
+
+def _w_moved(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
+    """y, z, w, x in the fields x, y, z, w."""
+    return lambda rows: formula(rows)[:, [1, 2, 3, 0]]
+
+
+def _conjugate(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
+    return lambda rows: formula(rows) * np.array([-1.0, -1.0, -1.0, 1.0])
+
+
+_AXIS_ANGLE = (
+    Slip(
+        "the angle is not halved",
+        _HALF_HINT,
+        lambda rows: _turn(_axis(rows), rows[:, 3], rows[:, 3]),
+    ),
+    Slip(
+        "the axis is not normalized",
+        _AXIS_HINT,
+        lambda rows: _turn(rows[:, :3], _half(rows), _half(rows)),
+    ),
+    Slip(
+        "the axis is not normalized before, only the quaternion afterwards",
+        _AXIS_HINT,
+        lambda rows: _length(_turn(rows[:, :3], _half(rows), _half(rows))),
+    ),
+    Slip(
+        "the axis is not normalized and the angle is not halved",
+        f"{_AXIS_HINT} {_HALF_HINT}",
+        lambda rows: _turn(rows[:, :3], rows[:, 3], rows[:, 3]),
+    ),
+    Slip(
+        "the angle is halved in the cosine only",
+        _HALF_HINT,
+        lambda rows: _turn(_axis(rows), rows[:, 3], _half(rows)),
+    ),
+    Slip(
+        "the angle is halved in the sine only",
+        _HALF_HINT,
+        lambda rows: _turn(_axis(rows), _half(rows), rows[:, 3]),
+    ),
+    Slip("the angle is halved twice", _HALF_HINT, _angle_scaled(0.5)),
+    Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
+         _w_first(_right_quaternion)),
+    Slip("the fields are in a wrong order: x, y, z, w hold y, z, w, x", _ORDER_HINT,
+         _w_moved(_right_quaternion)),
+    Slip("it is the conjugate, the inverse rotation", _INVERSE_HINT,
+         _conjugate(_right_quaternion)),
+    Slip("the angle is converted as if it came in degrees", _RADIANS_HINT,
+         _angle_scaled(np.pi / 180.0)),
+    Slip("the angle is converted to degrees", _RADIANS_HINT, _angle_scaled(180.0 / np.pi)),
+    Slip("the first number is taken for the angle",
+         "The message holds [x, y, z, angle]: the angle is data[3].", _angle_first),
+    Slip("sine and cosine are exchanged", _HALF_HINT,
+         lambda rows: _turn(_axis(rows), 0.5 * np.pi - _half(rows), 0.5 * np.pi - _half(rows))),
+)  # fmt: skip
+
+
+# --- Roll, pitch and yaw to quaternion ------------------------------------------------------
+
+
+def _mixed(order: list[int]) -> Callable[[Rows], Rows]:
+    return lambda rows: rotations_of_rpy(rows[:, order])
+
+
+def _rpy_scaled(factor: float) -> Callable[[Rows], Rows]:
+    return lambda rows: rotations_of_rpy(factor * rows)
+
+
+def _intrinsic(rows: Rows) -> Rows:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_euler("XYZ", rows).as_quat()).reshape(-1, 4)
+
+
+def _signs(x: float, y: float, z: float) -> Callable[[Rows], Rows]:
+    return lambda rows: rotations_of_rpy(rows * np.array([x, y, z]))
+
+
+_SWAPPED = (
+    ("roll and yaw are swapped", [2, 1, 0]),
+    ("roll and pitch are swapped", [1, 0, 2]),
+    ("pitch and yaw are swapped", [0, 2, 1]),
+    ("the angles are in a wrong order: pitch, yaw, roll", [1, 2, 0]),
+    ("the angles are in a wrong order: yaw, roll, pitch", [2, 0, 1]),
+)
+_SWAP_HINT = "Roll turns about x, pitch about y, yaw about z, and the fields are x, y and z."
+
+_RPY = (
+    *(Slip(words, _SWAP_HINT, _mixed(order)) for words, order in _SWAPPED),
+    Slip("it turns about the axes that turn with the body (intrinsic), not about fixed ones",
+         _FIXED_HINT, _intrinsic),
+    Slip("the angles are not halved", "A quaternion holds half angles: math.sin(roll / 2).",
+         _rpy_scaled(2.0)),
+    Slip("the angles are halved twice", "A quaternion holds half angles: math.sin(roll / 2).",
+         _rpy_scaled(0.5)),
+    Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
+         _w_first(rotations_of_rpy)),
+    Slip("the fields are in a wrong order: x, y, z, w hold y, z, w, x", _ORDER_HINT,
+         _w_moved(rotations_of_rpy)),
+    Slip("it is the conjugate, the inverse rotation", _INVERSE_HINT,
+         _conjugate(rotations_of_rpy)),
+    Slip("the angles are converted as if they came in degrees", _RADIANS_HINT,
+         _rpy_scaled(np.pi / 180.0)),
+    Slip("the angles are converted to degrees", _RADIANS_HINT, _rpy_scaled(180.0 / np.pi)),
+    Slip("only the yaw is used", _SWAP_HINT, _signs(0.0, 0.0, 1.0)),
+    Slip("the pitch has the wrong sign", _SWAP_HINT, _signs(1.0, -1.0, 1.0)),
+)  # fmt: skip
+
+
+# --- Quaternion to roll, pitch and yaw ------------------------------------------------------
+
+
+def rpy_of(quaternions: Rows) -> Rows:
+    """Roll, pitch and yaw by the textbook's formula, which takes unit quaternions.
+
+    Args:
+        quaternions: Shape (n, 4), as they are.
+
+    Returns:
+        Shape (n, 3); the pitch clamped to 90 deg.
+    """
+    x, y, z, w = quaternions.T
+    return np.column_stack(
+        (
+            np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
+            np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        )
+    )
+
+
+def _right_rpy(rows: Rows) -> Rows:
+    return rpy_of(unit_quaternions(rows))
+
+
+def _intrinsic_rpy(rows: Rows) -> Rows:
+    # The inverse turns backwards: intrinsic angles are those of the inverse, with their signs.
+    return np.asarray(-_right_rpy(rows * np.array([-1.0, -1.0, -1.0, 1.0])))
+
+
+def _tangent(rows: Rows) -> Rows:
+    """With the arc tangent of a quotient, which knows two quadrants only."""
+    angles = _right_rpy(rows)
+    for column in (0, 2):
+        angles[:, column] = np.arctan(np.tan(angles[:, column]))
+    return angles
+
+
+_TO_RPY = (
+    *(
+        Slip(words, _SWAP_HINT, lambda rows, order=order: _right_rpy(rows)[:, order])
+        for words, order in _SWAPPED
+    ),
+    Slip("the angles are those about axes that turn with the body (intrinsic), not about fixed "
+         "ones", _FIXED_HINT, _intrinsic_rpy),
+    Slip("the angles are in degrees", _RADIANS_HINT, lambda rows: np.degrees(_right_rpy(rows))),
+    Slip("the quaternion is not scaled to length 1 before", "Divide x, y, z and w by the length "
+         "of the quaternion, math.sqrt(x**2 + y**2 + z**2 + w**2), before you use them.",
+         rpy_of),
+    Slip("the quaternion is read with w first", _ORDER_HINT,
+         lambda rows: _right_rpy(rows[:, [1, 2, 3, 0]])),
+    Slip("the quaternion is read in a wrong order: z as w", _ORDER_HINT,
+         lambda rows: _right_rpy(rows[:, [3, 0, 1, 2]])),
+    Slip("it is the inverse rotation", "The conjugate of a quaternion turns backwards: look for "
+         "a wrong sign.", lambda rows: _right_rpy(rows * np.array([-1.0, -1.0, -1.0, 1.0]))),
+    Slip("the pitch has the wrong sign", "The pitch is asin(2 (w y - z x)).",
+         lambda rows: _right_rpy(rows) * np.array([1.0, -1.0, 1.0])),
+    Slip("roll and yaw lose their quadrant", "Use math.atan2(a, b) and not math.atan(a / b): only "
+         "the two signs tell the quadrant.", _tangent),
+    Slip("the angles are halved", "atan2 and asin give the whole angle here; do not halve it.",
+         lambda rows: 0.5 * _right_rpy(rows)),
+    Slip("the angles are doubled", "atan2 and asin give the whole angle here; do not double it.",
+         lambda rows: 2.0 * _right_rpy(rows)),
+)  # fmt: skip
+
+SLIPS = {
+    "axis_angle_to_quaternion": _AXIS_ANGLE,
+    "rpy_to_quaternion": _RPY,
+    "quaternion_to_rpy": _TO_RPY,
+}

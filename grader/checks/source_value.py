@@ -1,0 +1,116 @@
+"""Numbers that a message should be made of: fields of another message, or what follows of them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, TypeAdapter
+
+from grader.checks.field import FieldPath, number_at
+from grader.checks.value import leaves
+
+_YAW = re.compile(r"yaw\((?P<path>.*)\)")
+_PATH: TypeAdapter[str] = TypeAdapter(FieldPath)
+_QUATERNION = ("x", "y", "z", "w")
+
+
+@dataclass(frozen=True)
+class SourceValue:
+    """How a number follows from a message.
+
+    Attributes:
+        text: As the author wrote it.
+        path: The field, or the quaternion whose yaw it is.
+        is_yaw: Whether it is the yaw of a quaternion, in radians.
+    """
+
+    text: str
+    path: str
+    is_yaw: bool
+
+    @classmethod
+    def of(cls, text: str) -> SourceValue:
+        """Read ``twist.twist.linear.x`` or ``yaw(pose.pose.orientation)``.
+
+        Raises:
+            ValueError: It is neither.
+        """
+        match = _YAW.fullmatch(text)
+        return cls(text, _PATH.validate_python(match["path"] if match else text), match is not None)
+
+    def number(self, message: Mapping[str, Any]) -> float:
+        """The number that follows from a message.
+
+        Raises:
+            NoSuchField: It has no such field.
+        """
+        if self.is_yaw:
+            return yaw(*(number_at(message, f"{self.path}.{part}") for part in _QUATERNION))
+        return number_at(message, self.path)
+
+    def error(self, observed: float, wanted: float) -> float:
+        """How far a number is off; of angles the difference on the circle."""
+        difference = observed - wanted
+        if self.is_yaw and math.isfinite(difference):
+            return math.remainder(difference, math.tau)
+        return difference
+
+
+def _readable(text: str) -> str:
+    SourceValue.of(text)
+    return text
+
+
+SourceText = Annotated[str, AfterValidator(_readable)]
+
+
+def yaw(x: float, y: float, z: float, w: float) -> float:
+    """Heading of a quaternion: its rotation about the fixed z axis, in [-pi, pi].
+
+    Source: REP-103, and the usual conversion to roll, pitch, yaw.
+    """
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def mistakes(value: SourceValue, message: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """What students take instead of a value, with the number that it gives for a message.
+
+    Yields:
+        Words that end the sentence "it is ...", and the number; the same words in the same
+        order for every message of a type.
+    """
+    right = value.number(message)
+    if value.is_yaw:
+        x, y, z, w = (number_at(message, f"{value.path}.{part}") for part in _QUATERNION)
+        for part, number in zip(_QUATERNION, (x, y, z, w), strict=True):
+            yield f"`{part}` of the quaternion, which is no angle: convert the quaternion", number
+        yield "the yaw in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
+        yield "the yaw with the wrong sign", -right
+        yield "half of the yaw: atan2(z, w) is half of the angle", math.atan2(z, w)
+        yield "asin(z), which is half of the yaw", math.asin(max(-1.0, min(1.0, z)))
+        size = 2.0 * math.acos(max(-1.0, min(1.0, w)))
+        yield "2 acos(w), which has lost the sign of the yaw", size
+        roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        yield "the roll: the arguments of the conversion are in another order", roll
+        pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+        yield "the pitch: the angles of the conversion are in another order", pitch
+        yield (
+            "the yaw of the quaternion with `w` in front: ROS has x, y, z, w",
+            yaw(w, x, y, z),
+        )
+        yield "the yaw with the quaternion taken as w, x, y, z", yaw(y, z, w, x)
+    else:
+        yield f"`{value.path}` with the wrong sign", -right
+        yield f"`{value.path}` in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
+    for path, number in leaves(message).items():
+        if path != value.path and isinstance(number, int | float):
+            yield f"`{path}`", float(number)
+
+
+def spread(numbers: Sequence[float]) -> float:
+    """How much numbers vary."""
+    return max(numbers) - min(numbers) if numbers else 0.0

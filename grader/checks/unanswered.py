@@ -1,0 +1,140 @@
+"""Why something that was asked of a node was not answered in time: one cause, the deepest."""
+
+from __future__ import annotations
+
+from grader.assignment.quantity import format_duration
+from grader.checks import testimony
+from grader.checks.cause import Cause
+from grader.checks.death import cause_of_death, dead, ended_early
+from grader.checks.failure import interrupted_place, parse_failures, student_place
+from grader.checks.finding import Evidence, Moment
+from grader.recording.model import NS, Process, Recording
+
+_LIST_PARAMETERS = "/list_parameters"
+_LOG_LINES = 10
+
+
+def why_unanswered(
+    recording: Recording, what: str, node: str, asked_ns: int, within_s: float
+) -> Cause:
+    """Why an answer did not come in time.
+
+    Args:
+        recording: The run.
+        what: That it was not, in words.
+        node: Fully qualified name of the node that should have answered.
+        asked_ns: When it was asked.
+        within_s: How soon the answer was due.
+    """
+    process = testimony.process_of(recording, node)
+    moment = Moment("asked, not answered in time", recording.since_launch_s(asked_ns))
+    ended = dead(recording) if process is None else (process,)
+    if ended and ended_early(recording, ended[0]):
+        return cause_of_death(recording, ended[0]).after(what)
+    taken = why_taken(recording, what, asked_ns, recording.stop_ns, within_s)
+    if taken is not None:
+        return taken
+    if process is not None:
+        found = _in_process(recording, what, process, moment, asked_ns)
+        if found is not None:
+            return found
+    blocked = _blocked(recording, node, asked_ns)
+    place = interrupted_place(recording, process.name) if process else None
+    where = f" ({place.file}:{place.line})" if place else ""
+    evidence = Evidence(moments=(moment,), places=(place,) if place else ())
+    if blocked:
+        return Cause(
+            f"{what}: something keeps the executor from coming round{where}; the node's parameter "
+            "services answer no call either",
+            "A callback must return soon. Look for `while True`, time.sleep() or input() in it, "
+            "and for a call() of another service, which waits for an answer that the same "
+            "executor would have to take in: use call_async().",
+            evidence,
+        )
+    return Cause(
+        f"{what}{where}, although the node's executor spins",
+        "Does the callback come to its end and return the response? A callback that waits for "
+        "another one of the same callback group waits for ever.",
+        evidence,
+    )
+
+
+def why_taken(
+    recording: Recording, what: str, begin_ns: int, end_ns: int, within_s: float
+) -> Cause | None:
+    """The machine's doing, if it took as much as something was too late; else None.
+
+    Args:
+        recording: The run.
+        what: That it was too late, in words.
+        begin_ns: When it was asked for.
+        end_ns: When it came, or when the observation ended.
+        within_s: How long it may have taken.
+    """
+    taken_s = recording.taken_s(begin_ns, end_ns)
+    excess_s = (end_ns - begin_ns) / NS - within_s
+    if taken_s <= 0.0 or taken_s < excess_s:
+        return None
+    return Cause(
+        f"{what}, but the machine took {format_duration(taken_s)} from the process meanwhile",
+        ours=True,
+        disturbed=True,
+    )
+
+
+def why_raised(recording: Recording, what: str, process: Process, begin_ns: int) -> Cause | None:
+    """An exception that a process printed and survived from a time on; None if there is none.
+
+    Args:
+        recording: The run.
+        what: What came of it, in words.
+        process: Whose.
+        begin_ns: From when on.
+    """
+    lines = [
+        line.text
+        for line in recording.log
+        if line.process == process.name
+        and line.stream == "stderr"
+        and begin_ns <= line.time_ns <= recording.stop_ns
+    ]
+    found = [item for item in parse_failures(lines) if not item.ignored]
+    if not found:
+        return None
+    place = student_place(found[-1], recording.submission)
+    where = f" ({place.file}:{place.line})" if place else ""
+    return Cause(
+        f"{what}: an exception was raised meanwhile, {found[-1]}{where}",
+        "Mend the line that is named here." if place else "Read the traceback from its last line.",
+        Evidence(places=(place,) if place else (), log=tuple(lines[-_LOG_LINES:])),
+    )
+
+
+def _in_process(
+    recording: Recording, what: str, process: Process, moment: Moment, asked_ns: int
+) -> Cause | None:
+    """An exception that the process survived, or an executor that never spun."""
+    raised = why_raised(recording, what, process, asked_ns)
+    if raised is not None:
+        return raised
+    if testimony.never_spun(recording, process.name):
+        place = interrupted_place(recording, process.name)
+        where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
+        return Cause(
+            f"{what}: rclpy.spin() was never called, so no callback runs{where}",
+            "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
+            Evidence((moment,), (place,) if place else ()),
+        )
+    return None
+
+
+def _blocked(recording: Recording, node: str, asked_ns: int) -> bool:
+    """Whether the node's parameter service answered nothing from a time on, but was asked."""
+    calls = [
+        call
+        for call in recording.calls
+        if call.service == node + _LIST_PARAMETERS
+        and asked_ns <= call.requested_ns <= recording.stop_ns - NS
+    ]
+    answered = any(call.answered_ns is not None and call.answered_ns > asked_ns for call in calls)
+    return bool(calls) and not answered

@@ -1,0 +1,179 @@
+"""``rosgrade batch``: grade a class."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from grader.cli.console import output_console
+from grader.cli.progress import ClassProgress
+from grader.cli.sandbox import Choice, SandboxChoice
+from grader.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from grader.assignment.load import LoadedAssignment
+    from grader.batch.batch import Done
+    from grader.batch.crew import Crew
+    from grader.batch.intake import HandedIn
+    from grader.batch.roster import Roster
+    from grader.batch.worker import Order
+
+NOT_GRADED = 3
+_AUTO = "auto"
+
+
+def batch(
+    assignment: Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")],
+    submissions: Annotated[
+        Path,
+        typer.Argument(
+            help="A folder of folders, archives or clones, as Canvas, Gradescope or git leave it; "
+            "an archive of it; or a roster (.csv) with a column `submission`."
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for all results.")],
+    jobs: Annotated[
+        str, typer.Option(help="Submissions at once; auto lets the machine's load decide.")
+    ] = _AUTO,
+    roster: Annotated[
+        Path | None, typer.Option(help="CSV with everybody who should have handed in.")
+    ] = None,
+    retry: Annotated[
+        list[str] | None,
+        typer.Option(help="Grade this one again; `errors` or `all` for many. May be repeated."),
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, such as tcp://host:8786.")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of all random values; by default the submission's.")
+    ] = None,
+    sandbox: SandboxChoice = Choice.AUTO,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+) -> None:
+    """Grade a class. The same command goes on where an earlier one stopped.
+
+    Leaves a report for each submission, an overview (index.html) and grades.csv in OUT. Ends
+    with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
+    """
+    import tempfile
+
+    from grader.assignment.load import load_assignment
+    from grader.batch.batch import Batch
+    from grader.batch.class_files import GRADES_FILE, write_class
+    from grader.batch.ledger import Ledger
+    from grader.batch.worker import Order
+
+    at_once = _at_once(jobs)
+    loaded = load_assignment(assignment)
+    order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
+    began_s = time.monotonic()
+    with (
+        tempfile.TemporaryDirectory(prefix="rosgrade-batch-") as staging,
+        Ledger(out).opened() as ledger,
+        ClassProgress(quiet) as progress,
+    ):
+        known, rows = _rows(submissions, roster, Path(staging))
+        for problem in known.problems if known else ():
+            progress.note(f"{roster or submissions}: {problem}")
+        work = Batch(loaded, ledger, frozenset(retry or ()))
+        progress.begin("reading", len(rows))
+        entries, to_do = work.read(rows, progress.advance)
+        crew = _crew(order, loaded, scheduler, at_once) if to_do else None
+        done: list[Done] = []
+        progress.begin("grading", len(entries), already=len(entries) - len(to_do))
+        try:
+            for item in work.grade(to_do, crew):
+                done.append(item)
+                progress.advance(item.entry.key, _said(item), fresh=item.fresh)
+        except KeyboardInterrupt:
+            progress.note(
+                f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same command "
+                "goes on with the others"
+            )
+            raise
+        finally:
+            if crew is not None:
+                crew.close()
+        overview = write_class(done, ledger)
+    console = output_console()
+    console.print(_summary(done, time.monotonic() - began_s), soft_wrap=True)
+    console.print(f"Overview: {overview}", soft_wrap=True)
+    console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
+    graded = all(
+        item.result.graded if item.result is not None else not item.entry.fault for item in done
+    )
+    raise typer.Exit(0 if graded else NOT_GRADED)
+
+
+def _rows(
+    submissions: Path, roster: Path | None, staging: Path
+) -> tuple[Roster | None, list[HandedIn]]:
+    from grader.batch.intake import take_in, take_in_roster
+    from grader.batch.roster import read_roster
+
+    if submissions.suffix.lower() == ".csv" and submissions.is_file():
+        known = read_roster(submissions)
+        return known, take_in_roster(known, submissions.parent, staging)
+    read = read_roster(roster) if roster else None
+    return read, take_in(submissions, staging, read)
+
+
+def _crew(order: Order, loaded: LoadedAssignment, scheduler: str | None, jobs: int | None) -> Crew:
+    from grader.batch.crew import DaskCrew, LocalCrew
+    from grader.batch.worker import make_grading
+    from grader.run.admission import Admission
+
+    if scheduler is not None:
+        return DaskCrew(scheduler, order)
+    admission = Admission(cells=jobs)
+    return LocalCrew(make_grading(order, loaded, admission), admission.most)
+
+
+def _at_once(jobs: str) -> int | None:
+    """How many at once; None lets the load decide.
+
+    Raises:
+        UsageError: It is neither a number nor `auto`.
+    """
+    if jobs == _AUTO:
+        return None
+    if not (jobs.isdigit() and int(jobs) > 0):
+        raise UsageError(f"--jobs {jobs}: must be auto or a number from 1 on")
+    return int(jobs)
+
+
+def _said(done: Done) -> str:
+    """What came of a row, in a few words."""
+    if done.result is None:
+        return done.entry.fault or done.entry.problem or "not graded"
+    if done.result.score is None:
+        return "not graded"
+    return f"{done.result.score:g} of {done.result.max_score:g} points"
+
+
+def _summary(done: Sequence[Done], wall_s: float) -> str:
+    """The class in one line."""
+    results = [item.result for item in done if item.result is not None]
+    scores = [result.score for result in results if result.score is not None]
+    fresh = sum(item.fresh for item in done)
+    parts = [f"{len(scores)} of {len(done)} graded ({fresh} now, in {wall_s:.0f} s)"]
+    if scores:
+        parts.append(f"median {median(scores):g} of {results[0].max_score:g} points")
+        parts.append(f"{sum(r.score == r.max_score for r in results)} with full points")
+    same = sum(bool(item.entry.same_as) for item in done)
+    if same:
+        parts.append(f"{same} the same as another")
+    errors = len(results) - len(scores) + sum(bool(item.entry.fault) for item in done)
+    if errors:
+        parts.append(f"{errors} could not be graded (again with --retry errors)")
+    nothing = sum(item.result is None and not item.entry.fault for item in done)
+    if nothing:
+        parts.append(f"{nothing} handed in nothing")
+    return "; ".join(parts)

@@ -1,0 +1,70 @@
+"""``rosgrade replay``: what happened at grading, again at home."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from grader.cli.console import Progress
+from grader.resources import cache_folder
+
+
+def replay(
+    recording: Annotated[Path, typer.Argument(help="A recording, such as recordings/run.mcap.")],
+    submission: Annotated[Path, typer.Argument(help="What is run: a folder or an archive.")],
+    assignment: Annotated[
+        str | None,
+        typer.Argument(help="Id or folder; by default the one that it was recorded for."),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+) -> None:
+    """Give a node the very inputs of a recording again, and print what it does.
+
+    Messages are given at their recorded times, whatever the node does with them: a simulated
+    robot does not follow it. Services and actions are not replayed. The node runs without a
+    sandbox, as with `ros2 run`, on a ROS domain of its own.
+
+    Ends with 0 when all was given, 1 when the node ended before or never listened.
+    """
+    from dataclasses import replace
+
+    from grader import ros
+    from grader.assignment.load import load_assignment
+    from grader.batch.type_support import TypeSupport
+    from grader.errors import UsageError
+    from grader.grade.unrun import why_not_run
+    from grader.recording.mcap_reader import read_recording
+    from grader.run.replay import make_order, play
+    from grader.submission.locate import check_path
+    from grader.submission.prepare import prepare
+
+    recorded = read_recording(recording)
+    name = assignment or recorded.environment.get("assignment")
+    if name is None:
+        raise UsageError(f"{recording}: it does not say for which assignment; name it")
+    loaded = load_assignment(name)
+    check_path(submission)
+    progress = Progress(quiet)
+    installation = ros.find()
+    with progress.shown():
+        prepared = prepare(submission, installation, cache=cache_folder(), on_progress=progress.say)
+        type_support = TypeSupport(loaded, installation, cache_folder()).prefixes(progress.say)
+    reason = why_not_run(prepared.record, loaded.assignment.packages)
+    if prepared.install is None or reason is not None:
+        told = reason.observed if reason else prepared.record.problem
+        raise UsageError(f"{submission}: {told}")
+    with tempfile.TemporaryDirectory(prefix="rosgrade-replay-home-") as scratch:
+        installation = replace(installation, underlays=prepared.underlays or installation.underlays)
+        order = make_order(
+            recording,
+            recorded,
+            loaded.assignment,
+            installation,
+            prepared.install,
+            Path(scratch),
+            type_support,
+        )
+        raise typer.Exit(play(order, installation))

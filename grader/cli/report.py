@@ -1,0 +1,54 @@
+"""``rosgrade report``: render again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from grader.cli.console import output_console
+from grader.cli.formats import (
+    Formats,
+    Github,
+    GradescopeFile,
+    GradescopeMetadata,
+    JunitFamily,
+    JunitFamilyName,
+    JunitFile,
+    MarkdownFile,
+)
+
+
+def report(
+    out: Annotated[Path, typer.Argument(help="A report folder, or the folder of a class.")],
+    assignment: Annotated[
+        str | None,
+        typer.Argument(help="Id or folder; by default the one that the result names."),
+    ] = None,
+    junit: JunitFile = None,
+    junit_family: JunitFamilyName = JunitFamily.XUNIT2,
+    markdown: MarkdownFile = None,
+    gradescope: GradescopeFile = None,
+    gradescope_metadata: GradescopeMetadata = None,
+    github: Github = False,
+) -> None:
+    """Render reports again, with other formats if you like. Nothing is run, no grade changes.
+
+    The options of the formats are for one report; of a class every report is rendered.
+    """
+    from grader.batch.rendering import find_reports, render_again
+    from grader.errors import UsageError
+
+    folders = find_reports(out)
+    formats = Formats(junit, junit_family, markdown, gradescope, gradescope_metadata, github)
+    if len(folders) > 1 and formats != Formats(junit_family=junit_family):
+        raise UsageError(
+            f"{out} has {len(folders)} reports, and a file of one of the formats holds one: "
+            "name a report's own folder"
+        )
+    console = output_console()
+    for folder in folders:
+        written = render_again(folder, assignment)
+        console.print(f"Report: {written.report}", soft_wrap=True)
+        formats.write(written.result)

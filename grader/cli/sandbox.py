@@ -1,0 +1,39 @@
+"""The option ``--sandbox`` of the commands that run submissions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from grader.cli.console import Progress
+from grader.resources import cache_folder
+from grader.sandbox.choice import Choice
+
+__all__ = ["Choice", "SandboxChoice", "chosen_sandbox"]
+
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
+
+SandboxChoice = Annotated[
+    Choice,
+    typer.Option(
+        "--sandbox",
+        help="Build and run the submission in a sandbox: auto (where bubblewrap works), bwrap "
+        "(or do not run it at all), none.",
+    ),
+]
+
+
+def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:
+    """The sandbox that was asked for; says so where there is none.
+
+    Raises:
+        GraderFault: bwrap was asked for, and does not work here.
+    """
+    from grader.sandbox.trial import choose
+
+    sandbox, notice = choose(choice, cache_folder())
+    if notice:
+        progress.say(notice)
+    return sandbox

@@ -1,0 +1,199 @@
+"""What a course uploads or copies so that another system runs rosgrade by itself."""
+
+from __future__ import annotations
+
+import io
+import re
+import shutil
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader import resources
+from grader.assignment.load import LoadedAssignment
+from grader.assignment.selection import visible_part
+from grader.errors import UsageError
+from grader.report.files import write_whole
+
+_CHECKOUT = ("pyproject.toml", "requirements.lock", "README.md", "LICENSE")
+_PACKAGES = ("grader", "sim", "templates")
+_OWN_FOLDER = "rosgrade"
+# A zip holds no earlier date; with a fixed one the same files give the same bytes.
+_DATE = (1980, 1, 1, 0, 0, 0)
+_ACTION = re.compile(r"(\./\S+|[\w.-]+/[\w./-]+@[\w./-]+)")
+
+
+@dataclass(frozen=True)
+class Member:
+    """A file of an export.
+
+    Attributes:
+        content: All of it.
+        executable: Whether it is a program.
+    """
+
+    content: bytes
+    executable: bool = False
+
+
+def gradescope(loaded: LoadedAssignment, out: Path) -> Path:
+    """Write the autograder that is uploaded to Gradescope.
+
+    Args:
+        loaded: The assignment.
+        out: Folder for it.
+
+    Returns:
+        The zip: ``setup.sh`` and ``run_autograder`` at its top, rosgrade with the assignment.
+
+    Raises:
+        UsageError: It cannot be written, or this is no checkout of rosgrade.
+    """
+    members = {
+        "setup.sh": _template("gradescope-setup.sh", loaded, executable=True),
+        "run_autograder": _template("gradescope-run_autograder", loaded, executable=True),
+        **_rosgrade(loaded),
+    }
+    file = out / f"gradescope-{loaded.assignment.id}.zip"
+    write_whole(file, _zipped(members))
+    return file
+
+
+def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
+    """Write the folder that goes into a Classroom 50 classroom's ``autograders/``.
+
+    Its files can be found by whoever knows the classroom's address, so it holds no hidden check.
+
+    Returns:
+        The folder: ``autograder.py``, and rosgrade with the assignment.
+
+    Raises:
+        UsageError: It cannot be written, the assignment has hidden checks, or this is no
+            checkout of rosgrade.
+    """
+    _refuse_hidden(loaded, "everybody can read the files of a Classroom 50 autograder")
+    folder = out / f"classroom50-{loaded.assignment.id}"
+    members = {
+        "autograder.py": _template("classroom50-autograder.py", loaded),
+        **_rosgrade(loaded),
+    }
+    _write_folder(folder, members)
+    return folder
+
+
+def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
+    """Write the workflow that goes into a template repository.
+
+    An assignment that is not one of rosgrade's own is copied beside it.
+
+    Args:
+        loaded: The assignment.
+        out: The repository.
+        action: Where rosgrade's ``action.yml`` is, as ``uses:`` has it.
+
+    Returns:
+        The workflow.
+
+    Raises:
+        UsageError: It cannot be written, the action is none, or an assignment that would have
+            to be copied has hidden checks.
+    """
+    if not _ACTION.fullmatch(action):
+        raise UsageError(
+            f"{action!r} is no action: write OWNER/REPOSITORY@REF, such as my-course/rosgrade@v1"
+        )
+    name = loaded.assignment.id
+    if loaded.folder.resolve().parent != resources.assignments().resolve():
+        _refuse_hidden(loaded, "students can read the files of their repository")
+        name = f".github/rosgrade/{loaded.assignment.id}"
+        members = {
+            f"{name}/{path.relative_to(loaded.folder).as_posix()}": Member(path.read_bytes())
+            for path in _files(loaded.folder)
+        }
+        _write_members(out, members)
+    text = _read_template("github-workflow.yml")
+    file = out / ".github" / "workflows" / "rosgrade.yml"
+    write_whole(file, text.replace("@ACTION@", action).replace("@ASSIGNMENT@", name))
+    return file
+
+
+def _refuse_hidden(loaded: LoadedAssignment, why: str) -> None:
+    hidden = visible_part(loaded).withheld.checks
+    if hidden:
+        raise UsageError(
+            f"the assignment {loaded.assignment.id!r} has checks that are not visible ({hidden}), "
+            f"and {why}: export a copy without them, and grade with them yourself"
+        )
+
+
+def _rosgrade(loaded: LoadedAssignment) -> dict[str, Member]:
+    """A checkout of rosgrade with one assignment: what its own set-up needs."""
+    root = resources.root()
+    missing = [name for name in _CHECKOUT if not (root / name).is_file()]
+    if missing:
+        raise UsageError(
+            "this needs a checkout of rosgrade, whose requirements.lock says exactly what to "
+            f"install: there is no {', '.join(missing)} in {root}"
+        )
+    paths = {name: root / name for name in _CHECKOUT}
+    for package in _PACKAGES:
+        for path in _files(root / package):
+            paths[path.relative_to(root).as_posix()] = path
+    for path in _files(loaded.folder):
+        inside = path.relative_to(loaded.folder).as_posix()
+        paths[f"assignments/{loaded.assignment.id}/{inside}"] = path
+    return {
+        f"{_OWN_FOLDER}/{name}": Member(path.read_bytes(), path.stat().st_mode & 0o100 != 0)
+        for name, path in sorted(paths.items())
+    }
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """Every file in a folder, without caches and hidden ones, sorted."""
+    for path in sorted(folder.rglob("*")):
+        inside = path.relative_to(folder).parts
+        ignored = any(part.startswith(".") or part == "__pycache__" for part in inside)
+        if path.is_file() and not ignored:
+            yield path
+
+
+def _template(name: str, loaded: LoadedAssignment, *, executable: bool = False) -> Member:
+    text = _read_template(name).replace("@ASSIGNMENT@", loaded.assignment.id)
+    return Member(text.replace("@SLUG@", loaded.assignment.id).encode(), executable)
+
+
+def _read_template(name: str) -> str:
+    return (resources.templates() / "export" / name).read_text(encoding="utf-8")
+
+
+def _zipped(members: Mapping[str, Member]) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, member in members.items():
+            info = zipfile.ZipInfo(name, _DATE)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            info.external_attr = (0o100755 if member.executable else 0o100644) << 16
+            archive.writestr(info, member.content)
+    return stream.getvalue()
+
+
+def _write_folder(folder: Path, members: Mapping[str, Member]) -> None:
+    """Write a whole folder; an older one in its place is replaced."""
+    draft = folder.with_name(f".{folder.name}.new")
+    try:
+        shutil.rmtree(draft, ignore_errors=True)
+        _write_members(draft, members)
+        shutil.rmtree(folder, ignore_errors=True)
+        draft.replace(folder)
+    except OSError as error:
+        raise UsageError(f"{folder} cannot be written: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _write_members(folder: Path, members: Mapping[str, Member]) -> None:
+    for name, member in members.items():
+        write_whole(folder / name, member.content)
+        if member.executable:
+            (folder / name).chmod(0o755)

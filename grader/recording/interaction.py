@@ -1,0 +1,86 @@
+"""Facts of services and actions: who offers them, and goals that the probe sent.
+
+Times are integer nanoseconds since the Unix epoch, as everywhere in a recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Service:
+    """A service that a node of the student offers; an action is five topics and services.
+
+    Attributes:
+        name: Fully qualified, such as ``/add`` or ``/fibonacci/_action/send_goal``.
+        type: Interface name, such as ``std_srvs/srv/SetBool``.
+        node: Fully qualified node name.
+        appeared_ns: First time it was seen.
+        vanished_ns: First time it was missing again, or None.
+    """
+
+    name: str
+    type: str
+    node: str
+    appeared_ns: int
+    vanished_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """Feedback of a goal.
+
+    Attributes:
+        time_ns: When the probe received it.
+        value: Its fields.
+    """
+
+    time_ns: int
+    value: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A goal that the probe sent to an action server.
+
+    Attributes:
+        action: Fully qualified name.
+        type: Interface name, such as ``example_interfaces/action/Fibonacci``.
+        goal: Its fields.
+        sent_ns: When it was sent, or when it was due if no server was there.
+        accepted: The server's answer, or None if there was none by the end.
+        answered_ns: When that answer was there, or None.
+        feedback: In the order of its reception.
+        statuses: When the probe received a status of the goal, and which: ``accepted``,
+            ``executing``, ``canceling``, ``succeeded``, ``canceled`` or ``aborted``.
+        canceled_ns: When the probe asked to cancel it, or None.
+        cancel_answered_ns: When that was answered, or None.
+        cancel_accepted: Whether the server agreed to cancel it; None without an answer.
+        status: Final status, as in ``statuses``; empty if there was none by the end.
+        result: Fields of the result, or None.
+        result_ns: When the result was there, or None.
+        preempts: It was sent while the goal before it was still being worked on, on purpose.
+        preempted: A goal was sent while this one was still being worked on, on purpose.
+        error: Why it could not be sent: ``no server``, or what of ours went wrong.
+    """
+
+    action: str
+    type: str
+    goal: Mapping[str, Any]
+    sent_ns: int
+    accepted: bool | None = None
+    answered_ns: int | None = None
+    feedback: tuple[Feedback, ...] = ()
+    statuses: tuple[tuple[int, str], ...] = ()
+    canceled_ns: int | None = None
+    cancel_answered_ns: int | None = None
+    cancel_accepted: bool | None = None
+    status: str = ""
+    result: Mapping[str, Any] | None = None
+    result_ns: int | None = None
+    preempts: bool = False
+    preempted: bool = False
+    error: str = ""

@@ -1,0 +1,76 @@
+"""What a check of a result says, as plain words: the same in every format without pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from grader.assignment.withheld import Withheld
+from grader.checks.finding import Status
+from grader.report import words
+from grader.report.clean import clean, one_line
+from grader.report.result_model import CheckPart, FindingPart, PlacePart, Result
+
+
+@dataclass(frozen=True)
+class Row:
+    """One thing that is said.
+
+    Attributes:
+        name: What it is: ``expected``, ``observed``, ``try next``, ``where``, ``printed``.
+        text: Cleaned; ``printed`` has several lines.
+    """
+
+    name: str
+    text: str
+
+
+def explain(check: CheckPart) -> tuple[Row, ...]:
+    """Say why a check ended as it did, every scenario that did not pass in its turn."""
+    findings = [check, *check.other_scenarios]
+    told = [item for item in findings if item.status is check.status]
+    return tuple(row for item in told for row in _rows(check, item, many=len(findings) > 1))
+
+
+def _rows(check: CheckPart, finding: FindingPart, *, many: bool) -> Iterator[Row]:
+    if many and finding.scenario:
+        yield Row("scenario", one_line(finding.scenario))
+    yield Row("expected", one_line(finding.expected))
+    yield Row("observed", one_line(finding.observed))
+    own = check.author_hint if finding.status is Status.FAILED else ""
+    for text in dict.fromkeys(text for text in (finding.hint, own) if text):
+        yield Row("try next", one_line(text))
+    for place in finding.evidence.places:
+        yield Row("where", where(place))
+    if finding.evidence.log:
+        yield Row("printed", clean("\n".join(finding.evidence.log)))
+
+
+def where(place: PlacePart) -> str:
+    """``file:line: message`` in one line."""
+    line = f":{place.line}" if place.line else ""
+    return one_line(f"{place.file}{line}: {place.message}")
+
+
+def plain(check: CheckPart) -> str:
+    """:func:`explain` as text, a line for each."""
+    return "\n".join(f"{row.name}: {row.text}" for row in explain(check))
+
+
+def points(check: CheckPart) -> str:
+    """``1.02 / 3``; what could not be judged has a question mark."""
+    earned = "?" if check.status is Status.ERROR else words.number(check.points)
+    return f"{earned} / {words.number(check.max_points)}"
+
+
+def headline(result: Result) -> str:
+    """The headline of the report, from a result."""
+    withheld = Withheld(result.withheld.checks, result.withheld.points)
+    return words.summary([check.status for check in result.checks], withheld)
+
+
+def score(result: Result) -> str:
+    """``7 of 10 points``, or that there is no score."""
+    if result.score is None:
+        return "Not graded"
+    return f"{words.number(result.score)} of {words.counted_points(result.max_score)}"

@@ -1,0 +1,233 @@
+"""The class overview: one page for all submissions of an assignment.
+
+Everything is in the page as a plain table; its script only filters and sorts. As in a report,
+whatever a student chose is cleaned and escaped, and the page's policy names its own script and
+style by their hashes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from statistics import median
+from urllib.parse import quote
+
+from markupsafe import Markup
+
+from grader import resources
+from grader.checks.finding import Status
+from grader.report.clean import one_line
+from grader.report.distribution import draw_distribution
+from grader.report.html import environment
+from grader.report.policy import content_security_policy
+from grader.report.result_model import CheckPart, Result
+from grader.report.words import STATUS, number
+
+DISTURBED_S = 0.1
+"""So much taken by the host from one run is worth a look."""
+MOST_DISTURBED = 50
+
+
+@dataclass(frozen=True)
+class OverviewRow:
+    """One row of a class.
+
+    Attributes:
+        id: Key of the submission, unique.
+        name: Of whoever handed it in; may be empty.
+        report: The HTML report, relative to the overview, or None where there is none.
+        result: As in ``result.json``, or None where nothing could be graded at all.
+        note: What an instructor should know, in a few words; empty for an ordinary one.
+        late: Whether it was handed in late.
+    """
+
+    id: str
+    name: str = ""
+    report: str | None = None
+    result: Result | None = None
+    note: str = ""
+    late: bool = False
+
+    @property
+    def graded(self) -> bool:
+        """Whether it has a score."""
+        return self.result is not None and self.result.graded
+
+    @property
+    def full(self) -> bool:
+        """Whether it got all points."""
+        return (
+            self.result is not None and self.graded and self.result.score == self.result.max_score
+        )
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether the host took noticeably from one of its runs."""
+        return self.result is not None and any(
+            run.disturbance.taken_s >= DISTURBED_S or run.faults for run in self.result.scenarios
+        )
+
+    @property
+    def states(self) -> str:
+        """Words that the page filters by."""
+        found = {
+            "full": self.full,
+            "lost": self.graded and not self.full,
+            "ungraded": not self.graded,
+            "disturbed": self.disturbed,
+            "late": self.late,
+        }
+        return " ".join(word for word, holds in found.items() if holds)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A check over the whole class.
+
+    Attributes:
+        id: Of the check.
+        title: For people.
+        max_points: For passing.
+        counts: Status -> submissions.
+    """
+
+    id: str
+    title: str
+    max_points: float
+    counts: dict[Status, int]
+
+    @property
+    def total(self) -> int:
+        """Submissions in which it was there."""
+        return sum(self.counts.values())
+
+
+@dataclass(frozen=True)
+class Disturbed:
+    """A run from which the host took time."""
+
+    row: OverviewRow
+    scenario: str
+    taken_s: float
+    worst_late_s: float
+    faults: tuple[str, ...]
+
+
+def render_overview(rows: Sequence[OverviewRow]) -> str:
+    """Render the overview of a class.
+
+    Args:
+        rows: One for everybody, in the order in which they shall stand.
+
+    Returns:
+        A whole HTML document; the same input gives the same text. Its links are relative to
+        the folder that it is written to.
+    """
+    columns = _columns(rows)
+    scores = [row.result.score or 0.0 for row in rows if row.result is not None and row.graded]
+    most = max((row.result.max_score for row in rows if row.result is not None), default=0.0)
+    style, script = _asset("report.css") + _asset("overview.css"), _asset("overview.js")
+    return (
+        environment()
+        .get_template("overview.html.j2")
+        .render(
+            assignments=sorted({row.result.assignment.id for row in rows if row.result}),
+            rows=rows,
+            columns=columns,
+            failed_most=_failed_most(columns),
+            lines=[_line(row, columns) for row in rows],
+            scores=scores,
+            middle=median(scores) if scores else 0.0,
+            mean=sum(scores) / len(scores) if scores else 0.0,
+            most=most,
+            distribution=draw_distribution(scores, most, "distribution"),
+            ungraded=[row for row in rows if not row.graded],
+            why=_why_ungraded,
+            disturbed=_disturbed(rows),
+            link=_link,
+            style=Markup(style),
+            script=Markup(script),
+            policy=content_security_policy(style, script),
+        )
+    )
+
+
+def _columns(rows: Sequence[OverviewRow]) -> tuple[Column, ...]:
+    """Every check of the class, in the order of the assignment."""
+    found: dict[str, Column] = {}
+    for row in rows:
+        for check in row.result.checks if row.result is not None else ():
+            column = found.setdefault(
+                check.id,
+                Column(check.id, check.title, check.max_points, dict.fromkeys(Status, 0)),
+            )
+            column.counts[check.status] += 1
+    return tuple(found.values())
+
+
+def _failed_most(columns: Sequence[Column]) -> list[Column]:
+    """Checks that somebody failed, the most failed first."""
+    failed = [column for column in columns if column.counts[Status.FAILED]]
+    return sorted(failed, key=lambda column: -column.counts[Status.FAILED])
+
+
+def _line(row: OverviewRow, columns: Sequence[Column]) -> Markup:
+    """The cells of a row, each a link to the check in the report.
+
+    Made by hand and not by the template: a class has tens of thousands of them.
+    """
+    checks = {check.id: check for check in row.result.checks} if row.result is not None else {}
+    page = _link(row)
+    return Markup("").join(_cell(checks.get(column.id), page) for column in columns)
+
+
+def _cell(check: CheckPart | None, page: str) -> Markup:
+    if check is None:
+        return Markup("<td></td>")
+    status, word = check.status.value, STATUS[check.status].word
+    partial = check.status is Status.FAILED and check.points > 0.0
+    said = f"{word}, {number(check.points)}" if partial else word
+    kind = f"{status} partial" if partial else status
+    if not page:
+        return Markup('<td><span class="{}">{}</span></td>').format(kind, said)
+    anchor = f"{page}#check-{quote(check.id)}"
+    return Markup('<td><a class="{}" href="{}">{}</a></td>').format(kind, anchor, said)
+
+
+def _link(row: OverviewRow) -> str:
+    """Where the report of a row is; nothing where it has none.
+
+    Quoted, so that a name never becomes a scheme or another host.
+    """
+    if row.report is None:
+        return ""
+    return "./" + quote(row.report.lstrip("/").encode("utf-8", "surrogateescape"))
+
+
+def _why_ungraded(row: OverviewRow) -> str:
+    """Why a row has no score, in the words of the first error."""
+    if row.result is not None:
+        for check in row.result.checks:
+            if check.status is Status.ERROR:
+                return f"{one_line(check.title)}: {one_line(check.observed)}"
+        if row.result.submission.problem:
+            return row.result.submission.problem
+    return row.note or "nothing was graded"
+
+
+def _disturbed(rows: Sequence[OverviewRow]) -> list[Disturbed]:
+    """The most disturbed runs of the class, the worst first."""
+    found = [
+        Disturbed(row, run.id, run.disturbance.taken_s, run.disturbance.worst_late_s, run.faults)
+        for row in rows
+        if row.result is not None
+        for run in row.result.scenarios
+        if run.disturbance.taken_s >= DISTURBED_S or run.faults
+    ]
+    return sorted(found, key=lambda item: -item.taken_s)[:MOST_DISTURBED]
+
+
+@cache
+def _asset(name: str) -> str:
+    return (resources.templates() / name).read_text(encoding="utf-8")

@@ -1,0 +1,210 @@
+"""The path of the robot in its world: headings, contacts, where it stopped and before what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from markupsafe import Markup
+
+from grader.checks.ground import ahead
+from grader.checks.measure import metres
+from grader.checks.track import first_rest, has_moved, way_m
+from grader.checks.wording import counted, listing
+from grader.recording.model import NS, Recording, Scene, Truth
+from grader.report import ground_plan
+from grader.report.clean import one_line
+from grader.report.ground_plan import View, disc, in_metres, scale_bar, track
+from grader.report.svg import NARROW, WIDE, Figure, crosses, drawing, element, label, simplified
+from sim.motion import Pose, compose
+
+STRIDE = 5
+"""Steps of 10 ms from one drawn point to the next."""
+MOST_POINTS = 600
+TOLERANCE_M = 0.002
+MOST_ARROWS = 14
+LONGEST_SIGHT_M = 0.6
+"""A thing farther ahead than this is not what the robot stopped for."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a check wants the robot to end.
+
+    Attributes:
+        pose: In the world's frame.
+        radius_m: How far from it is still right.
+    """
+
+    pose: Pose
+    radius_m: float
+
+
+def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Figure | None:
+    """Draw the path of the robot.
+
+    Args:
+        recording: The run.
+        targets: Where it should end.
+        name: Unique in the document; letters, digits and hyphens.
+
+    Returns:
+        The drawing, or None in a scenario without a simulated robot.
+    """
+    scene = recording.scene
+    if scene is None or not recording.truth:
+        return None
+    caption = _caption(recording, scene, targets)
+    return Figure(
+        caption,
+        _draw(recording, scene, targets, caption, f"{name}-wide", WIDE),
+        _draw(recording, scene, targets, caption, f"{name}-narrow", NARROW),
+    )
+
+
+def _draw(
+    recording: Recording,
+    scene: Scene,
+    targets: Sequence[Target],
+    caption: str,
+    name: str,
+    width: float,
+) -> Markup:
+    truth = recording.truth
+    stride = max(STRIDE, len(truth) // MOST_POINTS)
+    points = [(step.x_m, step.y_m) for step in (*truth[::stride], truth[-1])]
+    view = ground_plan.fit(
+        [*points, *((target.pose.x_m, target.pose.y_m) for target in targets)],
+        scene,
+        width,
+        lowest=150.0,
+        highest=340.0 if width > NARROW else 300.0,
+    )
+    until_s = (truth[-1].time_ns - scene.began_ns) / NS
+    in_world = [
+        *ground_plan.world(scene, view),
+        *ground_plan.moving(scene, until_s),
+        *(disc(one.pose.x_m, one.pose.y_m, one.radius_m, "target") for one in targets),
+        *(_needle(one.pose, 2.0 * scene.radius_m, "target-heading") for one in targets),
+        track(simplified(points, TOLERANCE_M), "way"),
+        *robot(_pose(truth[0]), scene.radius_m, "robot at-start"),
+        *robot(_pose(truth[-1]), scene.radius_m, "robot"),
+    ]
+    content = [in_metres(in_world, view)]
+    content.append(element("path", d=_arrows(truth, view), class_="arrow"))
+    content += _stop(recording, scene, view)
+    touched = _contacts(truth)
+    if touched:
+        at = [view.pixel(step.x_m, step.y_m) for step in touched]
+        content.append(crosses(at, "out", 6.0))
+    content += scale_bar(view)
+    if has_moved(truth):
+        content += _named(view, truth[0], "start", scene.radius_m)
+    content += _named(view, truth[-1], "end", scene.radius_m)
+    title = f"Path of the robot in the scenario {recording.scenario}"
+    return drawing(name, title, caption, (view.width, view.height), content)
+
+
+def robot(pose: Pose, radius_m: float, class_: str) -> list[Markup]:
+    """Draw the robot, in metres: its outline, and a line to where it looks."""
+    return [
+        disc(pose.x_m, pose.y_m, radius_m, class_),
+        _needle(pose, radius_m, f"{class_} nose"),
+    ]
+
+
+def _needle(pose: Pose, length_m: float, class_: str) -> Markup:
+    tip = (
+        pose.x_m + length_m * math.cos(pose.yaw_rad),
+        pose.y_m + length_m * math.sin(pose.yaw_rad),
+    )
+    return track([(pose.x_m, pose.y_m), tip], class_)
+
+
+def _pose(step: Truth) -> Pose:
+    return Pose(step.x_m, step.y_m, step.yaw_rad)
+
+
+def _named(view: View, step: Truth, text: str, radius_m: float) -> list[Markup]:
+    x, y = view.pixel(step.x_m, step.y_m)
+    below = y + radius_m * view.scale + 15.0
+    y = below if below < view.height - 22.0 else y - radius_m * view.scale - 6.0
+    return [label(text, x, y, "lane", "middle")]
+
+
+def _arrows(truth: Sequence[Truth], view: View) -> str:
+    """Small arrow heads along the path, evenly in length: which way the robot looked."""
+    length_m = way_m(truth)
+    every_m = max(length_m / MOST_ARROWS, 30.0 / view.scale)
+    path, gone_m = [], 0.0
+    for before, step in pairwise(truth):
+        gone_m += math.hypot(step.x_m - before.x_m, step.y_m - before.y_m)
+        if gone_m >= every_m:
+            gone_m = 0.0
+            x, y = view.pixel(step.x_m, step.y_m)
+            cos, sin = math.cos(step.yaw_rad), -math.sin(step.yaw_rad)
+            # A head of 8 by 8 pixels around the point.
+            left = (x - 4.0 * cos - 4.0 * sin, y - 4.0 * sin + 4.0 * cos)
+            right = (x - 4.0 * cos + 4.0 * sin, y - 4.0 * sin - 4.0 * cos)
+            tip = (x + 4.0 * cos, y + 4.0 * sin)
+            path.append("M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in (left, tip, right)))
+    return "".join(path)
+
+
+def _contacts(truth: Sequence[Truth]) -> list[Truth]:
+    """The first step of every contact."""
+    return [
+        step
+        for before, step in zip((None, *truth), truth, strict=False)
+        if step.contact and (before is None or before.contact is None)
+    ]
+
+
+def _stopped(recording: Recording, scene: Scene) -> tuple[Truth, float] | None:
+    """Where the robot first came to rest with something near ahead, and how far that was."""
+    rest = first_rest(recording.truth)
+    if rest is None:
+        return None
+    step = recording.truth[rest]
+    sight = ahead(scene, step)
+    if sight is None or sight.distance_m > LONGEST_SIGHT_M:
+        return None
+    return step, sight.distance_m
+
+
+def _stop(recording: Recording, scene: Scene, view: View) -> list[Markup]:
+    found = _stopped(recording, scene)
+    if found is None:
+        return []
+    step, distance_m = found
+    eye = compose(_pose(step), scene.lidar)
+    x1, y1 = view.pixel(eye.x_m, eye.y_m)
+    x2, y2 = view.pixel(
+        eye.x_m + distance_m * math.cos(step.yaw_rad),
+        eye.y_m + distance_m * math.sin(step.yaw_rad),
+    )
+    high = min(y1, y2) - scene.radius_m * view.scale - 8.0
+    return [
+        element("line", x1=x1, y1=y1, x2=x2, y2=y2, class_="measure"),
+        label(metres(distance_m), (x1 + x2) / 2.0, max(12.0, high), "lane", "middle"),
+    ]
+
+
+def _caption(recording: Recording, scene: Scene, targets: Sequence[Target]) -> str:
+    truth = recording.truth
+    if not has_moved(truth):
+        return "The robot did not move."
+    parts = [f"The robot went {metres(way_m(truth))}"]
+    found = _stopped(recording, scene)
+    if found is not None:
+        parts.append(f"stopped with an obstacle {metres(found[1])} ahead of its LiDAR")
+    text = " and ".join(parts)
+    touched = _contacts(truth)
+    if touched:
+        names = listing(one_line(step.contact or "") for step in touched)
+        text += f"; {counted(len(touched), 'contact')} with {names} (marked ×)"
+    if targets:
+        text += "; the dashed circle is where it should end"
+    return f"{text}. Arrow heads show where it looked, the dashed outline where it started."

@@ -1,0 +1,77 @@
+"""QoS offered against requested, for every pair of endpoints of which one is the student's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from grader.checks.compatibility import STRENGTH, duration_words, refusals
+from grader.checks.topic_absence import OWN_TOPICS
+from grader.recording.model import Endpoint, Kind, Owner, Recording
+
+MOST_ROWS = 40
+POLICIES = ("reliability", "durability", "deadline", "liveliness")
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A publisher and a subscription on one topic.
+
+    Attributes:
+        topic: Fully qualified topic name.
+        publisher: Its node, or ``the grader``.
+        subscription: Its node, or ``the grader``.
+        cells: Policy -> what is offered and what is requested, in words.
+        refused: Policies by which they do not match.
+        types_differ: Whether they do not match because of their types.
+    """
+
+    topic: str
+    publisher: str
+    subscription: str
+    cells: tuple[tuple[str, str, str], ...]
+    refused: frozenset[str]
+    types_differ: bool
+
+    @property
+    def matches(self) -> bool:
+        """Whether messages can pass."""
+        return not self.refused and not self.types_differ
+
+
+def pairs(recording: Recording) -> tuple[Pair, ...]:
+    """Every publisher and subscription that could meet, each different pair once."""
+    ends = [item for item in recording.endpoints if item.topic not in OWN_TOPICS]
+    found = (
+        _pair(publisher, subscription)
+        for publisher in ends
+        if publisher.kind is Kind.PUBLISHER
+        for subscription in ends
+        if subscription.kind is Kind.SUBSCRIPTION
+        and subscription.topic == publisher.topic
+        and Owner.STUDENT in (publisher.owner, subscription.owner)
+    )
+    return tuple(dict.fromkeys(found))[:MOST_ROWS]
+
+
+def _pair(publisher: Endpoint, subscription: Endpoint) -> Pair:
+    reasons = refusals(offered=publisher.qos, requested=subscription.qos)
+    return Pair(
+        publisher.topic,
+        _whose(publisher),
+        _whose(subscription),
+        tuple((name, _words(publisher, name), _words(subscription, name)) for name in POLICIES),
+        frozenset(name for name in POLICIES if any(text.startswith(name) for text in reasons)),
+        publisher.type != subscription.type,
+    )
+
+
+def _whose(endpoint: Endpoint) -> str:
+    return endpoint.node if endpoint.owner is Owner.STUDENT else "the grader"
+
+
+def _words(endpoint: Endpoint, policy: str) -> str:
+    if policy in STRENGTH:
+        text = str(getattr(endpoint.qos, policy))
+        lease_s = endpoint.qos.liveliness_lease_s
+        return f"{text}, {duration_words(lease_s)}" if policy == "liveliness" and lease_s else text
+    return duration_words(endpoint.qos.deadline_s)

@@ -1,0 +1,61 @@
+"""The student's copy of a result: nothing of a check that is not visible is left in it."""
+
+from __future__ import annotations
+
+from grader.assignment.model import Visibility
+from grader.checks.finding import Status
+from grader.grade.points import total
+from grader.report.result_model import CheckPart, Result, WithheldPart
+
+
+def for_student(result: Result) -> Result:
+    """Leave out what a student does not get to see before grading.
+
+    Checks that are not visible go with all that they say, scenarios that only they judged go
+    with their recordings, and so do the tracebacks of checks that broke; score and what to fix first are those of the visible checks. What is
+    left of the rest is its number and its points. It is the result that
+    :func:`~grader.assignment.selection.visible_part` gives.
+
+    Args:
+        result: The whole result; no visible check waits for one that is not.
+
+    Returns:
+        A copy, or the result itself where everything is visible.
+    """
+    visible = tuple(check for check in result.checks if _is_visible(check))
+    hidden = [check for check in result.checks if not _is_visible(check)]
+    if not hidden:
+        return result
+    judged = {item.scenario for check in visible for item in (check, *check.other_scenarios)}
+    graded = all(check.status is not Status.ERROR for check in visible)
+    return result.model_copy(
+        update={
+            "score": total(check.points for check in visible) if graded else None,
+            "max_score": total(check.max_points for check in visible),
+            "graded": graded,
+            "first_to_fix": first_to_fix(visible),
+            "checks": tuple(_without_traceback(check) for check in visible),
+            "withheld": WithheldPart(
+                checks=result.withheld.checks + len(hidden),
+                points=total((result.withheld.points, *(check.max_points for check in hidden))),
+            ),
+            "scenarios": tuple(one for one in result.scenarios if one.id in judged),
+        }
+    )
+
+
+def first_to_fix(checks: tuple[CheckPart, ...]) -> str | None:
+    """Id of the failed check that most others wait for; of equals, the first. None: none failed."""
+    waiting = [name for check in checks for name in check.waits_for]
+    failed = [check.id for check in checks if check.status is Status.FAILED]
+    return max(failed, key=waiting.count, default=None)
+
+
+def _without_traceback(check: CheckPart) -> CheckPart:
+    """A traceback is for instructors, and quotes their own checks."""
+    others = tuple(item.model_copy(update={"traceback": ""}) for item in check.other_scenarios)
+    return check.model_copy(update={"traceback": "", "other_scenarios": others})
+
+
+def _is_visible(check: CheckPart) -> bool:
+    return check.visibility == Visibility.VISIBLE.value

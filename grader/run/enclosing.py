@@ -1,0 +1,124 @@
+"""An order for a cell in a sandbox, from the same order for one without.
+
+A cell in a sandbox sees nothing but its own folder, so what the order names is copied there: the
+install spaces and the world. And the student, in a sandbox within, sees of that only what is
+installed.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from grader.ros import RosInstallation
+from grader.run.enclosure import HOME, WORKSPACE, Enclosure
+from grader.run.environment import TRACER, enclosed_environment
+from grader.run.order import CellOrder
+from grader.sandbox import bubblewrap
+from grader.sandbox.bubblewrap import Bind
+from grader.sandbox.limits import Limits
+from grader.sandbox.namespaces import CELL, STUDENT
+from grader.sandbox.sandbox import TREE, Sandbox, hide
+
+_UID = 1000
+_TRACER = Path("/opt/tracer")
+_PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
+_FILTER, _WORLD, _PASSWD_FILE = "student.bpf", "world.yaml", "passwd"
+
+
+def enclose(
+    order: CellOrder,
+    folder: Path,
+    sandbox: Sandbox,
+    ros: RosInstallation,
+    install: Path,
+    limits: Limits,
+) -> CellOrder:
+    """Make an order for a sandbox, and copy into the cell's folder what it needs.
+
+    Args:
+        order: As it is without a sandbox.
+        folder: The cell's.
+        sandbox: What it runs in.
+        ros: The installation, with the install spaces of ours that the submission needs.
+        install: The submission's install space.
+        limits: What the student may take.
+    """
+    support = [Path(path) for path in order.type_support]
+    copies = _copy([install, *ros.underlays, *support], folder)
+    for_student = {
+        path: place for path, place in copies.items() if path == install or path in ros.underlays
+    }
+    shutil.copyfile(sandbox.filter_file, folder / _FILTER)
+    (folder / _PASSWD_FILE).write_text(_PASSWD, encoding="utf-8")
+    in_cell = {str(path): str(CELL / place) for path, place in copies.items()}
+    seen = {str(path): f"{WORKSPACE}/{place}" for path, place in for_student.items()}
+    binds = [
+        *(Bind(CELL / place, Path(WORKSPACE, place)) for place in for_student.values()),
+        Bind(TRACER, _TRACER),
+    ]
+    simulator = order.simulator
+    if simulator is not None:
+        shutil.copyfile(simulator.world, folder / _WORLD)
+        simulator = replace(simulator, world=str(CELL / _WORLD))
+    return replace(
+        order,
+        commands=tuple(
+            replace(command, argv=_moved(command.argv, seen)) for command in order.commands
+        ),
+        environment=enclosed_environment(order.environment, {**seen, str(TRACER): str(_TRACER)}),
+        prefixes=_moved(order.prefixes, in_cell),
+        type_support=_moved(order.type_support, in_cell),
+        scratch=str(CELL),
+        simulator=simulator,
+        enclosure=Enclosure(
+            arguments=(*_arguments(sandbox, ros, binds), "--chdir", HOME),
+            filter=str(CELL / _FILTER),
+            limits=limits,
+            folders={inside: in_cell[outside] for outside, inside in seen.items()},
+        ),
+        facts={**order.facts, "sandbox": sandbox.description},
+    )
+
+
+def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) -> list[str]:
+    python = sandbox.student_view(ros, TREE)
+    disk, shared = STUDENT / "disk", STUDENT / "shared"
+    writable = (
+        Bind(disk / "tmp", Path("/tmp"), writable=True),
+        Bind(disk / "home", Path(HOME), writable=True),
+        Bind(shared, Path("/dev/shm"), writable=True),
+    )
+    return [
+        *bubblewrap.namespaces(_UID, network=False),
+        *("--disable-userns", "--hostname", "student"),
+        *bubblewrap.system(),
+        *("--ro-bind", str(CELL / _PASSWD_FILE), "/etc/passwd"),
+        *bubblewrap.bound((*python, *writable, *binds)),
+        *hide(python),
+        *("--remount-ro", "/", "--remount-ro", "/dev"),
+    ]
+
+
+def _copy(folders: Iterable[Path], into: Path) -> dict[Path, str]:
+    """Copy folders; where each one is, relative to the cell's folder."""
+    places: dict[Path, str] = {}
+    for path in folders:
+        if path not in places:
+            places[path] = f"install{len(places) or ''}"
+            shutil.copytree(path, into / places[path], symlinks=True)
+    return places
+
+
+def _moved(paths: Iterable[str], places: dict[str, str]) -> tuple[str, ...]:
+    """Replace the beginnings of paths."""
+    return tuple(_moved_path(path, places) for path in paths)
+
+
+def _moved_path(path: str, places: dict[str, str]) -> str:
+    for outside, inside in places.items():
+        if path == outside or path.startswith(f"{outside}/"):
+            return inside + path[len(outside) :]
+    return path

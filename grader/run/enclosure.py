@@ -1,0 +1,194 @@
+"""A student's process in a sandbox of its own, within the cell's.
+
+The cell starts bubblewrap, which starts an init and, as its child, what is to be run. All that
+the student starts are descendants of that init; a signal to its process group reaches the
+student's process as one to an own session does without a sandbox, because an init is deaf to it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from grader.run.descendants import descendants
+from grader.sandbox.limits import Limits
+
+WORKSPACE = "/ws"
+"""Where a student sees what is installed."""
+HOME = "/home/student"
+
+# A shell reports a signal so, and bubblewrap does as well.
+_SIGNALLED = 128
+_STATUS_BYTES = 4096
+_FORMATS = (b"\x7fELF", b"#!")
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """What a cell has to know to put a student into a sandbox.
+
+    Attributes:
+        arguments: Of bubblewrap.
+        filter: File with the filter of system calls.
+        limits: What its processes may take.
+        folders: Folder inside -> where the cell finds it.
+    """
+
+    arguments: tuple[str, ...]
+    filter: str
+    limits: Limits
+    folders: dict[str, str]
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Enclosure:
+        """Read what :func:`dataclasses.asdict` made."""
+        return cls(
+            tuple(data["arguments"]), data["filter"], Limits(**data["limits"]), data["folders"]
+        )
+
+    def outside(self, path: str) -> Path:
+        """Where the cell finds what a student sees at a path."""
+        for inside, folder in self.folders.items():
+            if Path(path).is_relative_to(inside):
+                return Path(folder, Path(path).relative_to(inside))
+        return Path(path)
+
+
+class EnclosedProcess(subprocess.Popen[bytes]):
+    """A process that is started in a sandbox; its exit code is that of what was started in it."""
+
+    def __init__(
+        self,
+        enclosure: Enclosure,
+        argv: Sequence[str],
+        environment: Mapping[str, str],
+        pass_fds: Sequence[int],
+    ) -> None:
+        """Start it.
+
+        Args:
+            enclosure: The sandbox.
+            argv: What to execute.
+            environment: Its variables.
+            pass_fds: Descriptors that it inherits.
+
+        Raises:
+            OSError: It cannot be executed.
+        """
+        if argv[0].startswith(f"{WORKSPACE}/"):
+            _check_executable(enclosure.outside(argv[0]))
+        self._status, status = os.pipe()
+        os.set_blocking(self._status, False)
+        self._told = b""
+        arguments = [*enclosure.arguments, "--clearenv"]
+        for name, value in environment.items():
+            arguments += ["--setenv", name, value]
+        given = _temporary("\0".join((*arguments, "")).encode())
+        rules = os.open(enclosure.filter, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            super().__init__(
+                [
+                    *("bwrap", "--args", str(given), "--json-status-fd", str(status)),
+                    *("--seccomp", str(rules), "--"),
+                    *(*enclosure.limits.prlimit(), "--", *argv),
+                ],
+                cwd="/",
+                env={"PATH": "/usr/bin:/bin"},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                pass_fds=(*pass_fds, given, rules, status),
+                start_new_session=True,
+            )
+        finally:
+            for descriptor in (given, rules, status):
+                os.close(descriptor)
+
+    @property
+    def group(self) -> int | None:
+        """Process group of the student's process and id of its init; None before there is one."""
+        told = self._read_status().get("child-pid")
+        return told if isinstance(told, int) else None
+
+    @property
+    def was_set_up(self) -> bool:
+        """Whether the sandbox stood and the student's program was started; asked at its end."""
+        return "exit-code" in self._read_status()
+
+    @property
+    def exit_code(self) -> int | None:
+        """As in :mod:`subprocess`: negative for the signal that ended it."""
+        code = self.returncode
+        if code is not None and code > _SIGNALLED and code - _SIGNALLED in _signal_numbers():
+            return _SIGNALLED - code
+        return code
+
+    def signal_group(self, number: signal.Signals) -> None:
+        """Send a signal to the student's process group.
+
+        Raises:
+            ProcessLookupError: It is not there.
+        """
+        init = self.group
+        if init is None and number is not signal.SIGKILL:
+            raise ProcessLookupError
+        if init is None or number is not signal.SIGKILL:
+            os.killpg(init or self.pid, number)
+            return
+        # Without its init everything would be gone, and nobody could say what was left behind.
+        for pid in descendants(init):
+            with contextlib.suppress(ProcessLookupError):
+                if os.getpgid(pid) == init:
+                    os.kill(pid, number)
+
+    def close_status(self) -> None:
+        """Nothing more is asked."""
+        self._read_status()
+        os.close(self._status)
+
+    def _read_status(self) -> dict[str, Any]:
+        try:
+            while block := os.read(self._status, _STATUS_BYTES):
+                self._told += block
+        except (BlockingIOError, OSError):
+            pass
+        found: dict[str, Any] = {}
+        for line in self._told.splitlines():
+            try:
+                found.update(json.loads(line))
+            except ValueError:
+                break
+        return found
+
+
+def _signal_numbers() -> frozenset[int]:
+    return frozenset(int(number) for number in signal.Signals)
+
+
+def _check_executable(path: Path) -> None:
+    """Raise what the kernel would say of a program.
+
+    Raises:
+        OSError: It is not there, or nothing to execute.
+    """
+    with path.open("rb") as file:
+        begin = file.read(4)
+    if not begin.startswith(_FORMATS):
+        raise OSError(errno.ENOEXEC, os.strerror(errno.ENOEXEC))
+    if not os.access(path, os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+def _temporary(data: bytes) -> int:
+    descriptor = os.memfd_create("arguments")
+    os.write(descriptor, data)
+    os.lseek(descriptor, 0, os.SEEK_SET)
+    return descriptor

@@ -1,0 +1,337 @@
+"""A process that has imported what every cell imports, and forks into cells.
+
+``python -m grader.run.nursery SOCKET`` reads requests from the socket that it inherits as that
+descriptor. Interpreter start, imports and loading of the DDS libraries are most of what a cell
+costs; here they are paid once for all cells of a batch. Nothing of a student's is ever imported
+by it, and it has neither a node nor a thread of its own, so that a fork of it is a whole
+process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without them.)
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import importlib
+import json
+import os
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from grader.errors import GraderFault
+from grader.ros import RosInstallation
+from grader.run.descendants import kill_tree
+from grader.run.environment import RMW, cell_environment
+from grader.sandbox import bubblewrap
+from grader.sandbox.namespaces import CELL, enter
+
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
+
+_REQUEST_BYTES = 65_536
+_TOLD = struct.Struct("=id")
+"""Process id and 0, then exit status and CPU time in seconds."""
+_FORK_LIMIT_S = 10.0
+_ALWAYS = (
+    "grader.run.graph",
+    "grader.run.probe",
+    "grader.run.stimuli.player",
+    "grader.recording.mcap_writer",
+    "rcl_interfaces.srv",
+)
+SIMULATOR_MODULE = "grader.run.simulator"
+"""What a cell with a simulated robot imports besides."""
+
+
+class ForkedCell:
+    """A cell that a nursery forks, with the surface of :class:`subprocess.Popen`.
+
+    Attributes:
+        stdin: It goes on while this is open.
+        stdout: Its progress.
+        returncode: As in :mod:`subprocess`, or None while it runs.
+        cpu_s: CPU time of it and of all processes of the student, known at its end.
+    """
+
+    def __init__(
+        self, stdin: IO[str], stdout: IO[str], status: int, kill: Callable[[int], None]
+    ) -> None:
+        """Take over the descriptors.
+
+        Args:
+            stdin: Write end.
+            stdout: Read end.
+            status: Of the pipe that tells its process id and then its exit status.
+            kill: Kills the cell of that process id.
+        """
+        self._kill = kill
+        self.stdin = stdin
+        self.stdout = stdout
+        self.returncode: int | None = None
+        self.cpu_s = 0.0
+        self._status = status
+        self._pid: int | None = None
+        self._waiting = threading.Lock()
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end.
+
+        Raises:
+            subprocess.TimeoutExpired: It has not ended within the timeout.
+        """
+        with self._waiting:
+            if self.returncode is None:
+                self._await_fork(timeout)
+                # Nobody is left to tell when the nursery itself was killed.
+                self.returncode, self.cpu_s = self._told(timeout) or (-signal.SIGKILL, 0.0)
+                os.close(self._status)
+            return self.returncode
+
+    def kill(self) -> None:
+        """SIGKILL it and all that descends from it."""
+        with self._waiting:
+            if self.returncode is None:
+                self._await_fork(_FORK_LIMIT_S)
+                if self._pid is not None:
+                    self._kill(self._pid)
+
+    def _await_fork(self, timeout: float | None) -> None:
+        if self._pid is None:
+            told = self._told(timeout)
+            self._pid = told and told[0]
+
+    def _told(self, timeout: float | None) -> tuple[int, float] | None:
+        readable, _, _ = select.select([self._status], [], [], timeout)
+        if not readable:
+            raise subprocess.TimeoutExpired("cell", timeout or 0.0)
+        told = os.read(self._status, _TOLD.size)
+        if not told:
+            return None
+        number, cpu_s = _TOLD.unpack(told)
+        return number, cpu_s
+
+
+class Nursery:
+    """The process, as whoever needs cells sees it."""
+
+    def __init__(self, ros: RosInstallation, sandbox: Sandbox | None = None) -> None:
+        """Start it; it begins to import at once.
+
+        Args:
+            ros: The installation.
+            sandbox: What it and its cells run in, or None.
+        """
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket = ours
+        self._sandbox = sandbox
+        self._cells = tempfile.TemporaryDirectory(prefix="rosgrade-cells-")
+        command = [str(ros.python), "-m", "grader.run.nursery", str(theirs.fileno())]
+        environment = cell_environment(ros, sandboxed=sandbox is not None)
+        if sandbox is not None:
+            bubblewrap.give(Path(self._cells.name))
+            command = sandbox.nursery_command(command, ros, Path(self._cells.name), environment)
+            environment = bubblewrap.PLAIN_ENVIRONMENT
+        with theirs:
+            self._popen = subprocess.Popen(
+                command,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,
+            )
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it can still be asked for cells."""
+        return self._popen.poll() is None
+
+    @property
+    def cells(self) -> Path:
+        """Where the folders of its cells are made."""
+        return Path(self._cells.name)
+
+    def start_cell(
+        self, folder: Path, errors: IO[bytes], arguments: Sequence[str], modules: Sequence[str] = ()
+    ) -> ForkedCell:
+        """Fork a cell.
+
+        Args:
+            folder: The cell's own.
+            errors: Where its standard error goes.
+            arguments: Further arguments of the cell.
+            modules: What it will import besides what every cell does; ours or ROS's only.
+
+        Raises:
+            GraderFault: The nursery has ended.
+        """
+        in_read, in_write = os.pipe()
+        out_read, out_write = os.pipe()
+        status_read, status_write = os.pipe()
+        request = {
+            "arguments": [str(folder), *arguments],
+            "modules": list(modules),
+            "private": self._sandbox is not None,
+        }
+        self.give(folder)
+        try:
+            socket.send_fds(
+                self._socket,
+                [json.dumps(request).encode()],
+                [in_read, out_write, errors.fileno(), status_write],
+            )
+        except OSError as error:
+            for descriptor in (in_write, out_read, status_read):
+                os.close(descriptor)
+            raise GraderFault(f"the nursery of cells has ended: {error.strerror}") from error
+        finally:
+            for descriptor in (in_read, out_write, status_write):
+                os.close(descriptor)
+        return ForkedCell(open(in_write, "w"), open(out_read), status_read, self._kill)  # noqa: PTH123
+
+    def give(self, folder: Path) -> None:
+        """Let a cell read and write all that is in its folder."""
+        if self._sandbox is not None:
+            bubblewrap.give(folder)
+
+    def close(self) -> None:
+        """Wait for the cells that it has forked, and for itself, to end."""
+        self._socket.close()
+        self._popen.wait()
+        self._cells.cleanup()
+
+    def _kill(self, pid: int) -> None:
+        if self._sandbox is None:
+            kill_tree(pid)
+            return
+        # In a sandbox it counts processes in its own way. Without it the cell is gone as well.
+        with contextlib.suppress(OSError):
+            self._socket.send(json.dumps({"kill": pid}).encode())
+
+
+def _serve(requests: socket.socket) -> None:
+    """Fork a cell for each request, and tell how each ended, until nobody can ask any more."""
+    running: dict[int, int] = {}
+    ended_read, ended_write = os.pipe()
+    os.set_blocking(ended_read, False)
+    os.set_blocking(ended_write, False)
+    signal.set_wakeup_fd(ended_write, warn_on_full_buffer=False)
+    signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
+    sources = [requests.fileno(), ended_read]
+    # Without anybody to ask for more, the cells that run are still waited for.
+    while len(sources) > 1 or running:
+        readable, _, _ = select.select(sources, [], [])
+        if ended_read in readable:
+            with contextlib.suppress(BlockingIOError):
+                os.read(ended_read, 4096)
+            _tell_ended(running)
+        if requests.fileno() in readable:
+            text, descriptors, _, _ = socket.recv_fds(requests, _REQUEST_BYTES, 4)
+            request = json.loads(text) if text else {}
+            if request.get("kill") in running:
+                os.kill(request["kill"], signal.SIGKILL)
+            elif "arguments" in request:
+                _fork(requests, request, descriptors, running)
+            elif not text:
+                sources.remove(requests.fileno())
+
+
+def _fork(
+    requests: socket.socket,
+    request: dict[str, Any],
+    descriptors: list[int],
+    running: dict[int, int],
+) -> None:
+    _import(request["modules"])
+    *standard, status = descriptors
+    pid = os.fork()
+    if pid == 0:
+        requests.close()
+        _become_cell(request["arguments"], standard, private=request["private"])
+    for descriptor in standard:
+        os.close(descriptor)
+    running[pid] = status
+    # Whoever asked may be gone; the cell notices it as well.
+    with contextlib.suppress(BrokenPipeError):
+        os.write(status, _TOLD.pack(pid, 0.0))
+
+
+def _tell_ended(running: dict[int, int]) -> None:
+    while running:
+        pid, status, usage = os.wait4(-1, os.WNOHANG)
+        if not pid:
+            return
+        descriptor = running.pop(pid)
+        told = _TOLD.pack(os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime)
+        # Whoever asked may be gone.
+        with contextlib.suppress(BrokenPipeError):
+            os.write(descriptor, told)
+        os.close(descriptor)
+
+
+def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool) -> None:
+    """Run a cell in this process, which was just forked, and end it."""
+    from grader.run.cell import main
+
+    status = 1
+    try:
+        os.setsid()
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        for target, descriptor in enumerate(descriptors):
+            os.dup2(descriptor, target)
+        os.closerange(3, 256)
+        folder, mounter = Path(arguments[0]), None
+        if private:
+            mounter = enter(folder)
+            folder = CELL
+        status = main(folder, tuple(map(int, arguments[1:])), mounter)
+        sys.stdout.flush()
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+    finally:
+        os._exit(status)
+
+
+def _import(modules: Sequence[str]) -> None:
+    for name in modules:
+        # The cell imports it again and says what is wrong with it.
+        with contextlib.suppress(Exception):
+            importlib.import_module(name)
+
+
+def main(descriptor: int) -> int:
+    """Import, then serve."""
+    _import(_ALWAYS)
+    # rclpy opens the middleware with its first node; to relocate it is half of that.
+    with contextlib.suppress(OSError):
+        ctypes.CDLL(f"lib{RMW}.so")
+    _load_type_support()
+    # Pages that the collector touches would be copied by every fork.
+    gc.collect()
+    gc.freeze()
+    with socket.socket(fileno=descriptor) as requests:
+        _serve(requests)
+    return 0
+
+
+def _load_type_support() -> None:
+    from rcl_interfaces.srv import ListParameters
+
+    with contextlib.suppress(Exception):
+        ListParameters.__import_type_support__()
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1])))

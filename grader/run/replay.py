@@ -1,0 +1,192 @@
+"""A node on a domain of its own, given again what it was given in a recording.
+
+For students at home: the node runs as they would run it, without a sandbox, and nothing is
+judged. The player is a process of its own, as a cell is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from grader.errors import UsageError
+from grader.recording.inputs import read_inputs
+from grader.recording.model import NS, Kind, Owner, Qos, Recording
+from grader.ros import RosInstallation
+from grader.run.environment import cell_environment, student_environment
+from grader.run.order import Command
+from grader.run.runner import Runner
+
+if TYPE_CHECKING:
+    from grader.assignment.model import Assignment
+
+ORDER_FILE = "replay.json"
+_ENDING_LIMIT_S = 20.0
+_DEFAULT = Qos("reliable", "volatile")
+
+
+@dataclass(frozen=True)
+class Input:
+    """A topic that is given, with the QoS that it was given with."""
+
+    topic: str
+    type: str
+    reliability: str
+    durability: str
+
+
+@dataclass(frozen=True)
+class ReplayOrder:
+    """What is replayed.
+
+    Attributes:
+        recording: The recording's file.
+        commands: What is launched.
+        environment: Variables of the launched processes.
+        scratch: Their working folder.
+        inputs: Topics that are given.
+        outputs: Topic -> type of what the student published in the recording.
+        type_support: Install spaces of ours with interfaces that the player needs.
+        launched_ns: Launch in the recording.
+        matched_ns: When the recording's clock started.
+        duration_s: From then to the end of the observation.
+        discovery_s: How long a subscription of the student may take to appear.
+        shutdown_s: How long the node may take to end after SIGINT.
+    """
+
+    recording: str
+    commands: tuple[Command, ...]
+    environment: Mapping[str, str]
+    scratch: str
+    inputs: tuple[Input, ...]
+    outputs: Mapping[str, str]
+    type_support: tuple[str, ...]
+    launched_ns: int
+    matched_ns: int
+    duration_s: float
+    discovery_s: float
+    shutdown_s: float
+
+    def to_json(self) -> str:
+        """Write it for the player."""
+        return json.dumps(dataclasses.asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> ReplayOrder:
+        """Read what :meth:`to_json` wrote."""
+        data: dict[str, Any] = json.loads(text)
+        data["commands"] = tuple(
+            Command(item["name"], tuple(item["argv"])) for item in data["commands"]
+        )
+        data["inputs"] = tuple(Input(**item) for item in data["inputs"])
+        data["type_support"] = tuple(data["type_support"])
+        return cls(**data)
+
+
+def make_order(
+    file: Path,
+    recording: Recording,
+    assignment: Assignment,
+    ros: RosInstallation,
+    install: Path,
+    scratch: Path,
+    type_support: Sequence[Path] = (),
+) -> ReplayOrder:
+    """Say what to replay.
+
+    Args:
+        file: The recording's file.
+        recording: What it holds.
+        assignment: What it was recorded for.
+        ros: Runs the node, with the install spaces of ours that it was built with.
+        install: The submission's install space.
+        scratch: Working folder of the node.
+        type_support: Install spaces of ours with interfaces that the player needs.
+
+    Raises:
+        UsageError: The assignment has no such scenario, or nothing was given to the node.
+    """
+    scenario = next((s for s in assignment.scenarios if s.id == recording.scenario), None)
+    if scenario is None:
+        raise UsageError(
+            f"{file}: the assignment {assignment.id!r} has no scenario {recording.scenario!r}"
+        )
+    inputs = _inputs(file, recording)
+    if not inputs:
+        raise UsageError(
+            f"{file}: nothing was published to the node in this run, so there is nothing to "
+            "replay: run it with `ros2 run`"
+        )
+    runner = Runner(ros)
+    began_ns = recording.matched_ns or recording.launched_ns
+    return ReplayOrder(
+        recording=str(file.resolve()),
+        commands=tuple(
+            runner.command(launch, assignment.packages[0].name, install, dict(recording.values))
+            for launch in scenario.launch
+        ),
+        environment=student_environment(ros, install, scratch),
+        scratch=str(scratch),
+        inputs=inputs,
+        outputs={
+            endpoint.topic: endpoint.type
+            for endpoint in recording.student_endpoints(Kind.PUBLISHER)
+        },
+        type_support=tuple(map(str, type_support)),
+        launched_ns=recording.launched_ns,
+        matched_ns=began_ns,
+        duration_s=(recording.stop_ns - began_ns) / NS,
+        discovery_s=scenario.discovery,
+        shutdown_s=scenario.shutdown,
+    )
+
+
+def play(order: ReplayOrder, ros: RosInstallation) -> int:
+    """Replay, with everything that happens on standard output.
+
+    Returns:
+        0 when it was played to its end, 1 when the node ended or never listened, 130 when it
+        was interrupted; nothing of it runs any more.
+    """
+    with tempfile.TemporaryDirectory(prefix="rosgrade-replay-") as folder:
+        (Path(folder) / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
+        player = subprocess.Popen(
+            [str(ros.python), "-m", "grader.run.replay_player", folder],
+            env=cell_environment(ros),
+            # Its end tells the player that nobody waits any more; so does Ctrl-C, in here.
+            stdin=subprocess.PIPE,
+            start_new_session=True,
+        )
+        try:
+            return player.wait()
+        except KeyboardInterrupt:
+            assert player.stdin is not None
+            player.stdin.close()
+            player.wait(_ENDING_LIMIT_S)
+            return 130
+        finally:
+            if player.poll() is None:
+                player.kill()
+                player.wait()
+            if player.stdin is not None:
+                player.stdin.close()
+
+
+def _inputs(file: Path, recording: Recording) -> tuple[Input, ...]:
+    types = {message.topic: message.type for message in read_inputs(file, recording)}
+    offered = {
+        endpoint.topic: endpoint.qos
+        for endpoint in recording.endpoints
+        if endpoint.owner is Owner.PROBE and endpoint.kind is Kind.PUBLISHER
+    }
+    found = []
+    for topic, interface in sorted(types.items()):
+        qos = offered.get(topic, _DEFAULT)
+        found.append(Input(topic, interface, qos.reliability, qos.durability))
+    return tuple(found)

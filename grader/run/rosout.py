@@ -1,0 +1,51 @@
+"""What the student's loggers publish on /rosout, within bounds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rcl_interfaces.msg import Log
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from grader.recording.model import NS, LogLine
+from grader.run.output import KeptLines
+
+_TOPIC = "/rosout"
+_DEPTH = 1000
+_LONGEST = 8192
+_LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
+
+
+class RosoutLog:
+    """Subscribes to /rosout; the probe itself publishes nothing there."""
+
+    def __init__(self) -> None:
+        """Nothing is heard yet."""
+        self._kept = KeptLines(0)
+
+    def listen(self, node: Node, limit_bytes: int) -> None:
+        """Keep what comes from now on, and what was published before a logger was matched.
+
+        Args:
+            node: To subscribe with.
+            limit_bytes: How much text is kept, half of it from the end.
+        """
+        self._kept = KeptLines(limit_bytes)
+        profile = QoSProfile(
+            depth=_DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        )
+        node.create_subscription(Log, _TOPIC, self._take, profile)
+
+    @property
+    def lines(self) -> tuple[LogLine, ...]:
+        """Everything kept so far, in the order of its arrival."""
+        return (*self._kept.head, *self._kept.tail)
+
+    def _take(self, record: Any) -> None:
+        stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
+        text = str(record.msg)[:_LONGEST].encode(errors="replace").decode()
+        level = _LEVELS.get(int(record.level), str(record.level))
+        self._kept.add(LogLine(stamp_ns, str(record.name), "rosout", text, level))

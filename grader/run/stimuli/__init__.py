@@ -1,0 +1,1 @@
+"""Stimuli: what the probe does in a run besides observing."""

@@ -1,0 +1,214 @@
+"""Sends goals to an action of the student, and keeps what became of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from grader.recording.interaction import Feedback, Goal
+from grader.run.probe import import_interface
+from grader.run.stimuli.asking import NO_SERVER
+from grader.run.stimuli.calling import MARGIN_S, Readiness
+from grader.run.stimuli.filling import filled, plain
+from grader.run.stimuli.orders import GoalOrder
+from grader.run.stimuli.stage import Playing, Stage
+
+_POLL_S = 0.02
+_MOST_FEEDBACK = 5000
+# action_msgs/msg/GoalStatus
+_STATUSES = {
+    1: "accepted",
+    2: "executing",
+    3: "canceling",
+    4: "succeeded",
+    5: "canceled",
+    6: "aborted",
+}
+
+
+@dataclass
+class SentGoal:
+    """A goal under way, or one that could not be sent."""
+
+    order: GoalOrder
+    goal: Mapping[str, Any]
+    sent_ns: int
+    accepted: bool | None = None
+    answered_ns: int | None = None
+    feedback: list[Feedback] = field(default_factory=list)
+    statuses: list[tuple[int, str]] = field(default_factory=list)
+    canceled_ns: int | None = None
+    cancel_answered_ns: int | None = None
+    cancel_accepted: bool | None = None
+    status: str = ""
+    result: Mapping[str, Any] | None = None
+    result_ns: int | None = None
+    preempted: bool = False
+    error: str = ""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it was rejected, has its result, or was never sent."""
+        return self.accepted is False or self.result_ns is not None or bool(self.error)
+
+    @property
+    def record(self) -> Goal:
+        """For the recording."""
+        return Goal(
+            action=self.order.action,
+            type=self.order.type,
+            goal=self.goal,
+            sent_ns=self.sent_ns,
+            accepted=self.accepted,
+            answered_ns=self.answered_ns,
+            feedback=tuple(self.feedback),
+            statuses=tuple(self.statuses),
+            canceled_ns=self.canceled_ns,
+            cancel_answered_ns=self.cancel_answered_ns,
+            cancel_accepted=self.cancel_accepted,
+            status=self.status,
+            result=self.result,
+            result_ns=self.result_ns,
+            preempts=self.order.preempt,
+            preempted=self.preempted,
+            error=self.error,
+        )
+
+
+class SendingGoal(Playing):
+    """One goal, from its sending to its result."""
+
+    def __init__(self, order: GoalOrder, stage: Stage) -> None:
+        """Nothing is sent yet."""
+        self._order = order
+        self._stage = stage
+        self._ready = Readiness(f"an action {order.action}", stage)
+        # Those of the orders before it are there already, and are waited for.
+        self._before = [item for item in stage.goal_orders if item._order.action == order.action]
+        stage.goal_orders.append(self)
+        self._client: Any = None
+        self._handle: Any = None
+        self._sent: SentGoal | None = None
+        self._failed: str | None = None
+        self._sent_s = 0.0
+        self._now_s = 0.0
+
+    @property
+    def asks(self) -> bool:
+        """It does."""
+        return True
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it has ended, or was waited for; or nobody was there."""
+        if self._failed is not None or self._ready.given_up:
+            return True
+        if self._sent is None:
+            return False
+        return self._sent.is_over or self._now_s - self._sent_s >= self._order.within_s + MARGIN_S
+
+    @property
+    def due_s(self) -> float | None:
+        """When to look next."""
+        return None if self.is_done else max(self._order.after_s, self._now_s + _POLL_S)
+
+    def tick(self, elapsed_s: float | None) -> None:
+        """Send it, and ask to cancel it, when that is due."""
+        if elapsed_s is None or elapsed_s < self._order.after_s or self._failed is not None:
+            return
+        self._now_s = elapsed_s
+        if self._sent is None:
+            if self._is_ready(elapsed_s) and self._is_turn():
+                self._send(elapsed_s)
+            return
+        self._follow(self._sent)
+
+    def finish(self) -> None:
+        """Note that it could not be sent, unless it was not due yet."""
+        if self._failed is not None or self._ready.is_in_vain:
+            error = self._failed or NO_SERVER
+            self._note(SentGoal(self._order, self._order.goal, time.time_ns(), error=error))
+
+    def _is_ready(self, elapsed_s: float) -> bool:
+        from rclpy.action.client import ActionClient
+
+        if self._client is None:
+            try:
+                interface = import_interface(self._order.type)
+            except ImportError as error:
+                self._failed = f"the interface {self._order.type} is not installed ({error})"
+                return False
+            node = self._stage.probe.node
+            self._client = ActionClient(node, interface, self._order.action)
+        return self._ready.met(bool(self._client.server_is_ready()), elapsed_s)
+
+    def _is_turn(self) -> bool:
+        earlier = [item for item in self._stage.asking if item.after_s < self._order.after_s]
+        if not all(item.is_through for item in earlier):
+            return False
+        if not self._order.preempt:
+            return all(item.is_done for item in self._before)
+        # To preempt a goal, that must have been begun.
+        return all(item.is_done or item._handle is not None for item in self._before)
+
+    def _send(self, elapsed_s: float) -> None:
+        if self._order.preempt:
+            for item in self._before:
+                if item._sent is not None and not item._sent.is_over:
+                    item._sent.preempted = True
+        now_ns = time.time_ns()
+        message = filled(import_interface(self._order.type).Goal(), self._order.goal, now_ns)
+        sent = self._sent = SentGoal(self._order, plain(message), now_ns)
+        self._note(sent)
+        self._sent_s = elapsed_s
+
+        def take(message: Any) -> None:
+            if self._stage.probe.recording and len(sent.feedback) < _MOST_FEEDBACK:
+                sent.feedback.append(Feedback(time.time_ns(), plain(message.feedback)))
+
+        future = self._client.send_goal_async(message, feedback_callback=take)
+        future.add_done_callback(lambda done: self._answer(sent, done))
+
+    def _note(self, sent: SentGoal) -> None:
+        self._stage.goals.append(sent)
+
+    def _answer(self, sent: SentGoal, future: Any) -> None:
+        if not self._stage.probe.recording:
+            return
+        handle = future.result()
+        sent.accepted, sent.answered_ns = bool(handle.accepted), time.time_ns()
+        if sent.accepted:
+            self._handle = handle
+            handle.get_result_async().add_done_callback(lambda done: self._end(sent, done))
+
+    def _end(self, sent: SentGoal, future: Any) -> None:
+        if not self._stage.probe.recording:
+            return
+        answer = future.result()
+        sent.result_ns = time.time_ns()
+        sent.status = _STATUSES.get(answer.status, "unknown")
+        sent.result = plain(answer.result)
+
+    def _follow(self, sent: SentGoal) -> None:
+        """Note a new status, and ask to cancel when it is due."""
+        if self._handle is None:
+            return
+        status = _STATUSES.get(self._handle.status)
+        if status and (not sent.statuses or sent.statuses[-1][1] != status):
+            sent.statuses.append((time.time_ns(), status))
+        cancel_s = self._order.cancel_after_s
+        if cancel_s is None or sent.canceled_ns is not None or sent.is_over:
+            return
+        now_ns = time.time_ns()
+        if now_ns - (sent.answered_ns or now_ns) >= cancel_s * 1e9:
+            sent.canceled_ns = now_ns
+            self._handle.cancel_goal_async().add_done_callback(
+                lambda done: self._cancel(sent, done)
+            )
+
+    def _cancel(self, sent: SentGoal, future: Any) -> None:
+        if self._stage.probe.recording:
+            sent.cancel_answered_ns = time.time_ns()
+            sent.cancel_accepted = bool(future.result().goals_canceling)

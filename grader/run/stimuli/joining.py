@@ -1,0 +1,75 @@
+"""Joins a topic in the middle of a run."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+from grader.recording.model import Join, Qos
+from grader.run.probe import qos_profile
+from grader.run.stimuli.orders import JoinOrder
+from grader.run.stimuli.stage import Playing, Stage
+
+# What a publisher keeps for late joiners arrives within this of the match.
+_HISTORY_S = 0.5
+_POLL_S = 0.02
+
+
+class Joining(Playing):
+    """A late joiner."""
+
+    def __init__(self, order: JoinOrder, stage: Stage) -> None:
+        """Nothing is subscribed to yet."""
+        self._order = order
+        self._stage = stage
+        self._subscription: Any = None
+        self._joined_s = 0.0
+        self._matched_s: float | None = None
+        self._now_s = 0.0
+
+    @property
+    def due_s(self) -> float | None:
+        """Its time to join; then until it is matched, in short steps."""
+        if self._subscription is None:
+            return self._order.after_s
+        return None if self.is_done else self._now_s + _POLL_S
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it has been matched long enough, or was not in all that time."""
+        if self._subscription is None:
+            return False
+        if self._matched_s is not None:
+            return self._now_s - self._matched_s > _HISTORY_S
+        return self._now_s - self._joined_s > self._stage.limits.settle_s
+
+    def tick(self, elapsed_s: float | None) -> None:
+        """Join when it is due; then note the match."""
+        if elapsed_s is None or elapsed_s < self._order.after_s:
+            return
+        self._now_s = elapsed_s
+        if self._subscription is None:
+            self._join(elapsed_s)
+        elif self._matched_s is None and self._subscription.get_publisher_count():
+            self._matched_s = elapsed_s
+            joins, name = self._stage.joins, self._order.name
+            joins[name] = replace(joins[name], matched_ns=time.time_ns())
+
+    def _join(self, elapsed_s: float) -> None:
+        order = self._order
+        self._joined_s = elapsed_s
+        self._stage.joins[order.name] = Join(
+            name=order.name,
+            topic=order.topic,
+            type=order.type,
+            qos=Qos(
+                reliability=order.reliability,
+                durability=order.durability,
+                history="keep_last",
+                depth=order.depth,
+            ),
+            joined_ns=time.time_ns(),
+        )
+        profile = qos_profile(order.reliability, order.durability, order.depth)
+        self._subscription = self._stage.probe.join(order.name, order.topic, order.type, profile)

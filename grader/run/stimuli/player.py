@@ -1,0 +1,108 @@
+"""Plays the stimuli of a scenario."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+from grader.run.stimuli.calling import Calling
+from grader.run.stimuli.goal_sending import SendingGoal
+from grader.run.stimuli.joining import Joining
+from grader.run.stimuli.orders import (
+    CallOrder,
+    GoalOrder,
+    JoinOrder,
+    KillOrder,
+    ListParametersOrder,
+    ParametersOrder,
+    PublishOrder,
+    RestartOrder,
+    StimulusOrder,
+)
+from grader.run.stimuli.parameters import ListingParameters
+from grader.run.stimuli.processes import Killing, Restarting
+from grader.run.stimuli.publishing import Publishing
+from grader.run.stimuli.setting import SettingParameters
+from grader.run.stimuli.stage import Playing, Stage
+
+_KINDS: dict[type, Callable[..., Playing]] = {
+    PublishOrder: Publishing,
+    JoinOrder: Joining,
+    KillOrder: Killing,
+    RestartOrder: Restarting,
+    ListParametersOrder: ListingParameters,
+    CallOrder: Calling,
+    ParametersOrder: SettingParameters,
+    GoalOrder: SendingGoal,
+}
+
+
+class Player:
+    """Plays every stimulus of a run at its time."""
+
+    def __init__(self, orders: Sequence[StimulusOrder], stage: Stage) -> None:
+        """Prepare what has to be there before anything of the student's is launched.
+
+        Args:
+            orders: What to play.
+            stage: What to act on.
+        """
+        self._playing = [_KINDS[type(order)](order, stage) for order in orders]
+        self._answers = {
+            order.topic: order.answer
+            for order in orders
+            if isinstance(order, PublishOrder) and order.answer is not None
+        }
+        self._began_s: float | None = None
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """Topics on which a subscription of the student's is expected."""
+        return tuple(sorted({item.topic for item in self._playing if item.topic}))
+
+    @property
+    def answers(self) -> dict[str, str]:
+        """Topic that is published on -> topic on which its answers are expected."""
+        return dict(self._answers)
+
+    @property
+    def asks(self) -> bool:
+        """Whether a stimulus asks something of a service or an action."""
+        return any(item.asks for item in self._playing)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether every stimulus that has an end was played."""
+        return self._began_s is not None and all(item.is_done for item in self._playing)
+
+    @property
+    def keeps_run(self) -> bool:
+        """Whether the run goes on although no process of the student's runs any more."""
+        return any(item.keeps_run for item in self._playing)
+
+    def begin(self) -> None:
+        """Now was the first match."""
+        if self._began_s is None:
+            self._began_s = time.monotonic()
+
+    def tick(self) -> None:
+        """Do what is due."""
+        elapsed_s = self._elapsed_s()
+        for item in self._playing:
+            item.tick(elapsed_s)
+
+    def finish(self) -> None:
+        """The observation is over: note what could not be played."""
+        for item in self._playing:
+            item.finish()
+
+    def pause_s(self, most_s: float) -> float:
+        """How long nothing is due, at most ``most_s``."""
+        elapsed_s = self._elapsed_s()
+        if elapsed_s is None:
+            return most_s
+        due = [item.due_s for item in self._playing]
+        return max(0.0, min([most_s, *(one - elapsed_s for one in due if one is not None)]))
+
+    def _elapsed_s(self) -> float | None:
+        return None if self._began_s is None else time.monotonic() - self._began_s

@@ -1,0 +1,150 @@
+"""Publishes messages of the scenario, once a subscription of the student has matched."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rclpy.serialization import serialize_message
+
+from grader.checks.compatibility import refusals
+from grader.recording.mcap_writer import RawMessage
+from grader.recording.model import Kind, Qos, Wait
+from grader.run.probe import import_interface, qos_profile
+from grader.run.stimuli.filling import filled
+from grader.run.stimuli.orders import PublishOrder
+from grader.run.stimuli.stage import Playing, Stage
+
+_POLL_S = 0.02
+# Of a node that declares nothing to us, the writer that answers may match a moment later.
+_GRACE_S = 0.1
+
+
+class Publishing(Playing):
+    """A publisher of the probe with its messages."""
+
+    def __init__(self, order: PublishOrder, stage: Stage) -> None:
+        """Create the publisher, and publish what is to be there before the student's launch.
+
+        Raises:
+            ImportError: The interface does not exist.
+        """
+        self.topic = order.topic
+        self._order = order
+        self._stage = stage
+        self._class = import_interface(order.type)
+        self._qos = Qos(reliability=order.reliability, durability=order.durability)
+        self._publisher: Any = stage.probe.node.create_publisher(
+            self._class,
+            order.topic,
+            qos_profile(order.reliability, order.durability, order.depth),
+        )
+        self._sent = 0
+        self._began_ns = 0
+        self._ready_s: float | None = None
+        self._next_s: float | None = None
+        self._sent_s = 0.0
+        self._heard = 0
+        self._now_s = 0.0
+        self._given_up = False
+        for _ in range(min(order.before_launch, len(order.messages))):
+            self._publish()
+
+    @property
+    def is_done(self) -> bool:
+        """Whether everything was published, with its answer; or nobody ever listened."""
+        order = self._order
+        if order.repeat_s is not None or self._given_up:
+            return True
+        return self._sent >= len(order.messages) and self._is_answered()
+
+    @property
+    def due_s(self) -> float | None:
+        """When the next message is due; until somebody listens, in short steps."""
+        if self._next_s is None:
+            return max(self._order.after_s, self._now_s + _POLL_S)
+        if self._order.answer and self._sent > self._order.before_launch:
+            return max(self._next_s, self._now_s + _POLL_S) if not self.is_done else None
+        return self._next_s if self._is_more else None
+
+    def tick(self, elapsed_s: float | None) -> None:
+        """Publish what is due."""
+        if elapsed_s is None or elapsed_s < self._order.after_s:
+            return
+        self._now_s = elapsed_s
+        if self._next_s is None:
+            self._await_listener(elapsed_s)
+        while self._is_more and self._next_s is not None and elapsed_s >= self._next_s:
+            if not self._is_answered():
+                return
+            self._heard = self._answers()
+            self._publish()
+            self._sent_s = elapsed_s
+            # A late cell must not make up for it with a burst.
+            self._next_s = max(self._next_s, elapsed_s - self._gap_s()) + self._gap_s()
+
+    @property
+    def _is_more(self) -> bool:
+        return self._sent < len(self._order.messages) or self._order.repeat_s is not None
+
+    def _gap_s(self) -> float:
+        times, number = self._order.times_s, self._sent
+        if 0 < number < len(times):
+            return times[number] - times[number - 1]
+        return self._order.repeat_s or 0.0
+
+    def _await_listener(self, elapsed_s: float) -> None:
+        if not self._began_ns:
+            self._began_ns = time.time_ns()
+        if not self._is_listened_to():
+            self._ready_s = None
+            settle_s = self._stage.limits.settle_s
+            if not self._given_up and self._stage.calm_s > settle_s:
+                self._given_up = True
+                what = f"a subscription on {self._order.topic}"
+                self._stage.waits.append(Wait(what, settle_s, self._began_ns))
+            return
+        self._given_up = False
+        if self._ready_s is None:
+            self._ready_s = elapsed_s
+        if elapsed_s - self._ready_s >= _GRACE_S:
+            self._next_s = elapsed_s
+
+    def _is_listened_to(self) -> bool:
+        """Whether every subscription of the student's that can match has, and there is one."""
+        able = [
+            item
+            for item in self._stage.endpoints(Kind.SUBSCRIPTION, self._order.topic)
+            if item.type == self._order.type and not refusals(self._qos, item.qos)
+        ]
+        matched = self._publisher.get_subscription_count()
+        return bool(able) and matched >= len(able) and self._stage.is_heard
+
+    def _answers(self) -> int:
+        return self._stage.probe.counts.get(self._order.answer or "", 0)
+
+    def _is_answered(self) -> bool:
+        """Whether the newest message was answered, or has had its time for it."""
+        if self._order.answer is None or self._sent <= self._order.before_launch:
+            return True
+        return self._answers() > self._heard or self._now_s - self._sent_s >= self._order.within_s
+
+    def _publish(self) -> None:
+        order = self._order
+        value = order.messages[min(self._sent, len(order.messages) - 1)]
+        message = filled(self._class(), value, time.time_ns())
+        cdr = serialize_message(message)
+        stamp_ns = time.time_ns()
+        self._publisher.publish(cdr)
+        self._sent += 1
+        self._stage.probe.messages.append(
+            RawMessage(
+                topic=order.topic,
+                type=order.type,
+                cdr=cdr,
+                stamp_ns=stamp_ns,
+                received_ns=stamp_ns,
+                sequence=self._sent,
+                is_sent=True,
+            )
+        )

@@ -1,0 +1,137 @@
+"""What a stimulus acts on, and what every kind of stimulus can do."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from grader.recording.model import NS, Endpoint, Intervention, Join, Kind, Owner, Wait
+from grader.run.disturbance import DisturbanceMeter
+from grader.run.graph import GraphObserver
+from grader.run.order import Limits
+from grader.run.probe import Probe
+from grader.run.stimuli.asking import Asker
+from grader.run.stopwatch import Stopwatch
+from grader.run.student import StudentProcesses
+
+if TYPE_CHECKING:
+    from grader.run.stimuli.calling import Asking
+    from grader.run.stimuli.goal_sending import SendingGoal, SentGoal
+
+# A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
+_SET_UP_S = 0.5
+
+
+@dataclass
+class Stage:
+    """What a stimulus acts on.
+
+    Attributes:
+        probe: Whose node publishes and subscribes.
+        graph: What has been seen of the ROS graph.
+        students: The student's processes.
+        meter: Of the host's disturbance.
+        limits: Bounds of the run.
+        start: Starts a process by its name, as it was launched.
+        waits: Bounded waits so far.
+        joins: Late joiners so far, by name.
+        interventions: What was done to processes so far.
+        goals: Goals so far.
+        goal_orders: What sends goals, in the order of the YAML.
+        asking: What asks something of a service.
+    """
+
+    probe: Probe
+    graph: GraphObserver
+    students: StudentProcesses
+    meter: DisturbanceMeter
+    limits: Limits
+    start: Callable[[str], None]
+    waits: list[Wait]
+    joins: dict[str, Join] = field(default_factory=dict)
+    interventions: list[Intervention] = field(default_factory=list)
+    goals: list[SentGoal] = field(default_factory=list)
+    goal_orders: list[SendingGoal] = field(default_factory=list)
+    asking: list[Asking] = field(default_factory=list)
+    _calm: tuple[int, Stopwatch] | None = None
+
+    @cached_property
+    def asker(self) -> Asker:
+        """Made with the first call."""
+        return Asker(self.probe, self.limits.message_bytes)
+
+    def endpoints(self, kind: Kind, topic: str) -> list[Endpoint]:
+        """The student's endpoints on a topic that are there at the moment."""
+        return [
+            item
+            for item in self.graph.endpoints
+            if item.owner is Owner.STUDENT
+            and item.kind is kind
+            and item.topic == topic
+            and item.vanished_ns is None
+        ]
+
+    @property
+    def calm_s(self) -> float:
+        """How long the graph has not changed, less what the host took meanwhile."""
+        if self._calm is None or self._calm[0] != self.graph.changed_ns:
+            self._calm = (self.graph.changed_ns, Stopwatch(self.meter))
+        return self._calm[1].elapsed_s
+
+    @property
+    def is_set_up(self) -> bool:
+        """Whether the student's nodes are past their constructors, as far as it shows."""
+        if self.probe.last_message_ns is not None:
+            return True
+        return (time.time_ns() - self.graph.changed_ns) / NS > _SET_UP_S
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether the probe hears the student: on every topic, or on all that will be there."""
+        topics = self.probe.student_topics
+        return (
+            bool(topics) and all(self.endpoints(Kind.PUBLISHER, topic) for topic in topics)
+        ) or self.is_set_up
+
+
+class Playing(ABC):
+    """One stimulus being played; its clock starts with the first match."""
+
+    topic: str | None = None
+    """Topic on which a subscription of the student's counts as the first match."""
+
+    @abstractmethod
+    def tick(self, elapsed_s: float | None) -> None:
+        """Do what is due.
+
+        Args:
+            elapsed_s: Seconds since the first match; None before it.
+        """
+
+    @property
+    def asks(self) -> bool:
+        """Whether it needs a service or an action of the student's, and no topic."""
+        return False
+
+    def finish(self) -> None:
+        """The observation is over: note what could not be played; by default nothing."""
+        return
+
+    @property
+    def due_s(self) -> float | None:
+        """When the next call of :meth:`tick` should come at the latest, on its clock."""
+        return None
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it was played; one without an end never keeps a run from ending."""
+        return True
+
+    @property
+    def keeps_run(self) -> bool:
+        """Whether the run goes on although no process of the student's runs any more."""
+        return False

@@ -1,0 +1,114 @@
+"""Watches what the student's processes take in a sandbox, beyond what the kernel bounds itself.
+
+The kernel's limits are per process: a hundred processes may each stay within theirs. Here they
+are counted together several times a second, and ended when they take too much.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from grader.recording.model import Breach
+from grader.run.descendants import descendants
+from grader.sandbox.limits import MIB, Limits
+from grader.sandbox.namespaces import STUDENT
+from grader.sandbox.usage import memory_bytes, thread_count
+
+_POLL_S = 0.1
+_FULL = 0.99
+# Some for subprocesses of good manners; every session gets a share of the CPU of its own.
+_MOST_SESSIONS = 16
+
+
+class Watchdog:
+    """Looks from a thread of its own until it is stopped."""
+
+    def __init__(
+        self,
+        limits: Limits,
+        inits: Callable[[], Sequence[int]],
+        output_bytes: Callable[[], int],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            limits: What is too much.
+            inits: Ids of the first processes of the student's sandboxes.
+            output_bytes: How much was written so far.
+        """
+        self._limits = limits
+        self._inits = inits
+        self._output_bytes = output_bytes
+        self._breaches: dict[str, Breach] = {}
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
+
+    def start(self) -> None:
+        """Begin to look."""
+        self._thread.start()
+
+    def stop(self) -> tuple[Breach, ...]:
+        """End; the limits that were passed."""
+        self._stop.set()
+        self._thread.join()
+        self._look()
+        return tuple(self._breaches.values())
+
+    def _run(self) -> None:
+        while not self._stop.wait(_POLL_S):
+            self._look()
+
+    def _look(self) -> None:
+        limits = self._limits
+        pids = [pid for init in self._inits() for pid in (init, *descendants(init))]
+        taken = memory_bytes(pids, limits.memory_bytes)
+        if taken > limits.memory_bytes:
+            self._note("memory", f"{_mib(taken)} of memory", _mib(limits.memory_bytes))
+            self._end_all()
+        threads = thread_count(pids)
+        # The last ones that it may start count as too many: no more can be seen.
+        if threads >= limits.processes:
+            self._note("processes", f"{threads} processes and threads", str(limits.processes))
+        if len({_session(pid) for pid in pids}) > _MOST_SESSIONS:
+            self._note("sessions", f"more than {_MOST_SESSIONS} sessions", str(_MOST_SESSIONS))
+            self._end_all()
+        written = self._output_bytes()
+        if written > limits.output_bytes:
+            self._note("output", f"{_mib(written)} of output", _mib(limits.output_bytes))
+            self._end_all()
+        self._look_at(STUDENT / "disk", "disk", "/tmp and home")
+        self._look_at(STUDENT / "shared", "shared memory", "/dev/shm")
+
+    def _look_at(self, place: Path, what: str, name: str) -> None:
+        status = os.statvfs(place)
+        size, free = status.f_blocks * status.f_frsize, status.f_bfree * status.f_frsize
+        if free < (1 - _FULL) * size:
+            self._note(what, f"all space in {name}", _mib(size))
+        if status.f_ffree < (1 - _FULL) * status.f_files:
+            self._note(f"files in {what}", f"all files of {name}", str(status.f_files))
+
+    def _note(self, what: str, taken: str, allowed: str) -> None:
+        self._breaches.setdefault(what, Breach(time.time_ns(), what, taken, allowed))
+
+    def _end_all(self) -> None:
+        for init in self._inits():
+            try:
+                os.kill(init, signal.SIGKILL)
+            except ProcessLookupError:
+                continue
+
+
+def _mib(size: int) -> str:
+    return f"{size // MIB} MiB"
+
+
+def _session(pid: int) -> int:
+    try:
+        return os.getsid(pid)
+    except ProcessLookupError:
+        return 0

@@ -1,0 +1,162 @@
+"""Command lines of bubblewrap: what a process sees, and how little.
+
+Nothing runs bubblewrap as root: it could not mount /proc below itself, the limit of processes
+would not hold, and files that only root may read would be readable. As root the folders to show
+are bound to a place that everybody can reach, in a mount namespace of the command's own, and
+the command goes on as a user that has nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+UID = 61_000
+"""The user that sandboxes run as where rosgrade runs as root: nobody's (systemd, UIDs-GIDs)."""
+PLAIN_ENVIRONMENT = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
+"""Of bubblewrap itself: the sandbox's first process shows it to everybody inside."""
+
+_STAGE = "/run/rosgrade"
+_FILTER_FD = 9
+_STAGING = """\
+set -e
+stage=$1; shift
+mkdir -p -m 755 "$stage"
+mount -t tmpfs -o mode=755,size=1m rosgrade "$stage"
+n=0
+while [ "$1" != -- ]; do
+  if [ -d "$1" ]; then mkdir "$stage/$n"; else : > "$stage/$n"; fi
+  mount --rbind "$1" "$stage/$n"
+  n=$((n + 1)); shift
+done
+shift
+exec "$@"
+"""
+_NAMESPACES = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts")
+_SYSTEM_FOLDERS = ("bin", "sbin", "lib", "lib32", "lib64", "libx32")
+_SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/localtime")
+
+
+@dataclass(frozen=True)
+class Bind:
+    """A folder or file that is seen inside.
+
+    Attributes:
+        source: Outside.
+        target: Inside; absolute.
+        writable: Whether it can be changed inside.
+    """
+
+    source: Path
+    target: Path
+    writable: bool = False
+
+    @classmethod
+    def same(cls, path: Path, *, writable: bool = False) -> Bind:
+        """What is seen at the same place as outside."""
+        return cls(path, path, writable)
+
+
+def namespaces(uid: int, *, network: bool = True) -> list[str]:
+    """New namespaces, with a user of no rights in them.
+
+    Args:
+        uid: What it is called inside.
+        network: Also of its own network, with nothing but a loopback interface.
+    """
+    own = [*_NAMESPACES, "--unshare-cgroup-try", *(["--unshare-net"] if network else [])]
+    return [*own, "--uid", str(uid), "--gid", str(uid), "--new-session"]
+
+
+def system() -> list[str]:
+    """The system's programs and libraries, read-only, and an empty /proc, /dev and /tmp."""
+    arguments = ["--ro-bind", "/usr", "/usr"]
+    for name in _SYSTEM_FOLDERS:
+        path = Path("/", name)
+        if path.is_symlink():
+            arguments += ["--symlink", str(path.readlink()), str(path)]
+        elif path.is_dir():
+            arguments += ["--ro-bind", str(path), str(path)]
+    for file in _SYSTEM_FILES:
+        if Path(file).exists():
+            arguments += ["--ro-bind", file, file]
+    return [*arguments, "--proc", "/proc", "--dev", "/dev"]
+
+
+def variables(environment: Mapping[str, str]) -> list[str]:
+    """Exactly these variables."""
+    arguments = ["--clearenv"]
+    for name, value in environment.items():
+        arguments += ["--setenv", name, value]
+    return arguments
+
+
+def bound(binds: Iterable[Bind]) -> list[str]:
+    """Arguments that show folders and files."""
+    arguments: list[str] = []
+    for bind in binds:
+        how = "--bind" if bind.writable else "--ro-bind"
+        arguments += [how, str(bind.source), str(bind.target)]
+    return arguments
+
+
+def launch(
+    arguments: Sequence[str],
+    binds: Sequence[Bind],
+    last: Sequence[str],
+    command: Sequence[str],
+    filter_file: Path | None = None,
+) -> list[str]:
+    """The whole command line that starts a sandbox from outside of any.
+
+    Args:
+        arguments: Of bubblewrap; what is bound by them everybody may read.
+        binds: What is seen inside besides.
+        last: Further arguments, in force after the binds.
+        command: Run in it.
+        filter_file: Filter of system calls, or None.
+    """
+    program = [str(shutil.which("bwrap"))]
+    opened: list[str] = []
+    if filter_file is not None:
+        # Opened before the rights to read it are dropped.
+        opened = ["/bin/sh", "-c", f'exec {_FILTER_FD}<"$1"; shift; exec "$@"', "sh"]
+        opened.append(str(filter_file))
+        last = [*last, "--seccomp", str(_FILTER_FD)]
+    if os.geteuid() != 0:
+        return [*opened, *program, *arguments, *bound(binds), *last, "--", *command]
+    staged = [
+        Bind(Path(_STAGE, str(number)), bind.target, bind.writable)
+        for number, bind in enumerate(binds)
+    ]
+    sources = [str(bind.source) for bind in binds]
+    return [
+        *opened,
+        *("unshare", "--mount", "--propagation", "private"),
+        *("/bin/sh", "-c", _STAGING, "sh", _STAGE, *sources, "--"),
+        *("setpriv", f"--reuid={UID}", f"--regid={UID}", "--clear-groups"),
+        *("--inh-caps=-all", "--bounding-set=-all", "--no-new-privs"),
+        *(*program, *arguments, *bound(staged), *last, "--", *command),
+    ]
+
+
+def give(path: Path) -> None:
+    """Make a folder with all that is in it the sandbox's own, so that it can write there."""
+    if os.geteuid() == 0:
+        _chown(path, UID)
+
+
+def take_back(path: Path) -> None:
+    """Make what a sandbox wrote ours again, and readable for the next one."""
+    if os.geteuid() == 0:
+        _chown(path, 0)
+
+
+def _chown(path: Path, uid: int) -> None:
+    os.chown(path, uid, uid, follow_symlinks=False)
+    for parent, folders, names in os.walk(path):
+        for name in (*folders, *names):
+            os.chown(os.path.join(parent, name), uid, uid, follow_symlinks=False)  # noqa: PTH118

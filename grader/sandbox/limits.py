@@ -1,0 +1,66 @@
+"""How much of the machine untrusted code may take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+MIB = 2**20
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of one sandbox.
+
+    Attributes:
+        memory_bytes: Of all its processes together, shared pages counted once.
+        processes: Processes and threads together.
+        cpu_s: CPU time of one process.
+        file_bytes: Of one file.
+        disk_bytes: Of everything that is written to /tmp and home.
+        files: Number of files and folders there.
+        shared_bytes: Of /dev/shm.
+        open_files: Of one process.
+        address_bytes: Address space of one process. Reserving takes nothing from anybody, and
+            every thread reserves some, so this is far more than the memory.
+        output_bytes: A process that writes more than this is ended.
+    """
+
+    memory_bytes: int = 1024 * MIB
+    processes: int = 128
+    cpu_s: int = 300
+    file_bytes: int = 32 * MIB
+    disk_bytes: int = 64 * MIB
+    files: int = 20_000
+    shared_bytes: int = 16 * MIB
+    open_files: int = 1024
+    address_bytes: int = 4096 * MIB
+    output_bytes: int = 2048 * MIB
+
+    def prlimit(self) -> list[str]:
+        """The command in front of what is to be bounded.
+
+        The number of processes counts per user and user namespace where it is set inside, and
+        over everything of the user where it is set outside.
+        """
+        return [
+            "prlimit",
+            f"--as={self.address_bytes}",
+            f"--data={self.memory_bytes}",
+            f"--nproc={self.processes}",
+            f"--nofile={self.open_files}",
+            f"--fsize={self.file_bytes}",
+            f"--cpu={self.cpu_s}",
+            "--core=0",
+        ]
+
+
+BUILD = Limits(
+    memory_bytes=2048 * MIB,
+    processes=512,
+    cpu_s=600,
+    file_bytes=256 * MIB,
+    disk_bytes=1024 * MIB,
+    files=40_000,
+    address_bytes=8192 * MIB,
+)
+"""Of a build: compilers take more than nodes."""

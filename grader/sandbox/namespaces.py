@@ -1,0 +1,196 @@
+"""A forked process goes into namespaces of its own: each cell of a nursery does.
+
+The nursery is in a sandbox already. A cell in it gets its own network (only a loopback
+interface), processes, shared memory and scratch, and sees of all cells' folders its own alone.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import fcntl
+import os
+import signal
+import socket
+import struct
+from pathlib import Path
+
+CELL = Path("/cell")
+"""Where a cell sees its folder."""
+STUDENT = Path("/run/student")
+"""Where it mounts what a student can write to: ``disk`` and ``shared``."""
+MOUNT_POINTS = (CELL, STUDENT / "disk", STUDENT / "shared")
+
+# linux/sched.h
+_CLONE_NEWNS = 0x00020000
+_CLONE_NEWUTS = 0x04000000
+_CLONE_NEWIPC = 0x08000000
+_CLONE_NEWUSER = 0x10000000
+_CLONE_NEWPID = 0x20000000
+_CLONE_NEWNET = 0x40000000
+# linux/mount.h
+_MS_RDONLY, _MS_NOSUID, _MS_NODEV, _MS_NOEXEC = 1, 2, 4, 8
+_MS_BIND, _MS_REC, _MS_PRIVATE = 0x1000, 0x4000, 0x40000
+# linux/prctl.h, linux/capability.h
+_PR_SET_PDEATHSIG, _PR_CAPBSET_DROP, _PR_SET_NO_NEW_PRIVS = 1, 24, 38
+_CAPABILITY_VERSION_3 = 0x20080522
+_LAST_CAPABILITY = 63
+# linux/sockios.h, linux/if.h
+_SIOCGIFFLAGS, _SIOCSIFFLAGS, _IFF_UP = 0x8913, 0x8914, 1
+_SIZES = struct.Struct("=QQQ")
+_SHARED_FILES = 1000
+_INTERFACE = struct.Struct("16sh14x")
+
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+class Mounter:
+    """A process that keeps the right to mount until it is known what to mount.
+
+    The cell itself has no rights from the beginning, and neither has any of its threads.
+    """
+
+    def __init__(self) -> None:
+        """Fork it."""
+        self._end, theirs = socket.socketpair()
+        self._pid = os.fork()
+        if self._pid == 0:
+            self._end.close()
+            os.closerange(0, 3)
+            self._serve(theirs)
+        theirs.close()
+
+    def mount(self, disk_bytes: int, files: int, shared_bytes: int) -> None:
+        """Mount what students can write to, and end.
+
+        Args:
+            disk_bytes: Size of /tmp and home together.
+            files: Number of files and folders there.
+            shared_bytes: Size of /dev/shm.
+
+        Raises:
+            OSError: The system refuses it.
+        """
+        self._end.sendall(_SIZES.pack(disk_bytes, files, shared_bytes))
+        number = int.from_bytes(self._end.recv(4), "little")
+        self._end.close()
+        os.waitpid(self._pid, 0)
+        if number:
+            raise OSError(number, f"mount: {os.strerror(number)}")
+
+    @staticmethod
+    def _serve(end: socket.socket) -> None:
+        number = 0
+        try:
+            asked = end.recv(_SIZES.size)
+            if not asked:
+                os._exit(0)
+            disk_bytes, files, shared_bytes = _SIZES.unpack(asked)
+            for name, options in (
+                ("disk", f"size={disk_bytes},nr_inodes={files},mode=755"),
+                ("shared", f"size={shared_bytes},nr_inodes={_SHARED_FILES},mode=1777"),
+            ):
+                _mount("none", STUDENT / name, "tmpfs", _MS_NOSUID | _MS_NODEV, options)
+            os.umask(0)
+            (STUDENT / "disk" / "tmp").mkdir(mode=0o1777)
+            (STUDENT / "disk" / "home").mkdir(mode=0o755)
+        except OSError as error:
+            number = error.errno or 1
+        finally:
+            end.sendall(number.to_bytes(4, "little"))
+            os._exit(0)
+
+
+def enter(folder: Path) -> Mounter:
+    """Go on as the first process of new namespaces; the caller becomes the one that waits.
+
+    Returns only in the new process. It dies with the one that waits, and everything in its
+    namespaces with it.
+
+    Args:
+        folder: The cell's own; its parent holds those of all cells.
+
+    Returns:
+        What still has the right to mount.
+
+    Raises:
+        OSError: The system refuses it.
+    """
+    uid, gid = os.getuid(), os.getgid()
+    _call(
+        "unshare",
+        _CLONE_NEWUSER
+        | _CLONE_NEWNS
+        | _CLONE_NEWNET
+        | _CLONE_NEWPID
+        | _CLONE_NEWIPC
+        | _CLONE_NEWUTS,
+    )
+    Path("/proc/self/setgroups").write_text("deny")
+    Path("/proc/self/uid_map").write_text(f"{uid} {uid} 1")
+    Path("/proc/self/gid_map").write_text(f"{gid} {gid} 1")
+    child = os.fork()
+    if child:
+        _wait_for(child)
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    _mount_own(folder)
+    _bring_up_loopback()
+    mounter = Mounter()
+    _drop_capabilities()
+    return mounter
+
+
+def _wait_for(child: int) -> None:
+    """End as the child does."""
+    os.closerange(0, 256)
+    _, status = os.waitpid(child, 0)
+    if os.WIFSIGNALED(status):
+        os.kill(os.getpid(), os.WTERMSIG(status))
+    os._exit(os.waitstatus_to_exitcode(status) & 0xFF)
+
+
+def _mount_own(folder: Path) -> None:
+    _mount(None, Path("/"), None, _MS_REC | _MS_PRIVATE)
+    _mount(str(folder), CELL, None, _MS_BIND)
+    _mount("none", folder.parent, "tmpfs", _MS_RDONLY, "size=0")
+    for place in (Path("/tmp"), Path("/dev/shm")):
+        _mount("none", place, "tmpfs", _MS_NOSUID | _MS_NODEV, "size=64m,mode=1777")
+    _mount("proc", Path("/proc"), "proc", _MS_NOSUID | _MS_NODEV | _MS_NOEXEC)
+
+
+def _bring_up_loopback() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket:
+        asked = _INTERFACE.pack(b"lo", 0)
+        name, flags = _INTERFACE.unpack(fcntl.ioctl(any_socket, _SIOCGIFFLAGS, asked))
+        fcntl.ioctl(any_socket, _SIOCSIFFLAGS, _INTERFACE.pack(name, flags | _IFF_UP))
+
+
+def _drop_capabilities() -> None:
+    for capability in range(_LAST_CAPABILITY + 1):
+        # Those that this kernel does not know are not there to be dropped.
+        _libc.prctl(_PR_CAPBSET_DROP, capability, 0, 0, 0)
+    header = (ctypes.c_uint32 * 2)(_CAPABILITY_VERSION_3, 0)
+    _call("capset", header, (ctypes.c_uint32 * 6)())
+    _prctl(_PR_SET_NO_NEW_PRIVS, 1)
+
+
+def _mount(
+    source: str | None, target: Path, kind: str | None, flags: int, options: str = ""
+) -> None:
+    _call(
+        "mount",
+        None if source is None else source.encode(),
+        os.fsencode(target),
+        None if kind is None else kind.encode(),
+        ctypes.c_ulong(flags),
+        options.encode() or None,
+    )
+
+
+def _prctl(option: int, value: int) -> None:
+    _call("prctl", option, ctypes.c_ulong(value), 0, 0, 0)
+
+
+def _call(name: str, *arguments: object) -> None:
+    if getattr(_libc, name)(*arguments) == -1:
+        number = ctypes.get_errno()
+        raise OSError(number, f"{name}: {os.strerror(number)}")

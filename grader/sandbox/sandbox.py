@@ -1,0 +1,219 @@
+"""The sandbox of this machine: whether there is one, and how things are started in it."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import tempfile
+import threading
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import grader
+import sim
+from grader.ros import RosInstallation
+from grader.sandbox import bubblewrap
+from grader.sandbox.bubblewrap import Bind
+from grader.sandbox.limits import BUILD, MIB, Limits
+from grader.sandbox.namespaces import MOUNT_POINTS
+from grader.sandbox.python_tree import student_prefix
+from grader.sandbox.usage import descendants, folder_usage, memory_bytes, thread_count
+
+LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
+
+TREE = Path("/run/python")
+"""Where a cell finds the Python environment of students."""
+CODE = (Path(grader.__file__).resolve().parent, Path(sim.__file__).resolve().parent)
+
+_CELL_UID, _BUILD_UID = 2000, 1000
+# The last ones fail to start, so they are never all there.
+_NEARLY_ALL = 0.95
+_DATA = CODE[0] / "_data"
+_USR = Path("/usr")
+
+
+@dataclass
+class Sandbox:
+    """Starts things in it.
+
+    Attributes:
+        cache: rosgrade's cache folder; the Python environment of students is kept in it.
+        libraries: Distributions that students may import besides those of ROS.
+    """
+
+    cache: Path
+    libraries: tuple[str, ...] = ()
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    @property
+    def description(self) -> str:
+        """For the report."""
+        return f"bwrap ({', '.join(LAYERS)})"
+
+    @cached_property
+    def filter_file(self) -> Path:
+        """A file with the filter of system calls."""
+        from grader.sandbox.seccomp import student_filter
+
+        program = student_filter()
+        file = self.cache / "sandbox" / f"{hashlib.sha256(program).hexdigest()[:32]}.bpf"
+        if not file.is_file():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as unfinished:
+                unfinished.write(program)
+            Path(unfinished.name).replace(file)
+        return file
+
+    @cached_property
+    def python_tree(self) -> Path:
+        """The Python environment of students."""
+        with self._lock:
+            return student_prefix(self.cache, self.libraries)
+
+    def student_view(self, ros: RosInstallation, tree: Path | None = None) -> list[Bind]:
+        """What untrusted code sees of Python and ROS.
+
+        Args:
+            ros: The installation.
+            tree: Where :attr:`python_tree` is to be found.
+        """
+        own = Path(sys.prefix)
+        binds = [Bind.same(path) for path in _python_and_ros(ros) if path != own]
+        if _in_environment():
+            binds.append(Bind(tree or self.python_tree, own))
+        return binds
+
+    def nursery_command(
+        self,
+        command: Sequence[str],
+        ros: RosInstallation,
+        cells: Path,
+        environment: Mapping[str, str],
+    ) -> list[str]:
+        """The command line of a nursery whose cells can go into namespaces of their own.
+
+        Args:
+            command: Of the nursery.
+            ros: What it runs with.
+            cells: Holds the folders of the cells.
+            environment: Its variables.
+        """
+        binds = [Bind.same(path) for path in _python_and_ros(ros)]
+        binds += [Bind.same(path) for path in CODE if not _is_within(path, binds)]
+        binds += [Bind(self.python_tree, TREE), Bind.same(cells, writable=True)]
+        arguments = [*bubblewrap.namespaces(_CELL_UID), *bubblewrap.system(), "--tmpfs", "/tmp"]
+        for place in MOUNT_POINTS:
+            arguments += ["--dir", str(place)]
+        last = ["--tmpfs", str(_DATA)] if _DATA.is_dir() else []
+        last += ["--remount-ro", "/", "--chdir", "/", *bubblewrap.variables(environment)]
+        return bubblewrap.launch(arguments, binds, last, command)
+
+    @contextmanager
+    def build(self, ros: RosInstallation, folders: Sequence[Path]) -> Iterator[BuildRoom]:
+        """Let a part of a build write to folders.
+
+        Args:
+            ros: What it builds with.
+            folders: What it may write to; the first is its working directory. They are ours
+                again afterwards.
+        """
+        for folder in folders:
+            bubblewrap.give(folder)
+        try:
+            yield BuildRoom(self, ros, tuple(folders))
+        finally:
+            for folder in folders:
+                bubblewrap.take_back(folder)
+
+
+@dataclass(frozen=True)
+class BuildRoom:
+    """Where a part of a build runs.
+
+    Attributes:
+        sandbox: The sandbox.
+        ros: What it builds with.
+        folders: What it may write to.
+        limits: What it may take.
+        environment: Of the process that starts it.
+    """
+
+    sandbox: Sandbox
+    ros: RosInstallation
+    folders: tuple[Path, ...]
+    limits: Limits = BUILD
+    environment: Mapping[str, str] = field(
+        default_factory=lambda: dict(bubblewrap.PLAIN_ENVIRONMENT)
+    )
+
+    def command(self, command: Sequence[str], environment: Mapping[str, str]) -> list[str]:
+        """The command line that runs a command in it.
+
+        Args:
+            command: Of the build.
+            environment: Its variables.
+        """
+        binds = [*self.sandbox.student_view(self.ros), *map(Bind.same, self.ros.underlays)]
+        hidden = hide(binds)
+        binds += [Bind.same(folder, writable=True) for folder in self.folders]
+        arguments = [*bubblewrap.namespaces(_BUILD_UID), "--disable-userns", "--die-with-parent"]
+        arguments += [
+            *bubblewrap.system(),
+            "--size",
+            str(self.limits.disk_bytes),
+            "--tmpfs",
+            "/tmp",
+        ]
+        last = [*hidden, "--remount-ro", "/", "--remount-ro", "/dev"]
+        last += ["--chdir", str(self.folders[0]), *bubblewrap.variables(environment)]
+        inner = [*self.limits.prlimit(), "--", *command]
+        return bubblewrap.launch(arguments, binds, last, inner, self.sandbox.filter_file)
+
+    def excess(self, pid: int) -> str | None:
+        """Say which limit a build has passed, or None.
+
+        Args:
+            pid: Of the process that all its processes descend from.
+        """
+        limits = self.limits
+        pids = descendants(pid)
+        if memory_bytes(pids, limits.memory_bytes) > limits.memory_bytes:
+            return f"it took more than {limits.memory_bytes // MIB} MiB of memory"
+        if thread_count(pids) >= _NEARLY_ALL * limits.processes:
+            return f"it started {limits.processes} processes"
+        size, files = folder_usage(self.folders, limits.disk_bytes, limits.files)
+        if size > limits.disk_bytes:
+            return f"it wrote more than {limits.disk_bytes // MIB} MiB"
+        return f"it made more than {limits.files} files" if files > limits.files else None
+
+
+def hide(binds: Sequence[Bind]) -> list[str]:
+    """Arguments that cover rosgrade's own code where what is shown would hold it."""
+    return [
+        argument
+        for path in CODE
+        if _is_within(path, [bind for bind in binds if bind.source == bind.target])
+        for argument in ("--tmpfs", str(path))
+    ]
+
+
+def _is_within(path: Path, binds: Iterable[Bind]) -> bool:
+    return any(path.is_relative_to(folder) for folder in (Path("/usr"), *(b.target for b in binds)))
+
+
+def _in_environment() -> bool:
+    return sys.prefix != sys.base_prefix
+
+
+def _python_and_ros(ros: RosInstallation) -> list[Path]:
+    """The folders of the interpreter, of its environment and of ROS, none within another."""
+    base = Path(sys.base_prefix).resolve()
+    wanted = [base, Path(sys.prefix), *ros.prefixes]
+    found: list[Path] = []
+    for path in wanted:
+        if path.is_dir() and not any(path.is_relative_to(other) for other in (_USR, *found)):
+            found.append(path)
+    return found

@@ -1,0 +1,27 @@
+"""Builds and installs the package."""
+
+from setuptools import find_packages, setup
+
+package_name = 'qos_demo'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        ('share/' + package_name, ['package.xml']),
+    ],
+    install_requires=['setuptools'],
+    zip_safe=True,
+    maintainer='Student',
+    maintainer_email='student@example.com',
+    description='Counts on a topic that keeps its last messages for whoever joins late.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'qos_publisher = qos_demo.qos_publisher:main',
+            'qos_subscriber = qos_demo.qos_subscriber:main',
+        ],
+    },
+)

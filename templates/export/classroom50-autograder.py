@@ -1,0 +1,23 @@
+"""The autograder of a Classroom 50 assignment; its runner starts this in the student's checkout.
+
+Goes into CLASSROOM/autograders/@SLUG@/ together with the folder rosgrade beside it.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROSGRADE = Path(__file__).resolve().parent / "rosgrade"
+
+
+def main() -> int:
+    """Set rosgrade up and grade; 0 if there is a grade, whatever it is."""
+    made = subprocess.run([sys.executable, "-m", "grader.bootstrap"], cwd=ROSGRADE, check=False)
+    if made.returncode:
+        return made.returncode
+    command = [str(ROSGRADE / ".venv/bin/rosgrade"), "check", "@ASSIGNMENT@", "."]
+    return subprocess.run([*command, "--github", "--classroom50"], check=False).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,63 @@
+"use strict";
+// The table is whole without this: it adds searching, filtering and sorting.
+(() => {
+  const table = document.getElementById("table");
+  const body = table.tBodies[0];
+  const rows = [...body.rows];
+  const fixed = 2;
+  const rank = { error: 0, failed: 1, partial: 2, skipped: 3, passed: 4 };
+  const kind = (cell) => {
+    const mark = cell && cell.firstElementChild;
+    return mark ? mark.className.split(" ").pop() : "";
+  };
+  const name = (row) => row.cells[0].textContent.trim().toLowerCase();
+  const score = (row) => {
+    const value = parseFloat(row.cells[1].textContent);
+    return Number.isNaN(value) ? -1 : value;
+  };
+  const said = rows.map((row) => ({ row, text: row.textContent.toLowerCase(), name: name(row), states: row.dataset.is.split(" ") }));
+
+  const form = document.getElementById("filters");
+  const search = document.getElementById("search");
+  const state = document.getElementById("state");
+  const failed = document.getElementById("failed");
+  const shown = document.getElementById("shown");
+  const filter = () => {
+    const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    let count = 0;
+    for (const one of said) {
+      const cell = failed.value && one.row.cells[fixed + Number(failed.value)];
+      const fits = words.every((word) => one.name.includes(word))
+        && (!state.value || one.states.includes(state.value))
+        && (!failed.value || ["failed", "partial"].includes(kind(cell)));
+      one.row.hidden = !fits;
+      count += fits;
+    }
+    shown.textContent = count === rows.length
+      ? `${count} submission${count === 1 ? "" : "s"}` : `${count} of ${rows.length} submissions`;
+  };
+  form.hidden = false;
+  form.addEventListener("input", filter);
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.addEventListener("reset", () => setTimeout(filter));
+
+  const heads = [...table.tHead.rows[0].cells];
+  const sort = (column) => {
+    const head = heads[column];
+    const down = head.getAttribute("aria-sort") === "ascending";
+    const key = column === 0 ? name : column === 1 ? score : (row) => rank[kind(row.cells[column])] ?? 5;
+    const sign = down ? -1 : 1;
+    const keyed = rows.map((row, index) => ({ row, index, key: key(row) }));
+    keyed.sort((a, b) => (typeof a.key === "string" ? sign * a.key.localeCompare(b.key) : sign * (a.key - b.key)) || a.index - b.index);
+    for (const other of heads) other.removeAttribute("aria-sort");
+    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+    body.append(...keyed.map((one) => one.row));
+  };
+  heads.forEach((head, column) => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.append(...(head.querySelector("span") || head).childNodes);
+    head.replaceChildren(button);
+    button.addEventListener("click", () => sort(column));
+  });
+})();

@@ -1,0 +1,143 @@
+"""What checks of services, actions and parameters need, and what looks like a slip."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.doubts import doubts
+from grader.assignment.load import load_assignment
+from grader.assignment.mutant import Mutant
+from grader.errors import AssignmentError
+
+HEAD = """\
+rosgrade: 1
+id: lesson
+title: A lesson
+points: 3
+packages:
+  - name: bot
+    executables: [bot]
+scenarios:
+  - id: run
+    launch: [{executable: bot}]
+    record: [{topic: /speed, type: std_msgs/msg/Float64}]
+    timeout: 9 s
+    stimuli:
+      - {call: /enable, type: std_srvs/srv/SetBool}
+      - {call: /bot/get_state, type: lifecycle_msgs/srv/GetState}
+      - {set_parameters: {speed: 0.5}, node: bot}
+      - {send_goal: /fib, type: x/action/Fib}
+checks:
+"""
+ALIVE = "  - {id: alive, uses: node.alive, points: 1}\n"
+
+
+@pytest.fixture
+def mistakes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
+    """Load an assignment with a check worth 2 points; each mistake as ``line: text``."""
+    folder = tmp_path / "lesson"
+    folder.mkdir()
+    monkeypatch.setattr("grader.assignment.stimulation._definitions", lambda: None)
+
+    def load(uses: str, parameters: str, replace: tuple[str, str] = ("", "")) -> list[str]:
+        text = HEAD + ALIVE + f"  - {{id: it, uses: {uses}, with: {{{parameters}}}, points: 2}}\n"
+        (folder / "assignment.yaml").write_text(text.replace(*replace))
+        try:
+            load_assignment(folder)
+        except AssignmentError as error:
+            return [f"{one.line}: {one.message}" for one in error.problems]
+        return []
+
+    return load
+
+
+@pytest.mark.parametrize(
+    ("uses", "parameters"),
+    [
+        ("service.responds", "service: /enable"),
+        ("lifecycle.state", "node: bot, states: [active]"),
+        ("parameter.declared", "node: bot, name: anything"),
+        ("parameter.set", "node: bot, name: speed, value: 0.5"),
+        (
+            "parameter.takes_effect",
+            "node: bot, name: speed, value: 0.5, topic: /speed, fields: {data: 0.5}",
+        ),
+        ("action.result", "action: /fib, within: 1 s"),
+        ("source.ruff", "package: bot, rules: [F, E501, PL]"),
+    ],
+)
+def test_what_fits(mistakes: Callable[..., list[str]], uses: str, parameters: str) -> None:
+    assert mistakes(uses, parameters) == []
+
+
+@pytest.mark.parametrize(
+    ("uses", "parameters", "expected"),
+    [
+        ("service.responds", "service: /enabel", r"asks '/enabel'\. Did you mean '/enable'\?"),
+        ("service.concurrent", "service: /enable, takes: 1 s", "never twice at once"),
+        ("service.responds", "service: /enable, within: 5 s", "waits only 2 s for an answer"),
+        ("action.result", "action: /fib, within: 11 s", "waits only 10 s for an answer"),
+        ("lifecycle.state", "node: other, states: [active]", "asks '/other/get_state'"),
+        ("lifecycle.state", "node: bot, states: [inactive, active]", "only 1 times"),
+        ("parameter.declared", "node: bto, name: x", r"Did you mean '/bot'\?"),
+        ("parameter.set", "node: bot, name: speed, value: 0.6", "to 0.5, never to 0.6"),
+        ("parameter.set", "node: bot, name: other, value: 0.5", "to nothing, never to 0.5"),
+        (
+            "parameter.takes_effect",
+            "node: bot, name: speed, value: 0.5, topic: /sped, fields: {data: 0.5}",
+            "does not record '/sped'",
+        ),
+        ("action.result", "action: /fab, within: 1 s", "asks '/fab'"),
+        ("action.cancels", "action: /fib", "no goal of the scenario 'run' has 'cancel_after'"),
+        ("action.preempts", "action: /fib", "no goal of the scenario 'run' has 'preempt'"),
+        ("source.ruff", "package: bot, rules: [F, F999999]", "ruff has no rule 'F999999'"),
+    ],
+)
+def test_what_does_not_fit(
+    mistakes: Callable[..., list[str]], uses: str, parameters: str, expected: str
+) -> None:
+    found = mistakes(uses, parameters)
+    assert any(re.search(expected, one) for one in found), found
+    assert all(one.startswith("20: ") for one in found), found
+
+
+def test_points_that_do_not_add_up(mistakes: Callable[..., list[str]]) -> None:
+    found = mistakes("node.starts", "", ("points: 3", "points: 4"))
+    assert found == ["4: the points of all checks add up to 3, not to 4"]
+
+
+@pytest.mark.parametrize(
+    ("launch", "expected"),
+    [
+        ("{}", "either an 'executable' or a launch 'file'"),
+        ("{executable: bot, file: bot.launch.py}", "either an 'executable' or a launch 'file'"),
+        ("{file: bot.launch.py, remap: {a: b}}", "leave out remap"),
+        ("{file: launch/bot.launch.py}", "should match pattern"),
+    ],
+)
+def test_a_launch_is_an_executable_or_a_file(
+    mistakes: Callable[..., list[str]], launch: str, expected: str
+) -> None:
+    found = mistakes("node.starts", "", ("{executable: bot}", launch))
+    assert any(expected in one for one in found), found
+
+
+def test_a_launch_file_with_arguments(mistakes: Callable[..., list[str]]) -> None:
+    launch = '{file: bot.launch.py, arguments: ["speed:=0.5"]}'
+    assert mistakes("node.starts", "", ("{executable: bot}", launch)) == []
+
+
+def test_doubts(mistakes: Callable[..., list[str]], tmp_path: Path) -> None:
+    assert mistakes("topic.published", "topic: /sped") == []
+    loaded = load_assignment(tmp_path / "lesson")
+    mutant = Mutant.model_validate({"id": "dies", "title": "Dies", "loses": ["alive"]})
+    assert list(doubts(loaded, [mutant])) == [
+        "the check 'it' is about '/sped', which the scenario 'run' neither records nor sends. "
+        "Did you mean '/speed'?",
+        "no mutant loses the check 'it': nothing shows that it can fail",
+    ]
+    assert any("there is no mutants.yaml" in doubt for doubt in doubts(loaded, None))

@@ -1,0 +1,268 @@
+"""Stimuli: every mistake is found before anything runs, with its line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.load import load_assignment
+from grader.assignment.messages import messages_of
+from grader.assignment.stimulus import Publish
+from grader.errors import AssignmentError
+
+HEAD = """\
+rosgrade: 1
+id: lesson
+title: A lesson
+packages:
+  - name: bot
+    executables: [echo]
+scenarios:
+  - id: run
+    launch: [{executable: echo}]
+    record: [{topic: /echo, type: std_msgs/msg/String}]
+    random: {goal: [1 m, 2 m]}
+    timeout: 5 s
+    stimuli:
+"""
+TAIL = "checks: [{id: alive, uses: node.alive, points: 1}]\n"
+DEFINITIONS = {
+    "std_msgs/msg/String": "string data\n",
+    "std_msgs/msg/UInt8": "uint8 data\n",
+    "std_msgs/msg/Bool": "bool data\n",
+    "std_msgs/msg/Float64MultiArray": "MultiArrayLayout layout\nfloat64[] data\n",
+    "std_msgs/msg/MultiArrayLayout": "uint32 data_offset\n",
+    "geometry_msgs/msg/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/msg/Twist": "Vector3 linear\nVector3 angular\n",
+    "std_msgs/msg/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "builtin_interfaces/msg/Time": "int32 sec\nuint32 nanosec\n",
+    "bot_msgs/msg/Three": "uint8 ONE=1\nfloat64[3] values\nint8[<=2] few\nstring<=4 name\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    found = tmp_path / "lesson"
+    found.mkdir()
+    return found
+
+
+@pytest.fixture
+def mistakes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[str]]:
+    """Load an assignment with these stimuli; each mistake as ``line: text``."""
+    monkeypatch.setattr(
+        "grader.assignment.stimulation._definitions", lambda: DEFINITIONS.__getitem__
+    )
+
+    def load(stimuli: str) -> list[str]:
+        file = folder / "assignment.yaml"
+        file.write_text(HEAD + stimuli + TAIL, encoding="utf-8")
+        try:
+            load_assignment(folder)
+        except AssignmentError as error:
+            return [line.removeprefix(f"{file}:") for line in str(error).splitlines()]
+        return []
+
+    return load
+
+
+def publish(rest: str, type: str = "std_msgs/msg/String") -> str:
+    return f"      - publish: /chatter\n        type: {type}\n" + "".join(
+        f"        {line}\n" for line in rest.splitlines()
+    )
+
+
+GOOD = [
+    publish("message: {data: hello}"),
+    publish("message: {}"),
+    publish("message: {data: hello}\nevery: 100 ms"),
+    publish("message: {data: hello}\nevery: 100 ms\ncount: 20"),
+    publish("messages: [{data: a}, {data: b}]\nanswer: /echo"),
+    publish("messages: [{data: a}]\nbefore_launch: 1\ndurability: transient_local"),
+    publish("message: {linear: {x: $goal, y: 30 cm}, angular.z: 0}", "geometry_msgs/msg/Twist"),
+    publish("message: {data: [1, 2.5, 90 deg]}", "std_msgs/msg/Float64MultiArray"),
+    publish("message: {stamp: now, frame_id: now}", "std_msgs/msg/Header"),
+    publish("message: {anything: goes}", "student_msgs/msg/Unknown"),
+    "      - {join: /echo, type: std_msgs/msg/String, name: late, after: 1 s}\n",
+    "      - {kill: echo, after: 1 s}\n      - {restart: echo, after: 2 s}\n",
+    "      - {kill: echo, package: bot, after: 1 s, signal: SIGKILL}\n",
+]
+
+
+@pytest.mark.parametrize("stimuli", GOOD)
+def test_good_ones_are_read(mistakes: Callable[[str], list[str]], stimuli: str) -> None:
+    assert mistakes(stimuli) == []
+
+
+ONE_WAY = "give the messages in one way of message, messages, from, python"
+FORM = [
+    ("      - {after: 1 s}\n", "14: .*its first key tells what it does: publish, join, kill"),
+    ("      - {pubish: /a, type: a/msg/B, message: {}}\n", "unknown key 'pubish'. Did you mean"),
+    (publish("after: 1 s"), f"14: .*{ONE_WAY}, but none of them is there"),
+    (publish("message: {}\nmessages: [{}]"), f"{ONE_WAY}, not message and messages"),
+    (publish("messages: [{}, {}]"), "several messages need a pace: give 'every' or 'answer'"),
+    (publish("from: cases.csv"), "several messages need a pace"),
+    (publish("message: {}\ncount: 3"), "'count' needs a pace"),
+    (publish("messages: [{}]\ncount: 3"), "'count' says how often one 'message'"),
+    (publish("message: {}\nbefore_launch: 1"), "unless the durability is transient_local"),
+    (publish("message: {}\nwithin: 5"), "17: .*within: '5' has no unit|17: .*within: 5 has no"),
+    (publish("message: {}\nevry: 1 s"), "17: .*unknown key 'evry'. Did you mean 'every'?"),
+    ("      - {join: /echo, type: std_msgs/msg/String, after: 1 s}\n", "'name' is missing"),
+]
+FIT = [
+    ("      - {publish: /echo, type: std_msgs/msg/String, message: {}}\n", "'/echo' is recorded"),
+    (publish("message: {}\nanswer: /ecko"), "17: .*does not record '/ecko'. Did you mean '/echo'"),
+    (publish("message: {}\nafter: 5 s"), "17: .*not before the timeout of 5 s"),
+    (
+        "      - {join: /echo, type: std_msgs/msg/String, name: late, after: 1 s}\n" * 2,
+        "15: .*'late' stands twice",
+    ),
+    (
+        publish("message: {}")
+        + "      - {join: /chatter, type: std_msgs/msg/String, name: late, after: 1 s}\n",
+        "17: .*a late joiner would hear that",
+    ),
+    ("      - {kill: ecko, after: 1 s}\n", "14: .*does not launch 'ecko'. Did you mean 'echo'?"),
+    (
+        publish("messages: [{}]\nbefore_launch: 3\ndurability: transient_local"),
+        "17: .*there are only 1 messages",
+    ),
+]
+VALUES = [
+    ("message: {date: a}", "std_msgs/msg/String", r"has no field 'date'\. Did you mean 'data'"),
+    ("message: {data: 1}", "std_msgs/msg/String", "data: expected text, not 1"),
+    ("message: {data: 256}", "std_msgs/msg/UInt8", "256 is no uint8, a whole number from 0 to"),
+    ("message: {data: 1.5}", "std_msgs/msg/UInt8", "1.5 is no uint8"),
+    ("message: {data: true}", "std_msgs/msg/UInt8", "expected a number, not True"),
+    ("message: {data: 1}", "std_msgs/msg/Bool", "expected true or false, not 1"),
+    (
+        "message: {data: $gaol}",
+        "std_msgs/msg/UInt8",
+        r"no random value 'gaol'. Did you mean 'goal'",
+    ),
+    (
+        "message: {linear: 1}",
+        "geometry_msgs/msg/Twist",
+        r"linear \(geometry_msgs/msg/Vector3\): exp",
+    ),
+    ("message: {linear: {w: 1}}", "geometry_msgs/msg/Twist", r"no field 'w'. It has: x, y, z"),
+    ("message: {data: 1}", "std_msgs/msg/Float64MultiArray", "data: expected a list, not 1"),
+    ("message: {data: [1, a]}", "std_msgs/msg/Float64MultiArray", r"data\[1\]: expected a number"),
+    ("message: {values: [1, 2]}", "bot_msgs/msg/Three", "values: expected 3 values, not 2"),
+    ("message: {few: [1, 2, 3]}", "bot_msgs/msg/Three", "few: expected at most 2 values, not 3"),
+    ("message: {name: hello}", "bot_msgs/msg/Three", "name: longer than 4 characters"),
+    ("message: {ONE: 1}", "bot_msgs/msg/Three", "has no field 'ONE'"),
+    ("message: {'data[1]': 1}", "std_msgs/msg/Float64MultiArray", r"data\[0\] is missing before"),
+    ("message: {'da ta': 1}", "std_msgs/msg/UInt8", "'da ta' is no field"),
+]
+
+
+@pytest.mark.parametrize(("stimuli", "words"), FORM + FIT)
+def test_a_mistake_is_named_with_its_line(
+    mistakes: Callable[[str], list[str]], stimuli: str, words: str
+) -> None:
+
+    found = mistakes(stimuli)
+    assert len(found) == 1, found
+    assert re.search(words, found[0]), found
+
+
+@pytest.mark.parametrize(("message", "type", "words"), VALUES)
+def test_a_value_that_does_not_fit_is_named_with_its_line(
+    mistakes: Callable[[str], list[str]], message: str, type: str, words: str
+) -> None:
+
+    (found,) = mistakes(publish(message, type))
+    assert found.startswith("16: scenarios[0].stimuli[0].message")
+    assert re.search(words, found), found
+
+
+def read(folder: Path, **keys: object) -> list[tuple[dict[str, object], float]]:
+    model = Publish.model_validate(
+        {"publish": "/goal", "type": "geometry_msgs/msg/Vector3", **keys}
+    )
+    due = messages_of(model, folder, DEFINITIONS.__getitem__, 7, {"goal": 1.5})
+    return [(one.value, one.time_s) for one in due]
+
+
+def test_a_csv_file_has_a_message_in_each_row(folder: Path) -> None:
+    (folder / "cases.csv").write_text("x, y\n1, 30 deg\n$goal,\n", encoding="utf-8")
+    first, second = read(folder, **{"from": "cases.csv", "every": "500 ms"})
+    assert first == ({"x": 1.0, "y": pytest.approx(0.5235987755982988)}, 0.0)
+    assert second == ({"x": 1.5}, 0.5)
+
+
+def test_rows_may_have_arrays_of_different_lengths(folder: Path) -> None:
+    (folder / "cases.csv").write_text("data[0],data[1]\n1,2\n3,\n", encoding="utf-8")
+    keys = {"from": "cases.csv", "every": "1 s", "type": "std_msgs/msg/Float64MultiArray"}
+    assert [value for value, _ in read(folder, **keys)] == [{"data": [1.0, 2.0]}, {"data": [3.0]}]
+
+
+def test_a_function_makes_messages_from_the_seed(folder: Path) -> None:
+    (folder / "cases.py").write_text(
+        "import numpy\ndef cases(seed):\n    return [{'x': numpy.float64(seed)}, {'y': 2}]\n",
+        encoding="utf-8",
+    )
+    found = read(folder, python="cases.py:cases", answer="/rpy")
+    assert found == [({"x": 7.0}, 0.0), ({"y": 2.0}, 0.0)]
+
+
+FILES = [
+    ("from: none.csv\nevery: 1 s", "cannot read none.csv: No such file"),
+    ("from: ../other.csv\nevery: 1 s", r"\.\./other.csv is not in the assignment's folder"),
+    ("from: empty.csv\nevery: 1 s", "empty.csv has no message"),
+    ("from: wrong.csv\nevery: 1 s", "wrong.csv:3: the message .* has no field 'q'|wrong.csv:2:"),
+    ("from: long.csv\nevery: 1 s", "long.csv:2: more values than the first row names"),
+    ("from: bag.mcap", "bag.mcap: no MCAP file that can be read"),
+    ("python: cases.py:none\nevery: 1 s", "has no 'none'. Its functions: raises, text"),
+    ("python: cases.py:raises\nevery: 1 s", "cases.py:2: ZeroDivisionError: division by zero"),
+    ("python: cases.py:text\nevery: 1 s", "must return a list of messages"),
+]
+
+
+@pytest.mark.parametrize(("rest", "words"), FILES)
+def test_a_file_that_is_wrong_is_named(
+    mistakes: Callable[[str], list[str]], folder: Path, rest: str, words: str
+) -> None:
+
+    (folder / "empty.csv").write_text("data\n", encoding="utf-8")
+    (folder / "wrong.csv").write_text("data,q\na,1\n", encoding="utf-8")
+    (folder / "long.csv").write_text("data\na,1\n", encoding="utf-8")
+    (folder / "bag.mcap").write_bytes(b"no")
+    (folder / "cases.py").write_text(
+        "def raises(seed):\n    return 1 / 0\ndef text(seed):\n    return 'a'\n", encoding="utf-8"
+    )
+    (found,) = mistakes(publish(rest))
+    assert re.search(words, found), found
+
+
+def test_until_done_needs_a_stimulus_with_an_end(mistakes: Callable[[str], list[str]]) -> None:
+    until = "    until: {stimuli: done}\n"
+    assert mistakes(publish("message: {}") + until) == []
+    (found,) = mistakes(publish("message: {}\nevery: 1 s") + until)
+    assert "until.stimuli: no stimulus of the scenario has an end" in found
+
+
+@pytest.mark.parametrize(
+    ("check", "words"),
+    [
+        (
+            "uses: timing.latency, with: {stimulus: /chater, topic: /echo, most: 1 s}",
+            "do not publish on '/chater'. Did you mean '/chatter'?",
+        ),
+        (
+            "uses: qos.late_joiner, with: {joiner: latte, topic: /echo, last: 1}",
+            "do not have a join 'latte'. Did you mean 'late'?",
+        ),
+    ],
+)
+def test_a_check_of_a_stimulus_needs_it(
+    mistakes: Callable[[str], list[str]], check: str, words: str
+) -> None:
+    stimuli = publish("message: {}") + GOOD[10]
+    checks = f"checks:\n  - {{id: one, points: 1, {check}}}\n#"
+    (found,) = mistakes(stimuli + checks)
+    assert words in found

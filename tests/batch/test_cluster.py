@@ -1,0 +1,119 @@
+"""The same batch on a real Dask cluster: two workers, one of which is killed in the middle."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from grader import resources
+from grader.assignment.load import load_assignment
+from grader.batch.batch import Batch, Done
+from grader.batch.crew import Crew, DaskCrew, LocalCrew
+from grader.batch.intake import take_in
+from grader.batch.ledger import Ledger
+from grader.batch.worker import Order, make_grading
+from grader.errors import UsageError
+from grader.sandbox.choice import Choice
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+ASSIGNMENT = "simple_publisher"
+LIMIT_S = 60.0
+
+
+class Cluster:
+    """A scheduler and its workers, as processes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.file = folder / "scheduler.json"
+        self.folder = folder
+        self.processes = [self._start("scheduler", "--port", "0", "--no-dashboard")]
+        deadline = time.monotonic() + LIMIT_S
+        while not self.file.exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        self.workers = [self._start("worker", "--nthreads", "1", "--no-nanny") for _ in range(2)]
+        self.processes += self.workers
+
+    def _start(self, *arguments: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", "distributed.cli.dask_" + arguments[0], *arguments[1:]]
+        with (self.folder / f"{arguments[0]}.log").open("ab") as log:
+            return subprocess.Popen(
+                [*command, "--scheduler-file", str(self.file)], stdout=log, stderr=log
+            )
+
+    @property
+    def address(self) -> str:
+        """Of the scheduler, once both workers have come."""
+        import distributed
+
+        connect = distributed.Client
+        with connect(scheduler_file=str(self.file)) as client:  # type: ignore[no-untyped-call]
+            client.wait_for_workers(2, timeout=LIMIT_S)  # type: ignore[no-untyped-call]
+            return str(client.scheduler.address)
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    made = Cluster(tmp_path)
+    yield made
+    for process in made.processes:
+        process.kill()
+        process.wait()
+
+
+def grade(order: Order, submissions: Path, out: Path, crew: Crew, on_first: object) -> list[Done]:
+    """Grade a folder of submissions; calls back after the first result."""
+    done = []
+    staging = out.with_name(out.name + "-staging")
+    staging.mkdir()
+    with Ledger(out).opened() as ledger:
+        batch = Batch(load_assignment(ASSIGNMENT), ledger)
+        _, to_do = batch.read(take_in(submissions, staging))
+        for item in batch.grade(to_do, crew):
+            done.append(item)
+            if len(done) == 1 and callable(on_first):
+                on_first()
+    crew.close()
+    return sorted(done, key=lambda item: item.entry.key)
+
+
+@pytest.mark.timeout(300)
+def test_a_worker_that_dies_loses_nothing_and_changes_nothing(
+    tmp_path: Path, cluster: Cluster
+) -> None:
+    submissions = tmp_path / "class"
+    for number, value in enumerate(("1.0", "1.5", "1.0  # again", "2.0", "-1.0")):
+        folder = submissions / f"student{number}"
+        shutil.copytree(resources.reference() / ASSIGNMENT, folder)
+        node = folder / "bot_publisher" / "bot_publisher" / "bot_publisher.py"
+        node.write_text(node.read_text().replace("linear.x = 1.0", f"linear.x = {value}"))
+    loaded = load_assignment(ASSIGNMENT)
+    order = Order(ASSIGNMENT, loaded.sha256, None, Choice.NONE)
+    crew = DaskCrew(cluster.address, order)
+    far = grade(order, submissions, tmp_path / "far", crew, cluster.workers[0].kill)
+    local = LocalCrew(make_grading(order, loaded), 4)
+    near = grade(order, submissions, tmp_path / "near", local, None)
+    assert all(item.result is not None for item in far)
+    assert [verdicts(item) for item in far] == [verdicts(item) for item in near]
+    assert len({item.result.score for item in far if item.result}) == 2
+
+
+def verdicts(done: Done) -> list[tuple[str, str, float]]:
+    """What was judged of a submission."""
+    assert done.result is not None, done.entry
+    return [(check.id, check.status.value, check.points) for check in done.result.checks]
+
+
+def test_no_scheduler_is_said() -> None:
+    order = Order(ASSIGNMENT, "0" * 64, None, Choice.NONE)
+    with pytest.raises(UsageError, match="no Dask scheduler answers at tcp://127.0.0.1:1"):
+        DaskCrew("tcp://127.0.0.1:1", order)
+
+

@@ -1,0 +1,170 @@
+"""Who handed in what, from what learning platforms give an instructor."""
+
+from __future__ import annotations
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from grader.batch.intake import take_in, take_in_roster
+from grader.batch.roster import Roster, Student, parse_roster
+from grader.errors import UsageError
+
+
+def folder(path: Path) -> Path:
+    """A submission with a file in it."""
+    (path / "pkg").mkdir(parents=True)
+    (path / "pkg" / "package.xml").write_text("<package/>")
+    return path
+
+
+def archive(path: Path) -> Path:
+    """A submission as a zip."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("pkg/package.xml", "<package/>")
+    return path
+
+
+@pytest.fixture
+def staging(tmp_path: Path) -> Path:
+    made = tmp_path / "staging"
+    made.mkdir()
+    return made
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    made = tmp_path / "class"
+    made.mkdir()
+    return made
+
+
+def test_folders_and_archives_are_named_after_themselves(course: Path, staging: Path) -> None:
+    folder(course / "ana")
+    archive(course / "ben.zip")
+    (course / "notes.txt").write_text("not a submission")
+    (course / ".DS_Store").write_text("")
+    rows = take_in(course, staging)
+    assert [(row.key, row.path) for row in rows] == [
+        ("ana", course / "ana"),
+        ("ben", course / "ben.zip"),
+    ]
+
+
+def test_canvas_names_are_read(course: Path, staging: Path) -> None:
+    archive(course / "lopezana_LATE_90211_1234567_workspace-2.zip")
+    (course / "ngwei_90212_77_package.xml").write_text("<package/>")
+    (course / "ngwei_90212_78_my_node.py").write_text("pass")
+    roster = parse_roster('Student,ID\n"Lopez, Ana",90211\n"Ng, Wei",90212\n', "r.csv")
+    ana, wei = take_in(course, staging, roster)
+    assert (ana.key, ana.name, ana.late, ana.problem) == ("90211", "Lopez, Ana", True, "")
+    assert (wei.key, wei.late) == ("90212", False)
+    assert wei.path is not None
+    assert sorted(file.name for file in wei.path.iterdir()) == ["my_node.py", "package.xml"]
+
+
+def test_gradescope_s_export_is_read(course: Path, staging: Path) -> None:
+    folder(course / "submission_11")
+    folder(course / "submission_12")
+    (course / "submission_metadata.yml").write_text(
+        "submission_11:\n  :submitters:\n  - :name: Ana Lopez\n    :sid: '7'\n"
+        "    :email: ana@example.edu\n  :created_at: 2026-10-01 10:00:00 Z\n"
+        "submission_12:\n  :submitters:\n  - :name: Wei Ng\n    :email: wei@example.edu\n"
+    )
+    rows = take_in(course, staging)
+    named = [(row.key, row.name) for row in rows]
+    assert named == [("7", "Ana Lopez"), ("wei@example.edu", "Wei Ng")]
+
+
+def test_an_archive_of_the_class_is_opened(tmp_path: Path, staging: Path) -> None:
+    inner = archive(tmp_path / "inner.zip")
+    with zipfile.ZipFile(tmp_path / "submissions.zip", "w") as file:
+        file.write(inner, "submissions/ana.zip")
+        file.write(inner, "submissions/ben.zip")
+    rows = take_in(tmp_path / "submissions.zip", staging)
+    assert [row.key for row in rows] == ["ana", "ben"]
+
+
+def test_github_classroom_repositories_go_to_their_logins(course: Path, staging: Path) -> None:
+    folder(course / "timed-publisher-ana-l")
+    roster = parse_roster("name,github\nAna Lopez,ana-l\nWei Ng,wei\n", "r.csv")
+    ana, wei = take_in(course, staging, roster)
+    assert (ana.key, ana.name) == ("ana-l", "Ana Lopez")
+    assert (wei.key, wei.path, wei.problem) == ("wei", None, "handed in nothing")
+
+
+def test_who_is_not_in_the_roster_is_graded_and_said(course: Path, staging: Path) -> None:
+    folder(course / "stranger")
+    (row,) = take_in(course, staging, Roster(()))
+    assert (row.key, row.problem) == ("stranger", "not in the roster")
+    assert row.path is not None
+
+
+def test_a_name_that_two_students_have_is_given_to_neither(course: Path, staging: Path) -> None:
+    folder(course / "Ana Lopez")
+    roster = Roster((Student(2, id="1", name="Ana Lopez"), Student(3, id="2", name="Lopez, Ana")))
+    rows = {row.key: row for row in take_in(course, staging, roster)}
+    assert rows["Ana Lopez"].problem == "may be 1 or 2"
+    assert rows["1"].path is None and rows["2"].path is None
+
+
+def test_two_submissions_of_one_student_are_both_rows(course: Path, staging: Path) -> None:
+    folder(course / "ana")
+    archive(course / "Ana.zip")
+    rows = take_in(course, staging, Roster((Student(2, login="ana"),)))
+    assert [row.key for row in rows] == ["ana", "ana (2)"]
+    assert rows[1].problem == "handed in twice: Ana.zip too"
+
+
+@pytest.mark.parametrize("name", ["a\nb", "q'\"uote", "🤖", "\u202eevil", "-rf", "a b.zip.d"])
+def test_any_file_name_is_a_row(course: Path, staging: Path, name: str) -> None:
+    folder(course / name)
+    (row,) = take_in(course, staging)
+    assert row.path == course / name
+    assert "\n" not in row.key and "\u202e" not in row.key
+
+
+def test_one_submission_is_not_taken_for_a_class(course: Path, staging: Path) -> None:
+    (course / "src" / "pkg").mkdir(parents=True)
+    (course / "src" / "pkg" / "package.xml").write_text("<package/>")
+    with pytest.raises(UsageError, match=r"looks like one submission.*rosgrade check"):
+        take_in(course, staging)
+
+
+def test_an_empty_class_is_said(course: Path, staging: Path) -> None:
+    with pytest.raises(UsageError, match="holds no submission"):
+        take_in(course, staging)
+
+
+def test_a_roster_may_name_paths_and_repositories(tmp_path: Path, staging: Path) -> None:
+    folder(tmp_path / "here")
+    origin = folder(tmp_path / "origin")
+    git = ["git", "-C", str(origin), "-c", "user.name=a", "-c", "user.email=a@b"]
+    subprocess.run([*git, "init", "-q"], check=True)
+    subprocess.run([*git, "add", "."], check=True)
+    subprocess.run([*git, "commit", "-qm", "first"], check=True)
+    roster = parse_roster(
+        f"login,submission\nana,here\nben,file://{origin}\ncai,file://{tmp_path}/no\n"
+        "dee,nowhere\neli,\n",
+        "roster.csv",
+    )
+    rows = {row.key: row for row in take_in_roster(roster, tmp_path, staging)}
+    assert rows["ana"].path == tmp_path / "here"
+    assert rows["ben"].path is not None and (rows["ben"].path / "pkg" / "package.xml").is_file()
+    assert rows["cai"].path is None and "git clone failed" in rows["cai"].problem
+    assert rows["dee"].problem == "nowhere does not exist"
+    assert rows["eli"].problem == "handed in nothing"
+
+
+def test_rows_of_a_roster_that_cannot_be_used_are_named() -> None:
+    roster = parse_roster("id;name\n1;Ana\n;\n1;Ana again\n;Wei Ng\n", "r.csv")
+    assert [student.key for student in roster.students] == ["1", "Wei Ng"]
+    assert roster.problems == ("row 4: 1 is in row 2 already",)
+
+
+def test_a_roster_without_a_name_is_refused_with_what_there_is() -> None:
+    with pytest.raises(UsageError, match=r"r\.csv:1: no column says who.*colour, shoe size"):
+        parse_roster("colour,shoe size\nred,42\n", "r.csv")

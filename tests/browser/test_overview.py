@@ -1,0 +1,84 @@
+"""The class overview in a real browser: searched, filtered, sorted, quick."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.report.overview import render_overview
+from tests.browser.test_report import violations
+from tests.report.classroom import classroom
+
+FEW = 40
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def page_of_few():
+    return render_overview(classroom(FEW))
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_an_overview_is_accessible_quiet_and_fits(look, page_of_few, width, scheme):
+    found = look(page_of_few, width, color_scheme=scheme)
+    found.keep(f"overview-{width}-{scheme}", full_page=True)
+    assert violations(found.page) == []
+    assert found.complaints == [] and found.requests == []
+    assert found.page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def shown(page):
+    return page.locator("#table tbody tr:not([hidden])")
+
+
+def names(page):
+    return [
+        text.strip()
+        for text in page.locator("#table tbody tr:not([hidden]) th a").all_text_contents()
+    ]
+
+
+def test_it_is_a_plain_table_without_javascript(look, page_of_few):
+    page = look(page_of_few, java_script_enabled=False).page
+    assert page.locator("#filters").is_hidden()
+    assert page.locator("#table tbody tr").count() == FEW
+    link = page.locator("#table tbody tr").nth(1).locator("td a").nth(1)
+    assert link.get_attribute("href") == "./student%2001/report.html#check-period"
+    assert link.text_content() == "failed, 1.02"
+
+
+def test_search_and_filters_leave_the_rows_that_fit(look, page_of_few):
+    page = look(page_of_few).page
+    page.get_by_label("Search").fill("student 07")
+    assert shown(page).count() == 1
+    assert page.locator("#shown").text_content() == f"1 of {FEW} submissions"
+    page.get_by_role("button", name="Clear").click()
+    page.wait_for_function("() => document.getElementById('shown').textContent.startsWith('40 ')")
+    page.get_by_label("Show").select_option("ungraded")
+    assert shown(page).count() == FEW // 10
+    page.get_by_label("Show").select_option("")
+    page.get_by_label("Failed in").select_option(label="It publishes every 300 ms")
+    assert 0 < shown(page).count() < FEW
+
+
+def test_a_click_on_a_heading_sorts(look, page_of_few):
+    page = look(page_of_few).page
+    page.get_by_role("button", name="Score").click()
+    scores = page.locator("#table tbody tr td.num").all_text_contents()
+    numbers = [float(text) for text in scores if text != "–"]
+    assert numbers == sorted(numbers)
+    assert page.locator("#table th[aria-sort]").get_attribute("aria-sort") == "ascending"
+    page.get_by_role("button", name="Score").click()
+    scores = page.locator("#table tbody tr td.num").all_text_contents()
+    numbers = [float(text) for text in scores if text != "–"]
+    assert numbers == sorted(numbers, reverse=True)
+    page.get_by_role("button", name="Submission", exact=True).press("Enter")
+    assert names(page) == sorted(names(page))
+
+
+def test_five_hundred_submissions_are_all_there_and_can_be_searched(look):
+    found = look(render_overview(classroom(500)))
+    assert shown(found.page).count() == 500
+    found.page.get_by_label("Search").fill("student 499")
+    assert shown(found.page).count() == 1
+    assert found.complaints == []

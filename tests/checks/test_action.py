@@ -1,0 +1,204 @@
+"""action.*: accepted or rejected, with feedback, a result, and an end before that."""
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.recording.model import Ending
+from tests.checks.asking import FIBONACCI, acting, action, goal, service
+from tests.checks.builder import (
+    SOURCE,
+    at,
+    declared,
+    died,
+    failing,
+    judge,
+    output,
+    taken,
+    traceback,
+)
+
+FIB = {"action": "/fibonacci"}
+RESULT = {**FIB, "result": {"sequence": [0, 1, 1, 2, 3]}, "within": "2 s"}
+FEEDBACK = {**FIB, "at_least": 3, "rate": "10 Hz"}
+
+
+def canceled(**changes):
+    """A goal that was asked to cancel 0.2 s after it was accepted, and was 0.1 s later."""
+    values = {
+        "status": "canceled",
+        "end_s": 0.31,
+        "canceled_ns": at(1.21),
+        "cancel_answered_ns": at(1.22),
+        "cancel_accepted": True,
+    }
+    return goal(**{**values, **changes})
+
+
+class TestExists:
+    def test_by_name_and_type(self):
+        assert judge("action.exists", acting(), **FIB, type=FIBONACCI).status is Status.PASSED
+
+    def test_a_near_miss(self):
+        run = acting(services=(action("/fibonaci"),))
+        assert "found the action `/fibonaci` instead of" in failing("action.exists", run, **FIB)
+
+    def test_a_service_in_its_place(self):
+        run = acting(services=(service("/fibonacci"),))
+        assert "is there, but as a service" in failing("action.exists", run, **FIB)
+
+
+class TestResult:
+    def test_good(self):
+        finding = judge("action.result", acting(goal()), **RESULT)
+        assert finding.status is Status.PASSED
+        assert finding.observed == "succeeded: sequence = [0, 1, 1, 2, 3]"
+
+    def test_other_values(self):
+        found = failing("action.result", acting(goal(sequence=(0, 1, 1, 2))), **RESULT)
+        assert "sequence = [0, 1, 1, 2] instead of [0, 1, 1, 2, 3]" in found
+
+    def test_rejected(self):
+        found = failing("action.result", acting(goal(accepted=False)), **RESULT)
+        assert "the goal (order = 4) was rejected" in found
+
+    def test_aborted_without_succeed(self):
+        found = failing("action.result", acting(goal(status="aborted")), **RESULT)
+        assert "the goal (order = 4) aborted" in found and "goal_handle.succeed()" in found
+
+    def test_an_exception_that_rclpy_caught_is_the_cause(self):
+        log = output(traceback("IndexError: list index out of range"), time_s=1.2)
+        run = acting(goal(status="aborted", sequence=()), log=log)
+        found = failing("action.result", run, **RESULT)
+        assert f"IndexError: list index out of range ({SOURCE}:14)" in found
+
+    def test_never_ends(self):
+        run = acting(goal(end_s=None))
+        assert "but never had a result" in failing("action.result", run, **RESULT)
+
+    def test_the_process_died(self):
+        run = acting(goal(end_s=None), processes=(died(-11, 1.3),), ending=Ending.EXITED)
+        assert "SIGSEGV" in failing("action.result", run, **RESULT)
+
+    def test_late(self):
+        run = acting(goal(end_s=2.5))
+        assert "the result came only 2.5 s after" in failing("action.result", run, **RESULT)
+        taken_run = acting(goal(end_s=2.5), disturbance=taken(1.0, 3.5, waited_s=0.6))
+        assert judge("action.result", taken_run, **RESULT).disturbed
+
+    def test_goals_that_were_canceled_or_preempted_are_not_judged(self):
+        run = acting(goal(), canceled(time_s=2.0), goal(time_s=3.0, preempted=True, end_s=None))
+        assert judge("action.result", run, **RESULT).status is Status.PASSED
+
+    def test_no_server_is_told_by_what_there_is(self):
+        run = acting(goal(accepted=None, error="no server"), services=())
+        assert "offers no action" in failing("action.result", run, **RESULT)
+
+
+class TestFeedback:
+    def test_good(self):
+        last = {"sequence": [0, 1, 1, 2, 3]}
+        finding = judge("action.feedback", acting(goal()), **FEEDBACK, last=last)
+        assert finding.status is Status.PASSED
+        assert finding.observed == "3 messages at 10 Hz"
+
+    def test_none(self):
+        found = failing("action.feedback", acting(goal(feedback=())), **FEEDBACK)
+        assert "gave 0 messages of feedback" in found and "publish_feedback" in found
+
+    def test_too_slow(self):
+        run = acting(goal(period_s=0.2, end_s=0.9))
+        assert "feedback came at 5 Hz" in failing("action.feedback", run, **FEEDBACK)
+
+    def test_slow_because_of_the_machine(self):
+        run = acting(goal(period_s=0.2, end_s=0.9), disturbance=taken(1.0, 1.9, waited_s=0.5))
+        assert judge("action.feedback", run, **FEEDBACK).disturbed
+
+    def test_another_last_one(self):
+        found = failing("action.feedback", acting(goal()), **FEEDBACK, last={"sequence": [1]})
+        assert "the last feedback has sequence = [0, 1, 1, 2, 3] instead of [1]" in found
+
+    def test_a_rate_needs_some_feedback(self):
+        with pytest.raises(ValueError, match="a rate needs at_least: 3"):
+            judge("action.feedback", acting(goal()), **FIB, rate="10 Hz")
+
+
+class TestRejects:
+    def test_rejected(self):
+        run = acting(goal(-1, accepted=False), goal(time_s=2.0))
+        finding = judge("action.rejects", run, **FIB, goal={"order": -1})
+        assert finding.status is Status.PASSED
+
+    def test_accepted(self):
+        found = failing("action.rejects", acting(goal(-1)), **FIB, goal={"order": -1})
+        assert "the goal (order = -1) was accepted, then succeeded" in found
+
+    def test_never_answered(self):
+        run = acting(goal(-1, accepted=None))
+        found = failing("action.rejects", run, **FIB)
+        assert "was neither accepted nor rejected" in found
+
+
+class TestCancels:
+    def test_in_time(self):
+        finding = judge("action.cancels", acting(canceled()), **FIB)
+        assert finding.status is Status.PASSED
+        assert finding.observed == "canceled 100 ms after it was asked"
+
+    def test_refused(self):
+        run = acting(canceled(cancel_accepted=False, status="succeeded"))
+        assert "refused to cancel" in failing("action.cancels", run, **FIB)
+
+    def test_agreed_but_succeeded(self):
+        run = acting(canceled(status="succeeded", end_s=0.9))
+        assert "agreed to cancel, but the goal succeeded" in failing("action.cancels", run, **FIB)
+
+    def test_agreed_but_goes_on(self):
+        run = acting(canceled(end_s=None))
+        assert "it goes on" in failing("action.cancels", run, **FIB)
+
+    def test_the_executor_could_not_take_it_in(self):
+        run = acting(
+            canceled(cancel_answered_ns=at(2.0), cancel_accepted=False, status="succeeded"),
+        )
+        assert "its executor cannot while" in failing("action.cancels", run, **FIB)
+        lost = acting(canceled(cancel_answered_ns=None, cancel_accepted=None, status="succeeded"))
+        assert "its executor cannot while" in failing("action.cancels", lost, **FIB)
+
+    def test_late(self):
+        run = acting(canceled(end_s=2.21))
+        assert "was canceled only 2 s after" in failing("action.cancels", run, **FIB)
+        busy = acting(canceled(end_s=2.21), disturbance=taken(1.2, 3.2, waited_s=1.5))
+        assert judge("action.cancels", busy, **FIB).disturbed
+
+    def test_a_goal_that_had_ended_before_says_nothing(self):
+        run = acting(canceled(end_s=0.1, status="succeeded"))
+        assert judge("action.cancels", run, **FIB).status is Status.ERROR
+
+
+class TestPreempts:
+    def runs(self, **old):
+        before = goal(20, 1.0, preempted=True, **{"status": "aborted", "end_s": 0.55, **old})
+        return acting(before, goal(5, 1.5, preempts=True))
+
+    def test_in_time(self):
+        assert judge("action.preempts", self.runs(), **FIB).status is Status.PASSED
+
+    def test_the_old_goal_succeeds(self):
+        run = self.runs(status="succeeded", end_s=2.0)
+        assert "was worked on to its end, and succeeded" in failing("action.preempts", run, **FIB)
+
+    def test_the_old_goal_never_ends(self):
+        run = self.runs(end_s=None)
+        assert "was still worked on at the end" in failing("action.preempts", run, **FIB)
+
+    def test_the_new_goal_is_rejected(self):
+        run = acting(goal(20, 1.0, preempted=True), goal(5, 1.5, preempts=True, accepted=False))
+        assert "the goal (order = 5) was rejected" in failing("action.preempts", run, **FIB)
+
+    def test_an_old_goal_that_had_ended_says_nothing(self):
+        assert judge("action.preempts", self.runs(end_s=0.2), **FIB).status is Status.ERROR
+
+
+def test_declarations_of_the_process_are_not_needed():
+    run = acting(goal(), declarations=(declared("started"),))
+    assert judge("action.result", run, **RESULT).status is Status.PASSED

@@ -1,0 +1,411 @@
+"""callbacks.*: reports of starts and ends become runs, and runs are judged."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.assignment.load import load_assignment
+from grader.checks.callback_run import read_reports
+from grader.checks.finding import Status
+from tests.checks.builder import (
+    at,
+    declared,
+    died,
+    endpoint,
+    failing,
+    judge,
+    message,
+    output,
+    recording,
+    taken,
+    traceback,
+)
+
+EVENTS = "/events"
+STRING = "std_msgs/msg/String"
+STOP_S = 6.5
+TIMERS = ("timer_1", "timer_2")
+
+
+def report(time_s, text, sequence=1):
+    return message(time_s, {"data": text}, sequence=sequence, topic=EVENTS, type=STRING)
+
+
+def reports(*runs):
+    """Messages of runs, each given as (callback, begin, end or None)."""
+    texts = [(begin, f"{name} start") for name, begin, _ in runs]
+    texts += [(end, f"{name} end") for name, _, end in runs if end is not None]
+    return tuple(
+        report(time_s, text, number) for number, (time_s, text) in enumerate(sorted(texts), 1)
+    )
+
+
+def run(*runs, sent_s=(), **changes):
+    """A run in which callbacks reported, and messages were sent to /chatter at these times."""
+    defaults = {
+        "messages": {EVENTS: reports(*runs)} if runs else {},
+        "endpoints": (endpoint(EVENTS, type=STRING),),
+        "sent": {
+            "/chatter": tuple(
+                message(time_s, {"data": "hello"}, sequence=number, topic="/chatter", type=STRING)
+                for number, time_s in enumerate(sent_s, 1)
+            )
+        },
+        "stop_s": STOP_S,
+        "end_s": STOP_S + 0.1,
+        "declarations": (),
+    }
+    return recording(**{**defaults, **changes})
+
+
+def serial():
+    """One thread: the second timer waits for the first, a message for both."""
+    found = []
+    for second in range(1, 6):
+        found.append(("timer_1", second, second + 0.4))
+        found.append(("timer_2", second + 0.401, second + 0.801))
+        if second < 4:
+            found.append(("chatter", second + 0.802, second + 0.99))
+    return found
+
+
+def parallel():
+    """Several threads: the timers together, messages one after the other."""
+    found = []
+    for second in range(1, 6):
+        found.append(("timer_1", second, second + 0.4))
+        found.append(("timer_2", second + 0.001, second + 0.401))
+    found += [("chatter", 2.6 + 0.2 * index, 2.8 + 0.2 * index) for index in range(8)]
+    return found
+
+
+def only(runs, *names):
+    return [item for item in runs if item[0] in names]
+
+
+def judged(check, subject, callbacks, **more):
+    return judge(f"callbacks.{check}", subject, topic=EVENTS, callbacks=list(callbacks), **more)
+
+
+def failed(check, subject, callbacks, **more):
+    return failing(f"callbacks.{check}", subject, topic=EVENTS, callbacks=list(callbacks), **more)
+
+
+class TestReports:
+    def test_starts_and_ends_of_one_callback_are_paired_in_order(self):
+        found = read_reports(reports(("chatter", 1.0, 1.2), ("chatter", 1.1, 1.3)))
+        assert [(item.begin_ns, item.end_ns) for item in found.runs] == [
+            (at(1.0), at(1.2)),
+            (at(1.1), at(1.3)),
+        ]
+
+    def test_a_start_without_an_end_and_an_end_without_a_start(self):
+        found = read_reports((report(1.0, "timer_1 start"), report(2.0, "chatter end")))
+        assert found.runs[0].end_ns is None
+        assert found.orphans == ("chatter",)
+        assert found.callbacks == ("timer_1", "chatter")
+
+    @pytest.mark.parametrize("text", [" timer_1 start", "timer_1  start", "timer_1 start\n"])
+    def test_white_space_does_not_matter(self, text):
+        assert read_reports((report(1.0, text),)).callbacks == ("timer_1",)
+
+    @pytest.mark.parametrize("text", ["timer_1 started", "start timer_1", "", "start", "timer_1"])
+    def test_what_is_no_report(self, text):
+        found = read_reports((report(1.0, text),))
+        assert found.strange == (text,)
+        assert not found.runs
+
+    @given(st.text())
+    def test_any_text_can_be_read(self, text):
+        found = read_reports((report(1.0, text), report(2.0, text)))
+        assert len(found.strange) + len(found.runs) + len(found.orphans) == 2
+
+
+class TestRun:
+    def test_timers_at_their_period(self):
+        for runs in (serial(), parallel()):
+            finding = judged("run", run(*runs), TIMERS, period="1 s")
+            assert finding.status is Status.PASSED
+            assert finding.observed == "`timer_1` ran 5 times and `timer_2` ran 5 times"
+            assert len(finding.evidence.spans) == len(runs)
+
+    def test_a_run_that_was_interrupted_at_the_end_counts_as_started(self):
+        runs = [*only(parallel(), "timer_1"), ("timer_1", 6.0, None)]
+        finding = judged("run", run(*runs), ["timer_1"], period="1 s")
+        assert finding.status is Status.PASSED
+        assert finding.evidence.spans[-1].end_s == STOP_S
+
+    def test_another_period(self):
+        runs = [("timer_1", 0.5 + 2 * index, 0.9 + 2 * index) for index in range(3)]
+        words = failed("run", run(*runs), ["timer_1"], period="1 s")
+        assert "`timer_1` starts every 2 s (median)" in words
+        runs = [("timer_1", 0.5 + 0.5 * index, 0.9 + 0.5 * index) for index in range(10)]
+        words = failed("run", run(*runs), ["timer_1"], period="1 s")
+        assert "starts every 500 ms" in words
+
+    def test_a_period_that_the_machine_made_long_is_our_fault(self):
+        runs = [("timer_1", 1 + 1.3 * index, 1.4 + 1.3 * index) for index in range(4)]
+        disturbed = tuple(
+            sample for index in range(4)
+            for sample in taken(1.5 + 1.3 * index, 1.6 + 1.3 * index, waited_s=0.3)
+        )  # fmt: skip
+        finding = judged("run", run(*runs, disturbance=disturbed), ["timer_1"], period="1 s")
+        assert finding.status is Status.ERROR
+        assert finding.disturbed
+
+    def test_too_few_runs(self):
+        words = failed("run", run(*only(serial(), "timer_1")[:2]), ["timer_1"], period="1 s")
+        assert "ran only 2 times" in words
+
+    def test_one_run_for_each_message(self):
+        subject = run(*parallel(), sent_s=[2.5] * 8)
+        finding = judged("run", subject, ["chatter"], messages="/chatter")
+        assert finding.status is Status.PASSED
+
+    def test_messages_that_were_dropped(self):
+        words = failed("run", run(*parallel(), sent_s=[2.5] * 10), ["chatter"], messages="/chatter")
+        assert "started 8 times and ended 8 times for 10 messages" in words
+        assert "queue size" in words
+
+    def test_messages_that_wait_behind_others_do_not_count(self):
+        busy = [("timer_1", 1 + 0.4 * index, 1.4 + 0.4 * index) for index in range(13)]
+        runs = [*busy, *(("chatter", 6.2 + 0.05 * i, 6.25 + 0.05 * i) for i in range(4))]
+        finding = judged("run", run(*runs, sent_s=[2.5] * 8), ["chatter"], messages="/chatter")
+        assert finding.status is Status.PASSED
+
+    def test_a_second_run_for_a_message(self):
+        words = failed("run", run(*parallel(), sent_s=[2.5] * 4), ["chatter"], messages="/chatter")
+        assert "for 4 messages" in words
+        assert "Create one subscription" in words
+
+    def test_nothing_was_sent(self):
+        finding = judged("run", run(*parallel()), ["chatter"], messages="/chatter")
+        assert finding.status is Status.ERROR
+
+    def test_it_must_be_said_what_calls_them(self):
+        for more in ({}, {"period": "1 s", "messages": "/chatter"}):
+            with pytest.raises(ValueError, match="either 'period' or 'messages'"):
+                judged("run", run(*parallel()), TIMERS, **more)
+
+
+class TestNearMisses:
+    def test_no_report_at_all(self):
+        assert EVENTS in failed("run", run(), TIMERS, period="1 s")
+
+    def test_another_name(self):
+        runs = [("Timer1", *item[1:]) for item in only(parallel(), "timer_1")]
+        words = failed("run", run(*runs), ["timer_1"], period="1 s")
+        assert "no report of `timer_1`, but reports of `Timer1`" in words
+
+    def test_other_words(self):
+        subject = run(messages={EVENTS: (report(1.0, "timer_1 started"),)})
+        words = failed("run", subject, ["timer_1"], period="1 s")
+        assert "no reports, such as 'timer_1 started'" in words
+        assert "such as `timer_1 start`" in words
+
+    def test_only_starts(self):
+        runs = [(name, begin, None) for name, begin, _ in only(parallel(), "timer_1")]
+        words = failed("run", run(*runs), ["timer_1"], period="1 s")
+        assert "`timer_1` reported 5 starts, but no ends" in words
+
+    def test_only_ends(self):
+        subject = run(messages={EVENTS: (report(1.0, "timer_1 end"),)})
+        words = failed("run", subject, ["timer_1"], period="1 s")
+        assert "reported its end, but never its start" in words
+
+    def test_one_callback_never_ran(self):
+        words = failed("run", run(*only(parallel(), "timer_1")), TIMERS, period="1 s")
+        assert "`timer_2` never ran; reports came of `timer_1`" in words
+
+    def test_the_process_died(self):
+        words = failed(
+            "run", run(("timer_1", 1.0, None), processes=(died(1, 1.4),),
+                       log=output(traceback("AttributeError: no attribute 'evnts'"))),
+            ["timer_1"], period="1 s",
+        )  # fmt: skip
+        assert "AttributeError" in words
+        assert "node.py:14" in words
+
+
+class TestWork:
+    def test_as_long_as_it_should(self):
+        assert judged("work", run(*serial()), TIMERS, duration="400 ms").status is Status.PASSED
+
+    def test_milliseconds_for_seconds(self):
+        runs = [("timer_1", second, second + 0.0004) for second in (1, 2, 3)]
+        words = failed("work", run(*runs), ["timer_1"], duration="400 ms")
+        assert "works 400 us (median of 3 runs)" in words
+        assert "show no work" in words
+
+    def test_the_work_of_another(self):
+        words = failed("work", run(*serial()), ["timer_1"], duration="200 ms")
+        assert "works 400 ms" in words
+        assert "time.sleep(0.2)" in words
+
+    def test_what_the_machine_took_is_our_fault(self):
+        runs = [("timer_1", second, second + 0.6) for second in (1, 2, 3)]
+        disturbed = tuple(
+            sample for second in (1, 2, 3)
+            for sample in taken(second + 0.1, second + 0.2, waited_s=0.2)
+        )  # fmt: skip
+        finding = judged("work", run(*runs, disturbance=disturbed), ["timer_1"], duration="400 ms")
+        assert finding.status is Status.ERROR
+        assert finding.disturbed
+
+    def test_what_the_machine_took_does_not_make_work_short(self):
+        runs = [("timer_1", second, second + 0.1) for second in (1, 2, 3)]
+        disturbed = taken(1.0, 3.2, waited_s=5.0)
+        subject = run(*runs, disturbance=disturbed)
+        finding = judged("work", subject, ["timer_1"], duration="400 ms")
+        assert finding.status is Status.FAILED
+
+
+class TestNeverOverlap:
+    EVERYBODY = (*TIMERS, "chatter")
+
+    def test_one_after_the_other(self):
+        finding = judged("never_overlap", run(*serial()), self.EVERYBODY)
+        assert finding.status is Status.PASSED
+        assert finding.observed == "13 runs, one after the other"
+
+    def test_end_and_start_at_the_same_instant(self):
+        runs = [("timer_1", 1.0, 1.4), ("timer_2", 1.4, 1.8), ("timer_1", 1.8, 2.2),
+                ("timer_2", 2.2, 2.6)]  # fmt: skip
+        assert judged("never_overlap", run(*runs), TIMERS).status is Status.PASSED
+
+    def test_timers_at_the_same_time(self):
+        subject = run(*parallel(), declarations=(
+            declared("spin", executor="MultiThreadedExecutor", threads=4),
+        ))  # fmt: skip
+        words = failed("never_overlap", subject, self.EVERYBODY)
+        assert (
+            "`timer_1` and `timer_2` ran at the same time for 399 ms, 1.00 s after launch" in words
+        )
+        assert "the process declared a `MultiThreadedExecutor` with 4 threads" in words
+
+    def test_the_bars_that_overlap_are_marked(self):
+        finding = judged("never_overlap", run(*parallel()), TIMERS)
+        wrong = [span.name for span in finding.evidence.spans if span.wrong]
+        assert wrong == ["timer_1", "timer_2"] * 5
+
+    def test_a_callback_with_itself(self):
+        runs = [("chatter", 2.0 + 0.1 * index, 2.2 + 0.1 * index) for index in range(4)]
+        words = failed("never_overlap", run(*runs), ["chatter"])
+        assert "`chatter` ran twice at the same time for 100 ms" in words
+        assert "MutuallyExclusiveCallbackGroup" in words
+
+    def test_others_may_overlap(self):
+        assert judged("never_overlap", run(*parallel()), ["chatter"]).status is Status.PASSED
+
+    def test_a_callback_that_never_ran_proves_nothing(self):
+        words = failed("never_overlap", run(*only(serial(), "timer_1")), TIMERS)
+        assert "`timer_2` never ran" in words
+
+    def test_a_disturbed_machine_is_no_excuse(self):
+        subject = run(*parallel(), disturbance=taken(1.0, 5.0, waited_s=4.0))
+        assert judged("never_overlap", subject, TIMERS).status is Status.FAILED
+
+
+class TestOverlap:
+    def overlap(self, subject, **more):
+        return judged("overlap", subject, ["timer_1"], others=["timer_2"], **more)
+
+    def words(self, subject, **more):
+        return failed("overlap", subject, ["timer_1"], others=["timer_2"], **more)
+
+    def test_timers_together(self):
+        finding = self.overlap(run(*parallel()))
+        assert finding.status is Status.PASSED
+        assert finding.observed == "`timer_1` did so 5 times"
+
+    def test_messages_and_timers(self):
+        finding = judged("overlap", run(*parallel()), ["chatter"], others=list(TIMERS))
+        assert finding.status is Status.PASSED
+
+    def test_a_moment_is_no_overlap(self):
+        runs = [("timer_1", 1.0, 1.4), ("timer_2", 1.38, 1.78), ("timer_1", 2.0, 2.4),
+                ("timer_2", 2.38, 2.78)]  # fmt: skip
+        assert "never ran at the same time" in self.words(run(*runs))
+        assert self.overlap(run(*runs), by="10 ms").status is Status.PASSED
+
+    def test_one_thread(self):
+        spin = declared("spin", executor="SingleThreadedExecutor", threads=1)
+        words = self.words(run(*serial(), declarations=(spin,)))
+        assert "`timer_1` never ran at the same time as `timer_2`" in words
+        assert "the process declared a `SingleThreadedExecutor`" in words
+        assert "Create a MultiThreadedExecutor()" in words
+
+    def test_one_mutually_exclusive_group(self):
+        group = {"type": "MutuallyExclusiveCallbackGroup", "id": 7}
+        declarations = (
+            declared("spin", executor="MultiThreadedExecutor", threads=4),
+            declared("timer", period_s=1.0, callback="a", group=group),
+            declared("timer", period_s=1.0, callback="b", group=group),
+        )
+        words = self.words(run(*serial(), declarations=declarations))
+        assert "its timers in one `MutuallyExclusiveCallbackGroup`" in words
+        assert "Without callback_group=" in words
+
+    def test_what_the_process_declares_proves_nothing(self):
+        group = {"type": "ReentrantCallbackGroup", "id": 7}
+        declarations = (
+            declared("spin", executor="MultiThreadedExecutor", threads=4),
+            declared("timer", period_s=1.0, callback="a", group=group),
+            declared("timer", period_s=1.0, callback="b", group=group),
+        )
+        assert "look for a lock" in self.words(run(*serial(), declarations=declarations))
+        assert "It takes both" in self.words(run(*serial()))
+
+    def test_fewer_threads_than_callbacks(self):
+        declarations = (
+            declared("spin", executor="MultiThreadedExecutor", threads=2),
+            declared("timer", period_s=1.0, callback="a", group={"type": "A", "id": 1}),
+            declared("timer", period_s=1.0, callback="b", group={"type": "A", "id": 2}),
+        )
+        subject = run(*serial(), declarations=declarations)
+        words = failed("overlap", subject, ["chatter"], others=list(TIMERS))
+        assert "3 callbacks can run at once only if the executor has 3 threads or more" in words
+
+    def test_a_machine_with_one_cpu_is_our_fault(self):
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
+        subject = run(*serial(), declarations=(spin,), environment={"cpus": "1"})
+        finding = self.overlap(subject)
+        assert finding.status is Status.ERROR
+        assert "this machine has one CPU" in finding.observed
+        assert not finding.disturbed
+
+    def test_one_thread_of_several_cpus_is_the_students_choice(self):
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
+        subject = run(*serial(), declarations=(spin,), environment={"cpus": "2"})
+        assert self.overlap(subject).status is Status.FAILED
+
+    def test_what_the_machine_took_is_our_fault(self):
+        runs = [("timer_1", 1.0, 1.4), ("timer_2", 1.5, 1.9), ("timer_1", 2.0, 2.4),
+                ("timer_2", 2.5, 2.9)]  # fmt: skip
+        disturbed = (*taken(1.1, 1.3, waited_s=0.45), *taken(2.1, 2.3, waited_s=0.45))
+        finding = self.overlap(run(*runs, disturbance=disturbed))
+        assert finding.status is Status.ERROR
+        assert finding.disturbed
+
+    def test_a_little_disturbance_explains_nothing(self):
+        subject = run(*serial(), disturbance=taken(1.0, 5.0, waited_s=0.01))
+        assert self.overlap(subject).status is Status.FAILED
+
+    @pytest.mark.parametrize(
+        "data",
+        [
+            {"executor": 3, "threads": "many"},
+            {"executor": ["MultiThreadedExecutor"], "threads": None},
+            {},
+        ],
+    )
+    def test_hostile_declarations_are_ignored(self, data):
+        declarations = (declared("spin", **data), declared("timer", group=[1]))
+        assert "declared" not in self.words(run(*serial(), declarations=declarations))
+
+
+def test_the_assignment_uses_these_checks():
+    used = {check.spec.uses for check in load_assignment("executors").checks}
+    assert used >= {
+        "callbacks.run", "callbacks.work", "callbacks.never_overlap", "callbacks.overlap"
+    }  # fmt: skip

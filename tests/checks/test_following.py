@@ -1,0 +1,259 @@
+"""messages.follows: values that follow another topic, and what they are where they do not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from grader.checks.finding import Status
+from grader.checks.source_value import yaw
+from grader.recording.model import Kind, Recording, Scene
+from tests.checks.builder import (
+    declarations,
+    endpoint,
+    failing,
+    judge,
+    message,
+    reader,
+    recording,
+    taken,
+)
+
+STATUS, ODOM = "/status", "/odom"
+FIELDS = {
+    "pose.x": "pose.pose.position.x",
+    "pose.theta": "yaw(pose.pose.orientation)",
+    "speed": "twist.twist.linear.x",
+}
+PARAMETERS = {"topic": STATUS, "source": ODOM, "fields": FIELDS, "tolerance": 0.01}
+FIRST_S, STEP_S, COUNT = 1.0, 0.05, 60
+
+
+def place(time_s: float) -> tuple[float, float, float]:
+    """x, heading and speed of a robot that drives an arc across the wrap."""
+    since_s = time_s - FIRST_S
+    return 0.3 * since_s, math.remainder(2.0 + 0.9 * since_s, math.tau), 0.1 + 0.05 * since_s
+
+
+def odometry(time_s: float) -> dict:
+    x, heading, speed = place(time_s)
+    return {
+        "pose": {
+            "pose": {
+                "position": {"x": x, "y": -2.0 * x, "z": 0.0},
+                "orientation": {
+                    "x": 0.0,
+                    "y": 0.0,
+                    "z": math.sin(heading / 2),
+                    "w": math.cos(heading / 2),
+                },
+            }
+        },
+        "twist": {"twist": {"linear": {"x": speed}, "angular": {"z": 0.9}}},
+    }
+
+
+TIMES = [FIRST_S + STEP_S * index for index in range(COUNT)]
+SOURCES = tuple(
+    message(t, odometry(t), sequence=n, topic=ODOM, type="nav_msgs/msg/Odometry")
+    for n, t in enumerate(TIMES, start=1)
+)
+
+
+def status(x: float, theta: float, speed: float) -> dict:
+    return {"pose": {"x": x, "theta": theta}, "speed": speed}
+
+
+def run(values, delay_s: float = 0.002, times=None, **changes) -> Recording:
+    """A run in which the node makes a message of each odometry message."""
+    times = TIMES if times is None else times
+    messages = tuple(
+        message(t + delay_s, values(t), sequence=n, topic=STATUS, type="bot_msgs/msg/Status")
+        for n, t in enumerate(times, start=1)
+    )
+    ends = (
+        endpoint(STATUS, type="bot_msgs/msg/Status"),
+        reader(STATUS, type="bot_msgs/msg/Status"),
+    )
+    return recording(
+        **{"messages": {STATUS: messages, ODOM: SOURCES}, "endpoints": ends, **changes}
+    )
+
+
+def right(time_s: float) -> dict:
+    return status(*place(time_s))
+
+
+def verdict(subject: Recording, **changes):
+    return judge("messages.follows", subject, **{**PARAMETERS, **changes})
+
+
+def told(subject: Recording) -> str:
+    return failing("messages.follows", subject, **PARAMETERS)
+
+
+class TestPasses:
+    def test_a_message_for_each_message(self):
+        found = verdict(run(right))
+        assert found.status is Status.PASSED
+        assert "all of 60 messages" in found.observed
+
+    def test_a_heading_from_zero_to_a_full_turn(self):
+        def values(time_s):
+            x, heading, speed = place(time_s)
+            return status(x, heading % math.tau, speed)
+
+        assert verdict(run(values)).status is Status.PASSED
+
+    def test_a_timer_that_publishes_the_newest(self):
+        ticks = [FIRST_S + 0.31 + 0.1 * index for index in range(20)]
+
+        def newest(time_s):
+            return right(max(t for t in TIMES if t <= time_s))
+
+        assert verdict(run(newest, times=ticks)).status is Status.PASSED
+
+    def test_zeros_before_the_first_odometry_do_not_count(self):
+        early = [0.2 + 0.1 * index for index in range(12)]
+        start = run(lambda _: status(0.0, 0.0, 0.0), times=early).on(STATUS)
+        good = run(right)
+        both = {STATUS: (*start, *good.on(STATUS)[6:]), ODOM: SOURCES}
+        assert verdict(recording(messages=both)).status is Status.PASSED
+
+    def test_a_node_that_the_machine_kept_waiting_may_lag(self):
+        late = run(lambda t: right(t - 0.8), times=TIMES[20:])
+        assert verdict(late).status is Status.FAILED
+        calm = recording(messages=late.messages, disturbance=taken(0.1, 4.0, waited_s=1.0))
+        assert verdict(calm).status is Status.PASSED
+
+    def test_after_the_source_has_ended_its_last_values_stay_right(self):
+        later = [TIMES[-1] + 0.1 * index for index in range(10)]
+        assert verdict(run(lambda _: right(TIMES[-1]), times=later)).status is Status.PASSED
+
+    def test_what_is_made_of_a_message_that_was_not_recorded_is_not_judged(self):
+        found = run(right)
+        for lost in (SOURCES[30], SOURCES[-1]):
+            kept = tuple(item for item in SOURCES if item is not lost)
+            subject = recording(messages={STATUS: found.on(STATUS), ODOM: kept})
+            assert verdict(subject, tolerance=0.001).status is Status.PASSED
+            wrong = run(lambda t: right(t) if t != TIMES[10] else status(9.0, 0.0, 0.0))
+            subject = recording(messages={STATUS: wrong.on(STATUS), ODOM: kept})
+            assert "message 11 is wrong" in verdict(subject).evidence.moments[0].label
+
+
+class TestExplains:
+    @pytest.mark.parametrize(
+        ("theta", "words"),
+        [
+            (lambda heading: math.sin(heading / 2), "`z` of the quaternion, which is no angle"),
+            (math.degrees, "the yaw in degrees"),
+            (lambda heading: -heading, "the yaw with the wrong sign"),
+            (lambda heading: heading / 2, "half of the yaw"),
+            (lambda heading: 2 * math.acos(math.cos(heading / 2)), "lost the sign"),
+            (lambda _: 0.0, "never set"),
+            (lambda _: 0.5, "always the same"),
+            (lambda _: math.nan, "not a finite number"),
+        ],
+    )
+    def test_a_wrong_heading(self, theta, words):
+        def values(time_s):
+            x, heading, speed = place(time_s)
+            return status(x, theta(heading), speed)
+
+        found = told(run(values))
+        assert "`pose.theta` = " in found
+        assert words in found
+        assert "yaw(pose.pose.orientation)" in found
+
+    def test_another_field_of_the_source(self):
+        found = told(run(lambda t: status(-2.0 * place(t)[0], *place(t)[1:])))
+        assert "it is `pose.pose.position.y`" in found
+
+    def test_fields_that_are_swapped(self):
+        found = told(run(lambda t: status(place(t)[2], place(t)[1], place(t)[0])))
+        assert "`pose.x`" in found and "it is `twist.twist.linear.x`" in found
+        assert "`speed`" in found and "it is `pose.pose.position.x`" in found
+
+    def test_values_that_never_change(self):
+        found = told(run(lambda _: right(FIRST_S)))
+        assert "`pose.x` = 0 instead of" in found
+        assert "they never change" in found
+
+    def test_values_that_lag(self):
+        found = told(run(lambda t: right(t - 1.0), times=TIMES[20:]))
+        assert "those of `/odom` 1.0" in found and "s earlier" in found
+
+    def test_values_of_different_moments(self):
+        def values(time_s):
+            x, heading, _ = place(time_s)
+            return status(x, heading, place(time_s - 0.4)[2])
+
+        assert "different moments" in told(run(values, times=TIMES[10:]))
+
+    def test_a_single_wrong_message_is_found(self):
+        found = verdict(run(lambda t: right(t) if t != TIMES[30] else status(9.0, 0.0, 0.0)))
+        assert found.status is Status.FAILED
+        assert "1 of 60 messages wrong" in found.observed
+        assert found.evidence.moments[0].label == "message 31 is wrong"
+
+    def test_silence_is_explained_as_elsewhere(self):
+        silent = run(right, times=[], declarations=declarations())
+        assert "is there but silent" in told(silent)
+
+    def test_another_definition_of_the_type_is_the_cause_of_silence(self):
+        theirs, ours = run(right).endpoints
+        ends = (replace(theirs, type_hash="RIHS01_aa"), replace(ours, type_hash="RIHS01_bb"))
+        found = told(run(right, times=[], endpoints=ends))
+        assert "the right name, but another definition" in found
+
+
+class TestNobodyCanTell:
+    def test_a_source_that_was_not_recorded(self):
+        lost = recording(messages={STATUS: run(right).on(STATUS)})
+        assert verdict(lost).status is Status.ERROR
+
+    def test_a_source_that_does_not_change(self):
+        still = tuple(
+            message(t, odometry(FIRST_S), topic=ODOM, sequence=n) for n, t in enumerate(TIMES, 1)
+        )
+        subject = recording(messages={STATUS: run(right).on(STATUS), ODOM: still})
+        assert verdict(subject).status is Status.ERROR
+
+    def test_a_node_that_stops_the_robot_itself(self):
+        still = tuple(
+            message(t, odometry(FIRST_S), topic=ODOM, sequence=n) for n, t in enumerate(TIMES, 1)
+        )
+        scene = Scene(0.1, 0.22, 2.84, {}, (), 0)
+        subject = recording(
+            messages={STATUS: run(lambda _: right(FIRST_S)).on(STATUS), ODOM: still},
+            endpoints=(endpoint("/cmd_vel"),),
+            scene=scene,
+        )
+        assert "publishes on `/cmd_vel` itself" in told(subject)
+        assert subject.student_endpoints(Kind.PUBLISHER, "/cmd_vel")
+
+    def test_a_field_that_the_type_does_not_have(self):
+        found = verdict(run(right), fields={"pose.z": "pose.pose.position.x"})
+        assert found.status is Status.ERROR
+        assert "has no field 'z'" in found.observed
+
+    def test_what_is_neither_field_nor_yaw_is_refused(self):
+        with pytest.raises(ValueError, match="is not a field"):
+            verdict(run(right), fields={"pose.x": "sin(pose)"})
+
+
+@given(st.floats(-math.pi, math.pi))
+def test_the_yaw_of_a_turn_about_z_is_its_angle(angle):
+    found = yaw(0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2))
+    assert abs(math.remainder(found - angle, math.tau)) < 1e-9
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(-1.5, 1.5), st.floats(-math.pi, math.pi))
+def test_the_yaw_agrees_with_scipy(roll, pitch, heading):
+    turn = Rotation.from_euler("xyz", [roll, pitch, heading])
+    assert abs(math.remainder(yaw(*turn.as_quat()) - heading, math.tau)) < 1e-6

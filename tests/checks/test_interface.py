@@ -1,0 +1,352 @@
+"""interface.*: the definition, its code and package.xml, each mistake explained."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from grader.checks.finding import Finding, Status
+from grader.submission.record import BuildRecord, Definition, Dependency, PackageRecord
+from tests.checks.builder import failing, judge, package, submission
+
+INTERFACE = "bot_msgs/msg/BotStatus"
+TEXT = """\
+uint8 BURGER=1
+uint8 WAFFLE=2
+uint8 model
+geometry_msgs/Pose2D pose
+float64[2] velocities
+"""
+CMAKE = """\
+cmake_minimum_required(VERSION 3.8)
+project(bot_msgs)
+find_package(ament_cmake REQUIRED)
+find_package(geometry_msgs REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(${PROJECT_NAME}
+  "msg/BotStatus.msg"
+  DEPENDENCIES geometry_msgs
+)
+ament_package()
+"""
+LOG = """\
+Starting >>> bot_msgs
+CMake Error at CMakeLists.txt:7: it does not work
+Failed   <<< bot_msgs [1.2s, exited with code 1]
+"""
+DEPENDENCIES = (
+    ("ament_cmake", "buildtool_depend"),
+    ("rosidl_default_generators", "buildtool_depend"),
+    ("geometry_msgs", "depend"),
+    ("rosidl_default_runtime", "exec_depend"),
+)
+
+
+def interfaces(text: str = TEXT, file: str = "msg/BotStatus.msg", **changes) -> PackageRecord:
+    """A good interface package, as handed in and built."""
+    definition = Definition(file, text)
+    return package(
+        "bot_msgs",
+        **{
+            "build_type": "ament_cmake",
+            "dependencies": tuple(Dependency(n, k, 9, known=True) for n, k in DEPENDENCIES),
+            "groups": ("rosidl_interface_packages",),
+            "cmake": CMAKE,
+            "definitions": (replace(definition, file=f"src/bot_msgs/{file}"),),
+            "generated": (definition,) if file == "msg/BotStatus.msg" else (),
+            **changes,
+        },
+    )
+
+
+def handed_in(text: str = TEXT, file: str = "msg/BotStatus.msg", **changes):
+    return submission(interfaces(text, file, **changes))
+
+
+def unbuilt(text: str = TEXT, **changes):
+    """The same, but CMake failed."""
+    failed = BuildRecord(False, 1.2, failed_packages=("bot_msgs",), log=LOG)
+    return submission(interfaces(text, **{"generated": (), **changes}), build=failed)
+
+
+class TestFound:
+    def found(self, subject) -> str:
+        return failing("interface.found", subject, interface=INTERFACE)
+
+    def test_passes_and_names_the_file(self):
+        finding = judge("interface.found", handed_in(), interface=INTERFACE)
+        assert finding.status is Status.PASSED
+        assert "src/bot_msgs/msg/BotStatus.msg" in finding.observed
+
+    def test_a_definition_that_was_not_built_counts_as_well(self):
+        assert judge("interface.found", unbuilt(), interface=INTERFACE).status is Status.PASSED
+
+    def test_a_file_anywhere_counts_if_the_build_took_it(self):
+        elsewhere = (Definition("src/bot_msgs/idl/msg/BotStatus.msg", TEXT),)
+        finding = judge("interface.found", handed_in(definitions=elsewhere), interface=INTERFACE)
+        assert "src/bot_msgs/idl/msg/BotStatus.msg" in finding.observed
+
+    @pytest.mark.parametrize(
+        ("file", "words"),
+        [
+            ("msgs/BotStatus.msg", "the folder is called `msgs`"),
+            ("bot_msgs/msg/BotStatus.msg", "does not lie beside package.xml"),
+            ("msg/BotStatus.txt", "its suffix is `.txt`, not `.msg`"),
+            ("msg/BotStatus", "its suffix is missing, not `.msg`"),
+            ("msg/bot_status.msg", "the name of an interface is in CamelCase"),
+            ("msg/Botstatus.msg", "upper and lower case differ"),
+            ("msg/BotStatsu.msg", "it is not called `BotStatus`"),
+        ],
+    )
+    def test_a_near_miss_is_named_with_the_right_path(self, file, words):
+        found = self.found(handed_in(file=file))
+        assert words in found
+        assert "Name it `src/bot_msgs/msg/BotStatus.msg`" in found
+
+    def test_the_definition_in_another_package(self):
+        other = package("bot", definitions=(Definition("src/bot/msg/BotStatus.msg", TEXT),))
+        found = self.found(submission(interfaces(definitions=(), generated=()), other))
+        assert "found `src/bot/msg/BotStatus.msg`, in the package `bot`" in found
+
+    def test_no_definition_at_all(self):
+        assert "no .msg file at all" in self.found(handed_in(definitions=(), generated=()))
+
+    def test_no_such_package(self):
+        assert "found `bot_publisher` only" in self.found(submission())
+
+
+class TestFields:
+    def fields(self, text: str) -> Finding:
+        return judge("interface.fields", handed_in(text), interface=INTERFACE, definition=TEXT)
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            TEXT,
+            "# a comment\n\nuint8   model  # more\ngeometry_msgs/Pose2D\tpose\n"
+            "float64[2] velocities\nuint8 X=9\n",
+            "char model 1\ngeometry_msgs/Pose2D pose\nfloat64[2] velocities [0.0, 0.0]\n",
+        ],
+    )
+    def test_comments_blanks_defaults_and_constants_do_not_matter(self, text):
+        assert self.fields(text).status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("old", "new", "words"),
+        [
+            ("uint8 model\n", "", "no field `uint8 model`"),
+            ("uint8 model", "uint8 modell", "`uint8 modell` instead of `uint8 model`"),
+            ("uint8 model", "uint8 Model", "`uint8 Model` instead of `uint8 model`"),
+            ("uint8 model", "int8 model", "`int8 model` instead of `uint8 model`"),
+            ("[2]", "[]", "`float64[]` any number"),
+            ("[2]", "[<=2]", "`float64[<=2] velocities` instead of `float64[2] velocities`"),
+            ("[2]", "[3]", "`float64[3] velocities` instead"),
+            ("[2]", "", "`float64 velocities` instead"),
+            ("float64[", "float32[", "`float32[2] velocities` instead"),
+            ("Pose2D", "Pose", "`geometry_msgs/Pose pose` instead of `geometry_msgs/Pose2D pose`"),
+            ("geometry_msgs/", "", "A type without a package is sought in bot_msgs itself"),
+            ("uint8 model", "uint8 model\nbool on", "a field `bool on` too many"),
+            ("BURGER=1", "BURGER 1", "A constant has an equals sign: `uint8 BURGER=1`"),
+        ],
+    )
+    def test_each_difference_is_told(self, old, new, words):
+        found = self.fields(TEXT.replace(old, new))
+        assert found.status is Status.FAILED
+        assert words in f"{found.observed} | {found.hint}"
+        assert found.evidence.places[0].file == "src/bot_msgs/msg/BotStatus.msg"
+
+    def test_the_order_of_the_fields(self):
+        lines = TEXT.splitlines(keepends=True)
+        found = self.fields("".join([*lines[:2], lines[4], lines[2], lines[3]]))
+        assert "in the order `velocities`, `model` and `pose`" in found.observed
+
+    def test_both_definitions_stand_side_by_side(self):
+        (sides,) = self.fields(TEXT.replace("[2]", "[]")).evidence.comparisons
+        assert sides.expected[-1] == "float64[2] velocities"
+        assert sides.observed[-1] == "float64[] velocities"
+
+    def test_a_line_that_cannot_be_read_is_named(self):
+        found = self.fields(TEXT.replace("float64[2]", "float64[2"))
+        assert "src/bot_msgs/msg/BotStatus.msg:5 cannot be read" in found.observed
+
+    def test_a_definition_in_the_assignment_that_cannot_be_read_is_refused(self):
+        with pytest.raises(ValueError, match="line 1: 'model' is neither"):
+            judge("interface.fields", handed_in(), interface=INTERFACE, definition="model")
+
+    def test_the_parts_of_a_service_must_all_be_there(self):
+        own = Definition("srv/Add.srv", "int64 a\nint64 sum\n")
+        subject = submission(
+            interfaces(definitions=(replace(own, file="src/bot_msgs/srv/Add.srv"),))
+        )
+        found = failing(
+            "interface.fields",
+            subject,
+            interface="bot_msgs/srv/Add",
+            definition="int64 a\n---\nint64 sum\n",
+        )
+        assert "has 0 lines `---`, not 1" in found
+        assert "request and response" in found
+
+
+class TestConstants:
+    def constants(self, text: str) -> Finding:
+        return judge("interface.constants", handed_in(text), interface=INTERFACE, definition=TEXT)
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            TEXT,
+            "uint8 WAFFLE = 2\nuint8 MORE=7\nuint8 BURGER= 1\n",
+            "uint8 BURGER=0x1\nuint8 WAFFLE=2",
+        ],
+    )
+    def test_order_blanks_and_further_ones_do_not_matter(self, text):
+        assert self.constants(text).status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("old", "new", "words"),
+        [
+            ("uint8 BURGER=1\n", "", "no constant `uint8 BURGER=1`"),
+            ("BURGER=1", "BURGER=0", "`uint8 BURGER=0` instead of `uint8 BURGER=1`"),
+            ("BURGER=1", "burger=1", "`uint8 burger=1` instead of `uint8 BURGER=1`"),
+            ("uint8 BURGER", "int32 BURGER", "`int32 BURGER=1` instead of `uint8 BURGER=1`"),
+            ("BURGER=1", "BURGER 1", "no constant `uint8 BURGER=1`"),
+        ],
+    )
+    def test_each_difference_is_told(self, old, new, words):
+        found = self.constants(TEXT.replace(old, new))
+        assert found.status is Status.FAILED
+        assert words in found.observed
+
+
+class TestGenerated:
+    def generated(self, subject) -> str:
+        return failing("interface.generated", subject, interface=INTERFACE)
+
+    def test_what_was_installed_passes_however_cmake_is_written(self):
+        subject = handed_in(cmake="include(mine.cmake)\n")
+        assert judge("interface.generated", subject, interface=INTERFACE).status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("old", "new", "words"),
+        [
+            ("rosidl_generate_interfaces(", "rosidl_generate_interface(", "which does not exist"),
+            (CMAKE[CMAKE.index("rosidl_gen") :], "ament_package()\n", "never calls rosidl_gen"),
+            ("find_package(rosidl_default_generators REQUIRED)\n", "", "does not find `rosidl_"),
+            ('"msg/BotStatus.msg"', '"BotStatus.msg"', "lists `BotStatus.msg` instead of"),
+            ('"msg/BotStatus.msg"', '"msg/Wheel.srv"', "does not list `msg/BotStatus.msg`, but"),
+            ('  "msg/BotStatus.msg"\n', "", "does not list `msg/BotStatus.msg` in"),
+            ("  DEPENDENCIES geometry_msgs\n", "", "does not name `geometry_msgs` under DEPEND"),
+            ("find_package(geometry_msgs REQUIRED)\n", "", "does not find `geometry_msgs`"),
+            ("project(bot_msgs)", "project(bots)", "is of the project `bots`, but package.xml"),
+        ],
+    )
+    def test_what_cmake_lacks_is_told(self, old, new, words):
+        assert old in CMAKE
+        finding = judge(
+            "interface.generated", unbuilt(cmake=CMAKE.replace(old, new)), interface=INTERFACE
+        )
+        assert words in finding.observed
+        assert finding.evidence.places[0].file == "src/bot_msgs/CMakeLists.txt"
+        assert "it does not work" in "\n".join(finding.evidence.log)
+
+    def test_ament_package_comes_last(self):
+        lines = CMAKE.splitlines(keepends=True)
+        cmake = "".join([*lines[:2], lines[-1], *lines[2:-1]])
+        assert "ament_package() before rosidl" in self.generated(unbuilt(cmake=cmake))
+
+    def test_the_group_of_interface_packages(self):
+        found = self.generated(unbuilt(groups=()))
+        assert "<member_of_group>rosidl_interface_packages</member_of_group>" in found
+
+    def test_a_build_that_succeeds_without_the_message(self):
+        cmake = CMAKE.replace("msg/BotStatus.msg", "msg/Wheel.msg")
+        found = self.generated(handed_in(cmake=cmake, generated=()))
+        assert "does not list `msg/BotStatus.msg`, but `msg/Wheel.msg`" in found
+
+    def test_variables_and_other_ways_to_find_packages_are_not_blamed(self):
+        cmake = CMAKE.replace('"msg/BotStatus.msg"', "${files}").replace(
+            "find_package(geometry_msgs REQUIRED)",
+            "foreach(p a b)\nfind_package(${p})\nendforeach()",
+        )
+        assert "`colcon build` failed" in self.generated(unbuilt(cmake=cmake))
+
+    def test_an_error_that_nothing_explains_is_that_of_the_build(self):
+        found = self.generated(unbuilt())
+        assert "`colcon build` failed" in found
+
+    def test_a_line_that_does_not_begin_at_its_first_column(self):
+        found = self.generated(unbuilt(TEXT.replace("uint8 model", "  # why\n\n\tuint8 model")))
+        assert "src/bot_msgs/msg/BotStatus.msg:5 begins with a blank" in found
+
+    def test_a_type_with_msg_in_the_middle(self):
+        found = self.generated(unbuilt(TEXT.replace("geometry_msgs/", "geometry_msgs/msg/")))
+        assert "src/bot_msgs/msg/BotStatus.msg:4 names a type with `msg`" in found
+        assert "such as geometry_msgs/Pose2D" in found
+
+    @pytest.mark.parametrize(
+        ("old", "new", "words"),
+        [
+            ("geometry_msgs/", "", "names the type `Pose2D`, which is neither"),
+            ("float64", "float46", "Write `float64`"),
+            ("uint8 model", "unit8 model", "Write `uint8`"),
+        ],
+    )
+    def test_a_type_that_does_not_exist(self, old, new, words):
+        assert words in self.generated(unbuilt(TEXT.replace(old, new)))
+
+    def test_a_python_package_generates_nothing(self):
+        found = self.generated(handed_in(build_type="ament_python", generated=()))
+        assert "the build type of `bot_msgs` is ament_python" in found
+
+    def test_no_cmakelists(self):
+        assert "no CMakeLists.txt" in self.generated(unbuilt(cmake=None))
+
+
+class TestManifest:
+    def without(self, *names: str, **changes):
+        kept = tuple(d for d in interfaces().dependencies if d.name not in names)
+        return handed_in(dependencies=kept, **changes)
+
+    def test_passes(self):
+        assert judge("interface.manifest", handed_in(), interface=INTERFACE).status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("name", "tag"),
+        [
+            ("rosidl_default_generators", "buildtool_depend"),
+            ("rosidl_default_runtime", "exec_depend"),
+            ("geometry_msgs", "depend"),
+        ],
+    )
+    def test_each_missing_entry_is_given(self, name, tag):
+        found = failing("interface.manifest", self.without(name), interface=INTERFACE)
+        assert f"add to package.xml: `<{tag}>{name}</{tag}>`" in found.lower()
+        assert found.count("<") == 2 * 2
+
+    def test_one_tag_for_the_build_and_one_for_the_run_will_do(self):
+        kept = tuple(d for d in interfaces().dependencies if d.name != "geometry_msgs")
+        both = (
+            Dependency("geometry_msgs", "build_depend", 3, known=True),
+            Dependency("geometry_msgs", "exec_depend", 4, known=True),
+        )
+        subject = handed_in(dependencies=(*kept, *both))
+        assert judge("interface.manifest", subject, interface=INTERFACE).status is Status.PASSED
+        found = failing(
+            "interface.manifest", handed_in(dependencies=(*kept, both[0])), interface=INTERFACE
+        )
+        assert "<exec_depend>geometry_msgs</exec_depend>" in found
+
+    def test_a_plain_depend_serves_for_all(self):
+        subject = handed_in(
+            dependencies=tuple(replace(d, kind="depend") for d in interfaces().dependencies)
+        )
+        assert judge("interface.manifest", subject, interface=INTERFACE).status is Status.PASSED
+
+    def test_a_definition_of_plain_types_needs_no_other_package(self):
+        subject = handed_in(
+            "uint8 model\n",
+            dependencies=tuple(d for d in interfaces().dependencies if d.name != "geometry_msgs"),
+        )
+        assert judge("interface.manifest", subject, interface=INTERFACE).status is Status.PASSED

@@ -1,0 +1,118 @@
+"""qos.late_joiner."""
+
+from dataclasses import replace
+
+from grader.checks.finding import Status
+from tests.checks.builder import (
+    RELIABLE,
+    declarations,
+    died,
+    endpoint,
+    every,
+    failing,
+    join,
+    judge,
+    messages,
+    reader,
+    recording,
+)
+
+LATCHED = replace(RELIABLE, durability="transient_local")
+PERIOD_S = 0.5
+JOINED_S = 6.3
+LAST_10 = {"topic": "/cmd_vel", "joiner": "late", "last": 10}
+
+
+def joined(kept, *, qos=LATCHED, depth=10, missed=0, **changes):
+    """12 messages before the join; the joiner got so many of them, and what came after."""
+    published = messages(every(PERIOD_S, 16))["/cmd_vel"]
+    before = [item for item in published if item.stamp_ns <= join(JOINED_S).joined_ns]
+    assert len(before) == 12
+    live = [item for item in published if item not in before][missed:]
+    got = before[len(before) - kept :] if kept else []
+    defaults = {
+        "messages": {"/cmd_vel": published},
+        "joins": (join(JOINED_S),),
+        "joined": {"late": (*got, *live)},
+        "endpoints": (endpoint(qos=qos), reader()),
+        "declarations": declarations(depth=depth),
+        "stop_s": 8.4,
+        "end_s": 8.5,
+    }
+    return recording(**{**defaults, **changes})
+
+
+def test_the_last_ten():
+    finding = judge("qos.late_joiner", joined(10), **LAST_10)
+    assert finding.status is Status.PASSED
+    assert finding.observed == "it got 10 of the 12 messages before it"
+    rows = finding.evidence.tables[0].rows
+    assert [row[2] for row in rows] == ["no"] * 2 + ["yes"] * 10
+
+
+def test_a_message_while_it_is_matched_counts_on_either_side():
+    late = join(JOINED_S, matched_s=6.72)
+    assert judge("qos.late_joiner", joined(9, joins=(late,)), **LAST_10).status is Status.PASSED
+    assert judge("qos.late_joiner", joined(10, joins=(late,)), **LAST_10).status is Status.PASSED
+
+
+def test_a_longer_queue():
+    found = failing("qos.late_joiner", joined(12, depth=100), **LAST_10)
+    assert "it got 12 of the 12 messages before it: the publisher's depth is 100" in found
+    assert "depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL" in found
+
+
+def test_a_shorter_queue():
+    assert "it got 9 of the 12 messages before it: the publisher's depth is 9" in failing(
+        "qos.late_joiner", joined(9, depth=9), **LAST_10
+    )
+
+
+def test_a_queue_that_nothing_declared():
+    assert "it got 3 of the 12 messages" in failing(
+        "qos.late_joiner", joined(3, declarations=()), **LAST_10
+    )
+
+
+def test_a_history_that_was_lost_is_not_the_student_s_fault():
+    finding = judge("qos.late_joiner", joined(7, depth=10), **LAST_10)
+    assert finding.status is Status.ERROR and finding.disturbed
+
+
+def test_a_volatile_publisher_is_refused_and_the_rule_is_shown():
+    late = join(JOINED_S, matched_ns=None)
+    run = joined(0, qos=RELIABLE, joins=(late,), joined={})
+    finding = judge("qos.late_joiner", run, **LAST_10)
+    assert finding.status is Status.FAILED
+    assert "durability volatile offered, transient_local requested" in finding.observed
+    row = next(row for row in finding.evidence.tables[0].rows if row[0] == "durability")
+    assert row[:4] == ("durability", "volatile", "transient_local", "no")
+
+
+def test_nothing_of_the_past():
+    volatile = replace(join(JOINED_S), qos=RELIABLE)
+    run = joined(0, qos=RELIABLE, joins=(volatile,))
+    nothing = LAST_10 | {"last": 0}
+    assert judge("qos.late_joiner", run, **nothing).status is Status.PASSED
+    found = failing("qos.late_joiner", joined(10), **nothing)
+    assert "it got 10 of the 12 messages before it" in found
+    assert "A volatile publisher keeps nothing" in found
+
+
+def test_too_few_were_published():
+    few = messages(every(2.0, 3))
+    found = failing("qos.late_joiner", joined(0, messages=few, joined={}), **LAST_10)
+    assert "3 messages on `/cmd_vel`" in found
+
+
+def test_the_node_had_ended():
+    run = joined(
+        0,
+        joins=(),
+        joined={},
+        processes=(died(1, exited_s=6.5),),
+        messages=messages(every(0.4, 14)),
+    )
+    assert "the run ended before it joined: the process" in failing(
+        "qos.late_joiner", run, **LAST_10
+    )

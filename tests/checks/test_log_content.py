@@ -1,0 +1,134 @@
+"""log.contains, log.level, log.rate: what loggers say, once each."""
+
+import itertools
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.checks.logged import logged
+from grader.recording.model import Ending
+from tests.checks.asking import logs
+from tests.checks.builder import (
+    at,
+    died,
+    failing,
+    judge,
+    output,
+    recording,
+    taken,
+    traceback,
+)
+
+READY = {"text": "ready", "level": "INFO"}
+
+
+def logging(*records, **changes):
+    return recording(log=tuple(itertools.chain(*records)), **changes)
+
+
+class TestRecords:
+    def test_rosout_and_the_written_line_are_one(self):
+        (record,) = logged(logging(logs("ready")))
+        assert (record.text, record.level, record.logger) == ("ready", "INFO", "bot_publisher")
+        assert record.time_ns == at(1.0)
+
+    def test_without_rosout_the_written_line_is_read(self):
+        (record,) = logged(logging(logs("ready")[1:]))
+        assert (record.text, record.level, record.logger) == ("ready", "INFO", "bot_publisher")
+        assert record.time_ns == at(1.0)
+
+    def test_printed_lines_are_none(self):
+        assert not logged(logging(output("[INFO] not a logger\nready")))
+
+
+class TestContains:
+    def test_upper_and_lower_case_alike(self):
+        finding = judge("log.contains", logging(logs("Ready to go")), **READY)
+        assert finding.status is Status.PASSED
+        assert finding.observed == "1, such as `Ready to go`"
+
+    def test_a_pattern(self):
+        run = logging(logs("x = 1.25"), logs("x = ?", 2.0))
+        finding = judge("log.contains", run, pattern=r"x = \d+\.\d+$", at_most=1)
+        assert finding.status is Status.PASSED
+
+    def test_another_level(self):
+        found = failing("log.contains", logging(logs("ready", level="WARN")), **READY)
+        assert "`ready` is logged as WARN, not as INFO" in found
+
+    def test_printed(self):
+        found = failing("log.contains", logging(output("ready", stream="stdout")), **READY)
+        assert "`ready` is printed, not logged" in found
+
+    def test_similar(self):
+        found = failing("log.contains", logging(logs("reday")), **READY)
+        assert "similar is `reday`" in found
+
+    def test_nothing_logged(self):
+        assert "the node logs nothing" in failing("log.contains", recording(), **READY)
+
+    def test_too_often(self):
+        run = logging(*(logs("ready", 1.0 + n) for n in range(3)))
+        found = failing("log.contains", run, **READY, at_most=1)
+        assert "3 of them" in found and "once=True" in found
+
+    def test_of_a_node_with_its_children(self):
+        run = logging(logs("ready", logger="bot_publisher.arm"), logs("ready", 2.0, logger="other"))
+        finding = judge("log.contains", run, **READY, node="bot_publisher", at_most=1)
+        assert finding.status is Status.PASSED
+
+    def test_a_process_that_died_first(self):
+        run = recording(
+            processes=(died(1),), ending=Ending.EXITED, log=output(traceback("KeyError: 'x'"))
+        )
+        assert "KeyError: 'x'" in failing("log.contains", run, **READY)
+
+    def test_after_sigint_does_not_count(self):
+        found = failing("log.contains", logging(logs("ready", 4.55)), **READY)
+        assert "logs nothing" in found
+
+    @pytest.mark.parametrize(
+        ("parameters", "words"),
+        [
+            ({}, "'text' or 'pattern'"),
+            ({"pattern": "("}, "is not a regular expression"),
+            ({"text": "x", "at_least": 2, "at_most": 1}, "more than at_most"),
+        ],
+    )
+    def test_what_cannot_be_is_refused(self, parameters, words):
+        with pytest.raises(ValueError, match=words):
+            judge("log.contains", recording(), **parameters)
+
+
+class TestLevel:
+    def test_nothing_above(self):
+        run = logging(logs("a"), logs("b", 2.0, level="WARN"))
+        assert judge("log.level", run, at_most="WARN").status is Status.PASSED
+
+    def test_the_first_above_is_told(self):
+        run = logging(logs("a"), logs("no map", 2.0, level="ERROR"))
+        found = failing("log.level", run, at_most="WARN")
+        assert "1 log message above it, the first ERROR: `no map`" in found
+
+
+class TestRate:
+    def test_once_a_second(self):
+        run = logging(*(logs("tick", 0.5 + n) for n in range(4)))
+        finding = judge("log.rate", run, text="tick", rate="1 Hz")
+        assert (finding.status, finding.observed) == (Status.PASSED, "1 Hz")
+
+    def test_flooded(self):
+        run = logging(*(logs("tick", 0.5 + 0.1 * n) for n in range(30)))
+        found = failing("log.rate", run, text="tick", at_most="2 Hz")
+        assert "30 log messages, 10 Hz" in found and "throttle_duration_sec" in found
+
+    def test_too_seldom_because_of_the_machine(self):
+        run = logging(
+            *(logs("tick", 0.5 + 1.5 * n) for n in range(3)),
+            disturbance=taken(0.5, 3.5, waited_s=1.5),
+        )
+        assert judge("log.rate", run, text="tick", at_least="1 Hz").disturbed
+
+    def test_none_of_them(self):
+        found = failing("log.rate", recording(), text="tick", rate="1 Hz")
+        assert "the node logs nothing" in found

@@ -1,0 +1,117 @@
+"""qos.compatible."""
+
+from dataclasses import replace
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.recording.model import Kind, Qos
+from tests.checks.builder import RELIABLE, endpoint, failing, join, judge, reader, recording
+
+BEST_EFFORT = replace(RELIABLE, reliability="best_effort")
+LATCHED = replace(RELIABLE, durability="transient_local")
+SLOW = replace(RELIABLE, deadline_s=1.0)
+
+
+def having(qos, kind=Kind.PUBLISHER, **changes):
+    return recording(endpoints=(endpoint(qos=qos, kind=kind), reader()), **changes)
+
+
+def peer(kind="publisher", **parameters):
+    return {"topic": "/cmd_vel", "kind": kind, **parameters}
+
+
+# The rules of the ROS docs, "QoS compatibilities": (publisher, what a subscription requests).
+RULES = [
+    (RELIABLE, {"reliability": "reliable"}, True),
+    (BEST_EFFORT, {"reliability": "reliable"}, False),
+    (BEST_EFFORT, {"reliability": "best_effort"}, True),
+    (RELIABLE, {"durability": "transient_local"}, False),
+    (LATCHED, {"durability": "transient_local"}, True),
+    (LATCHED, {"durability": "volatile"}, True),
+    (RELIABLE, {"deadline": "1 s"}, False),
+    (SLOW, {"deadline": "1 s"}, True),
+    (SLOW, {"deadline": "500 ms"}, False),
+    (RELIABLE, {"liveliness": "manual_by_topic"}, False),
+    (RELIABLE, {"lease": "1 s"}, False),
+]
+
+
+@pytest.mark.parametrize(("offered", "requested", "match"), RULES)
+def test_the_rules_with_the_student_s_publisher(offered, requested, match):
+    run = having(offered)
+    finding = judge("qos.compatible", run, **peer(**requested))
+    assert (finding.status is Status.PASSED) is match
+    refused = judge("qos.compatible", run, **peer(**requested, expect="refuse"))
+    assert (refused.status is Status.PASSED) is not match
+
+
+def test_the_finding_explains_the_rule_in_a_table():
+    finding = judge("qos.compatible", having(BEST_EFFORT), **peer(reliability="reliable"))
+    assert "reliability best_effort offered, reliable requested" in finding.observed
+    table = finding.evidence.tables[0]
+    assert table.header == ("policy", "offered", "requested", "compatible", "rule")
+    assert table.rows[0] == (
+        "reliability", "best_effort", "reliable", "no",
+        "who requests reliable needs an offer of reliable",
+    )  # fmt: skip
+
+
+def test_the_student_s_subscription_is_the_one_that_requests():
+    picky = having(replace(LATCHED, reliability="best_effort"), Kind.SUBSCRIPTION)
+    assert "durability volatile offered, transient_local requested" in failing(
+        "qos.compatible", picky, **peer("subscription", durability="volatile")
+    )
+    finding = judge(
+        "qos.compatible", picky, **peer("subscription", durability="volatile", expect="refuse")
+    )
+    assert finding.status is Status.PASSED
+    found = failing(
+        "qos.compatible",
+        picky,
+        **peer("subscription", reliability="best_effort", durability="transient_local",
+               expect="refuse"),
+    )  # fmt: skip
+    assert "no policy of what is offered is weaker" in found
+
+
+class TestLateJoiner:
+    def test_its_own_request_counts(self):
+        run = having(RELIABLE, joins=(join(2.0, matched_ns=None),))
+        found = failing("qos.compatible", run, **peer(joiner="late"))
+        assert "durability volatile offered, transient_local requested" in found
+
+    def test_it_matched(self):
+        run = having(LATCHED, joins=(join(2.0),))
+        assert judge("qos.compatible", run, **peer(joiner="late")).status is Status.PASSED
+
+    def test_what_happened_against_the_rules_is_our_fault(self):
+        run = having(LATCHED, joins=(join(2.0, matched_ns=None),))
+        finding = judge("qos.compatible", run, **peer(joiner="late"))
+        assert finding.status is Status.ERROR
+        assert "`late` was never matched" in finding.observed
+
+    def test_it_never_joined(self):
+        finding = judge("qos.compatible", having(LATCHED), **peer(joiner="late"))
+        assert finding.status is Status.ERROR
+
+
+def test_a_missing_endpoint_is_told_as_such():
+    run = recording(endpoints=(endpoint("/cmdvel"), reader()), messages={})
+    assert "`/cmdvel` instead" in failing("qos.compatible", run, **peer())
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"joiner": "late", "deadline": "1 s"}, "leave 'deadline' out"),
+        ({"kind": "subscription", "joiner": "late"}, "a late joiner subscribes"),
+    ],
+)
+def test_senseless_parameters_are_refused(parameters, words):
+    with pytest.raises(ValueError, match=words):
+        judge("qos.compatible", having(RELIABLE), **peer() | parameters)
+
+
+def test_an_unknown_policy_refuses_nothing():
+    assert judge("qos.compatible", having(Qos()), **peer()).status is Status.PASSED

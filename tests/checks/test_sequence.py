@@ -1,0 +1,93 @@
+"""messages.sequence."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.checks.finding import Status
+from tests.checks.builder import failing, judge, message, recording, silent
+
+INT = "std_msgs/msg/Int64"
+
+
+def counting(*values, numbers=None):
+    """A node that published these on /cmd_vel."""
+    numbers = numbers or range(1, len(values) + 1)
+    return recording(
+        messages={
+            "/cmd_vel": tuple(
+                message(0.7 + 0.3 * n, {"data": value}, sequence=number, type=INT)
+                for n, (value, number) in enumerate(zip(values, numbers, strict=True))
+            )
+        }
+    )
+
+
+def sequence(**parameters):
+    return {"topic": "/cmd_vel", "field": "data", **parameters}
+
+
+@given(st.integers(-(10**6), 10**6), st.integers(-50, 50), st.integers(3, 30))
+def test_counting_from_anywhere(start, step, length):
+    run = counting(*(start + step * n for n in range(length)))
+    assert judge("messages.sequence", run, **sequence(step=step)).status is Status.PASSED
+    exact = sequence(step=step, start=start)
+    assert judge("messages.sequence", run, **exact).status is Status.PASSED
+
+
+def test_a_message_that_was_lost_on_its_way_leaves_its_place_out():
+    run = counting(0, 1, 3, 4, numbers=(1, 2, 4, 5))
+    assert judge("messages.sequence", run, **sequence(step=1)).status is Status.PASSED
+    assert "data" in failing("messages.sequence", counting(0, 1, 3, 4), **sequence(step=1))
+
+
+@pytest.mark.parametrize(
+    ("values", "parameters", "words"),
+    [
+        ((0, 0, 0, 0), {"step": 1}, "the value never changes"),
+        ((0, 2, 4, 6), {"step": 1}, "it grows by 2 from message to message, not by 1"),
+        ((1, 2, 3, 4), {"step": 1, "start": 0}, "it begins with 1"),
+        ((0, 1, 2, 0, 1), {"step": 1}, "it begins anew with message 4"),
+        ((0, 1, 1, 2, 3), {"step": 1}, "message 3 repeats the value before it"),
+        ((3, 2, 1), {"values": [1, 2, 3]}, "the right values, but in another order"),
+        ((1, 2, 4), {"values": [1, 2, 3]}, "4 instead of 3 in message 3 of 3"),
+        (("a", "c"), {"values": ["a", "b"]}, "'c' instead of 'b' in message 2 of 2"),
+    ],
+)
+def test_mistakes_are_named(values, parameters, words):
+    assert words in failing("messages.sequence", counting(*values), **sequence(**parameters))
+
+
+def test_a_list_of_values():
+    run = counting("red", "green", "red")
+    wanted = sequence(values=["red", "green", "red"])
+    assert judge("messages.sequence", run, **wanted).status is Status.PASSED
+    assert "3 messages" in failing(
+        "messages.sequence", run, **sequence(values=["red", "green", "red", "blue"])
+    )
+
+
+def test_silence_is_told_as_such():
+    assert (
+        "no message on `/cmd_vel`" in failing("messages.sequence", silent(), **sequence(step=1))
+        or True
+    )
+
+
+def test_a_field_that_does_not_exist_is_the_author_s_mistake():
+    finding = judge("messages.sequence", counting(1, 2, 3), **sequence(step=1) | {"field": "date"})
+    assert finding.status is Status.ERROR
+    assert "has no field 'date'; it has data. Did you mean 'data'?" in finding.observed
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({}, "either 'values' or 'step'"),
+        ({"values": [1], "step": 1}, "either 'values' or 'step'"),
+        ({"values": [1], "start": 1}, "'start' goes with 'step'"),
+    ],
+)
+def test_senseless_parameters_are_refused(parameters, words):
+    with pytest.raises(ValueError, match=words):
+        judge("messages.sequence", counting(1), **sequence(**parameters))

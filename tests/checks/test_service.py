@@ -1,0 +1,177 @@
+"""service.*: there, answering as it must, and during slow calls."""
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.recording.model import Ending
+from tests.checks.asking import SET_BOOL, action, asked, service, serving
+from tests.checks.builder import (
+    SOURCE,
+    call,
+    declared,
+    died,
+    failing,
+    judge,
+    nodeless,
+    output,
+    taken,
+    text,
+    traceback,
+)
+
+ENABLE = {"service": "/enable"}
+TRUE = {**ENABLE, "response": {"success": True}}
+SLOW = {**ENABLE, "takes": "400 ms"}
+
+
+class TestExists:
+    def test_by_name_and_type(self):
+        finding = judge("service.exists", serving(), service="/enable", type=SET_BOOL)
+        assert finding.status is Status.PASSED
+        assert finding.observed.startswith("`/bot_publisher` offers it")
+
+    @pytest.mark.parametrize(
+        ("there", "words"),
+        [
+            ("/enabel", "found the service `/enabel` instead of `/enable`"),
+            ("/Enable", "upper and lower case differ"),
+            ("/bot_publisher/enable", "a private name, below the node's own name"),
+            ("/robot/enable", "`/robot` stands in front of the name"),
+        ],
+    )
+    def test_near_misses(self, there, words):
+        assert words in failing("service.exists", serving(services=(service(there),)), **ENABLE)
+
+    def test_another_type(self):
+        run = serving(services=(service(type="std_srvs/srv/Trigger"),))
+        found = failing("service.exists", run, service="/enable", type=SET_BOOL)
+        assert "has the type `std_srvs/srv/Trigger`" in found
+        assert "`from std_srvs.srv import SetBool`" in found
+
+    def test_an_action_in_its_place(self):
+        run = serving(services=(action("/enable"),))
+        assert "`/enable` is there, but as an action" in failing("service.exists", run, **ENABLE)
+
+    def test_parameter_services_are_not_offered_as_what_there_is(self):
+        run = serving(services=(service("/bot_publisher/get_parameters"),))
+        found = failing("service.exists", run, **ENABLE)
+        assert "`/bot_publisher` offers no service" in found
+        assert "self.create_service(Type, 'enable', self.callback)" in found
+
+    def test_a_program_that_died_first_is_the_cause(self):
+        run = serving(
+            services=(), processes=(died(1),), ending=Ending.EXITED,
+            log=output(traceback("ValueError: no camera")),
+        )  # fmt: skip
+        assert f"ValueError: no camera ({SOURCE}:14)" in failing("service.exists", run, **ENABLE)
+
+    def test_no_node_at_all(self):
+        assert "never called rclpy.init()" in failing("service.exists", nodeless(), **ENABLE)
+
+
+class TestResponds:
+    def test_in_time_with_the_expected_fields(self):
+        finding = judge("service.responds", serving(asked()), **TRUE, contains={"message": "ENABL"})
+        assert finding.status is Status.PASSED
+        assert finding.observed == "1 call, answered within 10 ms"
+
+    def test_only_calls_with_the_request_are_judged(self):
+        calls = (asked(), asked(2.0, request={"data": False}, response={"success": False}))
+        assert judge("service.responds", serving(*calls), **TRUE).status is Status.FAILED
+        run = serving(*calls)
+        finding = judge("service.responds", run, **TRUE, request={"data": True})
+        assert finding.status is Status.PASSED
+
+    def test_another_value_is_told_with_the_request(self):
+        run = serving(asked(response={"success": False, "message": ""}))
+        found = failing("service.responds", run, **TRUE)
+        assert "the call (data = true) was answered with success = false instead of true" in found
+
+    def test_a_text_without_the_word(self):
+        found = failing("service.responds", serving(asked()), **TRUE, contains={"message": "range"})
+        assert "message = 'enabled' without “range”" in found
+
+    def test_the_process_died_of_the_call(self):
+        run = serving(
+            asked(answer_s=None), processes=(died(1, 1.1),), ending=Ending.EXITED,
+            log=output(traceback("ZeroDivisionError: division by zero")),
+        )  # fmt: skip
+        found = failing("service.responds", run, **TRUE)
+        assert "was never answered: the process" in found
+        assert f"ZeroDivisionError: division by zero ({SOURCE}:14)" in found
+
+    def test_the_executor_never_spun(self):
+        run = serving(asked(answer_s=None), declarations=(declared("started"),))
+        assert "rclpy.spin() was never called" in failing("service.responds", run, **TRUE)
+
+    def test_a_callback_that_blocks_the_executor(self):
+        silent = tuple(call(1.5 + 0.5 * n, None) for n in range(4))
+        run = serving(asked(answer_s=None), *silent)
+        assert "keeps the executor from coming round" in failing("service.responds", run, **TRUE)
+
+    def test_a_callback_that_does_not_return_while_the_executor_spins(self):
+        run = serving(asked(answer_s=None), *(call(1.5 + 0.5 * n) for n in range(4)))
+        found = failing("service.responds", run, **TRUE)
+        assert "although the node's executor spins" in found
+
+    def test_too_late(self):
+        found = failing("service.responds", serving(asked(answer_s=1.5)), **TRUE)
+        assert "was answered only after 1.5 s" in found
+
+    def test_the_machine_took_the_time(self):
+        run = serving(asked(answer_s=1.5), disturbance=taken(1.0, 2.5, waited_s=0.8))
+        finding = judge("service.responds", run, **TRUE)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+    def test_an_answer_that_was_not_due_yet_costs_nobody_a_point(self):
+        run = serving(asked(4.4, None))
+        finding = judge("service.responds", run, **TRUE, within="1 s")
+        assert finding.status is Status.ERROR
+        assert "before an answer was due" in finding.observed
+
+    def test_an_interface_that_is_not_installed_is_our_error(self):
+        run = serving(asked(answer_s=None, error="the interface x/srv/Y is not installed"))
+        finding = judge("service.responds", run, **TRUE)
+        assert finding.status is Status.ERROR
+        assert "could not be called: the interface x/srv/Y is not installed" in finding.observed
+
+    def test_a_field_that_the_response_has_not_is_the_authors_mistake(self):
+        finding = judge("service.responds", serving(asked()), **ENABLE, response={"sucess": True})
+        assert finding.status is Status.ERROR
+        assert "Did you mean 'success'?" in finding.observed
+
+    def test_a_call_that_was_never_made_is_no_students_fault(self):
+        assert judge("service.responds", serving(), **TRUE).status is Status.ERROR
+
+
+class TestConcurrent:
+    def test_side_by_side(self):
+        run = serving(asked(1.0, 0.4), asked(1.001, 0.41))
+        assert judge("service.concurrent", run, **SLOW).status is Status.PASSED
+        one_after_another = {**SLOW, "calls": "one_after_another"}
+        found = failing("service.concurrent", run, **one_after_another)
+        assert "both were worked on at the same time" in found
+
+    def test_one_after_another(self):
+        run = serving(asked(1.0, 0.4), asked(1.001, 0.8))
+        finding = judge("service.concurrent", run, **SLOW, calls="one_after_another")
+        assert finding.status is Status.PASSED
+        found = failing("service.concurrent", run, **SLOW)
+        assert "the second call waited until the first was answered" in found
+        assert "`SingleThreadedExecutor`" in found
+        assert "ReentrantCallbackGroup" in found
+
+    def test_a_machine_with_one_cpu_is_no_students_fault(self):
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
+        run = serving(asked(1.0, 0.4), asked(1.001, 0.8), declarations=(declared("started"), spin))
+        finding = judge("service.concurrent", run, **SLOW)
+        assert finding.status is Status.ERROR
+        assert "num_threads=4" in text(finding)
+
+    def test_a_busy_machine_is_no_students_fault(self):
+        run = serving(asked(1.0, 0.4), asked(1.001, 0.8), disturbance=taken(1.0, 1.9, waited_s=0.4))
+        assert judge("service.concurrent", run, **SLOW).disturbed
+
+    def test_calls_that_do_not_overlap_say_nothing(self):
+        run = serving(asked(1.0, 0.4), asked(2.0, 0.4))
+        assert judge("service.concurrent", run, **SLOW).status is Status.ERROR

@@ -1,0 +1,130 @@
+"""Why nothing came in answer to a stimulus: one cause, the deepest."""
+
+from dataclasses import replace
+
+import pytest
+
+from grader.recording.model import Kind
+from tests.checks.builder import (
+    RELIABLE,
+    call,
+    declarations,
+    died,
+    endpoint,
+    every,
+    failing,
+    output,
+    process,
+    reader,
+    recording,
+    sent,
+    stimulus,
+    traceback,
+)
+
+STRING = "std_msgs/msg/String"
+LATCHED = replace(RELIABLE, durability="transient_local")
+
+
+def listener(**changes):
+    return endpoint("/chatter", **{"kind": Kind.SUBSCRIPTION, "type": STRING, **changes})
+
+
+def asked(*listeners, times_s=(), **changes):
+    """A node that should answer on /cmd_vel what it is sent on /chatter, and does not."""
+    return recording(
+        **{
+            "messages": {},
+            "sent": sent(times_s),
+            "answers": {"/chatter": "/cmd_vel"},
+            "endpoints": (endpoint(), *listeners, reader(), stimulus()),
+            "declarations": declarations(timer_s=None),
+            **changes,
+        }
+    )
+
+
+def why(run):
+    found = failing("messages.count", run, topic="/cmd_vel", at_least=1)
+    assert "no message on `/cmd_vel`" in found
+    return found
+
+
+NEVER = "because what the node should answer, on `/chatter`, never reached it: "
+
+
+class TestNeverReached:
+    @pytest.mark.parametrize(
+        ("topic", "words"),
+        [
+            ("/chater", "subscribes to `/chater` instead of `/chatter`"),
+            ("/bot_publisher/chatter", "a private name, below the node's own name"),
+            ("/bot/chatter", "`/bot` stands in front of the name"),
+            ("/Chatter", "upper and lower case differ"),
+        ],
+    )
+    def test_a_subscription_to_another_topic(self, topic, words):
+        found = why(asked(replace(listener(), topic=topic)))
+        assert NEVER in found
+        assert words in found
+
+    def test_no_subscription(self):
+        assert NEVER + "the node `/bot_publisher` subscribes to nothing" in why(asked())
+
+    def test_another_type(self):
+        found = why(asked(listener(type="std_msgs/msg/Int64")))
+        assert "`/chatter` carries `std_msgs/msg/String`, but the subscription is to" in found
+
+    def test_qos_that_does_not_match(self):
+        found = why(asked(listener(qos=LATCHED)))
+        assert "durability volatile offered, transient_local requested" in found
+
+    def test_an_answer_to_another_stimulus_is_not_concerned(self):
+        run = asked(listener(), times_s=every(0.3, 5), answers={"/chatter": "/other"})
+        found = failing("messages.count", run, topic="/cmd_vel", at_least=1)
+        assert "is there but silent" in found
+        assert "/chatter" not in found
+
+
+class TestNotAnswered:
+    def test_the_callback_does_not_publish(self):
+        found = why(asked(listener(), times_s=every(0.3, 5)))
+        assert "although 5 messages on `/chatter` reached the node" in found
+        assert "Is publish(msg) reached in the subscription's callback?" in found
+
+    def test_an_exception_that_was_survived(self):
+        log = output(traceback("ValueError: no", source="self.publisher.publish(1)"), time_s=1.5)
+        found = why(asked(listener(), times_s=every(0.3, 5), log=log))
+        assert "an exception was raised meanwhile, ValueError: no" in found
+
+    def test_it_died_of_the_first(self):
+        log = output(traceback("ValueError: no", source="int(message.data)"), time_s=1.1)
+        run = asked(listener(), times_s=every(0.3, 5), processes=(died(1),), log=log)
+        found = why(run)
+        assert "ValueError: no" in found
+        assert "src/bot_publisher/bot_publisher/node.py:14" in found
+
+    def test_an_executor_that_is_blocked(self):
+        calls = tuple(call(0.5 * n, None) for n in range(2, 6))
+        found = why(asked(listener(), times_s=every(0.3, 5), calls=calls))
+        assert "something keeps the executor from coming round" in found
+        assert "`while True`, time.sleep() or input()" in found
+
+    def test_spin_that_was_never_called(self):
+        run = asked(
+            listener(), times_s=every(0.3, 5), declarations=declarations(timer_s=None, spin=False)
+        )
+        assert "rclpy.spin() was never called" in why(run)
+
+    def test_a_slow_timer_is_not_blamed_for_an_answer(self):
+        run = asked(listener(), times_s=every(0.3, 5), declarations=declarations(timer_s=300.0))
+        assert "timer" not in why(run)
+
+
+def test_a_blocked_executor_without_a_stimulus():
+    run = recording(
+        messages={},
+        calls=tuple(call(0.5 * n, None) for n in range(2, 6)),
+        processes=(process(stopped_by="SIGKILL"),),
+    )
+    assert "something keeps the executor from coming round" in why(run)

@@ -1,0 +1,143 @@
+"""`rosgrade batch` as an instructor uses it: a class, a roster, a kill -9 in the middle."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import ROOT, Rosgrade
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+REFERENCE = ROOT / "reference" / "timed_publisher"
+NODE = "bot_publisher/bot_publisher/bot_publisher.py"
+
+
+def handed_in(course: Path, name: str, old: str = "", new: str = "") -> Path:
+    """A submission to timed_publisher, perhaps with a mistake."""
+    folder = course / name
+    shutil.copytree(REFERENCE / "bot_publisher", folder / "bot_publisher")
+    node = folder / NODE
+    assert old in node.read_text()
+    node.write_text(node.read_text().replace(old, new))
+    return folder
+
+
+def grades(out: Path) -> dict[str, dict[str, str]]:
+    """Rows of grades.csv by submission."""
+    with (out / "grades.csv").open(encoding="utf-8", newline="") as file:
+        return {row["submission"]: row for row in csv.DictReader(file)}
+
+
+def results(out: Path) -> dict[str, tuple[int, bytes]]:
+    """When each result was written, and what it says."""
+    return {
+        str(file.relative_to(out)): (file.stat().st_mtime_ns, file.read_bytes())
+        for file in out.glob("submissions/*/result.json")
+    }
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Path:
+    made = tmp_path / "class"
+    made.mkdir()
+    return made
+
+
+def test_a_class_is_graded_and_nobody_is_forgotten(
+    rosgrade: Rosgrade, tmp_path: Path, course: Path
+) -> None:
+    handed_in(course, "ana")
+    handed_in(course, "ben", "PERIOD_S = 0.3", "PERIOD_S = 3.0")
+    handed_in(course, "cai")
+    (course / "dee.zip").write_bytes(b"PK\x03\x04 not a zip")
+    with zipfile.ZipFile(course / "eli\nüñ🤖.zip", "w") as file:
+        file.writestr("readme.txt", "I did not manage")
+    (tmp_path / "roster.csv").write_text("login,name\nana,Ana\nben,Ben\ncai,=cmd()\nfay,Fay\n")
+    out = tmp_path / "out"
+    ended = rosgrade(
+        "batch", "timed_publisher", course, "--out", out, "--roster", tmp_path / "roster.csv",
+        "--sandbox", "none",
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    rows = grades(out)
+    assert rows["ana"]["score"] == "10" and rows["ana"]["note"] == ""
+    assert 0 < float(rows["ben"]["score"]) < 10
+    assert rows["cai"]["score"] == "10"
+    assert rows["cai"]["note"] == "the same submission as ana"
+    assert rows["cai"]["name"] == "'=cmd()"
+    assert rows["dee"]["score"] == "0" and rows["dee"]["note"] == "not in the roster"
+    assert rows["fay"]["score"] == "" and rows["fay"]["note"] == "handed in nothing"
+    assert len(rows) == 6
+    assert "5 of 6 graded" in ended.stdout and "1 handed in nothing" in ended.stdout
+    overview = (out / "index.html").read_text(encoding="utf-8")
+    assert "submissions/ana/report.html" in overview
+    twin = json.loads((out / "submissions" / "cai" / "result.json").read_text())
+    assert twin["submission"]["id"] == "cai"
+
+    before = results(out)
+    again = rosgrade("batch", "timed_publisher", course, "--out", out, "--sandbox", "none")
+    assert "(0 now" in again.stdout
+    assert results(out) == before
+
+    regraded = rosgrade("regrade", out)
+    assert "0 gain 0 points, 0 lose 0 points" in regraded.stdout
+    assert results(out) == before
+
+    retried = rosgrade(
+        "batch", "timed_publisher", course, "--out", out, "--retry", "ben", "--sandbox", "none"
+    )
+    assert "(1 now" in retried.stdout
+    changed = {name for name, state in results(out).items() if state != before[name]}
+    assert changed == {"submissions/ben/result.json"}
+    assert list(out.glob("submissions/ben/earlier/result-*.json"))
+
+
+def test_after_kill_9_the_same_command_goes_on(
+    rosgrade: Rosgrade, tmp_path: Path, course: Path
+) -> None:
+    for number in range(4):
+        handed_in(course, f"student{number}", "PERIOD_S = 0.3", f"PERIOD_S = 0.3  # {number}")
+    out = tmp_path / "out"
+    command = ["batch", "timed_publisher", str(course), "--out", str(out), "--sandbox", "none"]
+    batch = subprocess.Popen(
+        [sys.executable, "-m", "grader", *command, "--jobs", "1"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
+    assert batch.stderr is not None
+    for line in batch.stderr:
+        if "1 of 4" in line:
+            break
+    batch.send_signal(signal.SIGKILL)
+    batch.communicate()
+    before = results(out)
+    assert len(before) in (1, 2)
+    ended = rosgrade(*command)
+    assert ended.returncode == 0, ended.stderr
+    after = results(out)
+    assert len(after) == 4
+    assert {name: after[name] for name in before} == before
+    assert not (out / ".partial").exists()
+
+
+def test_one_submission_in_place_of_a_class_is_a_mistake_of_use(
+    rosgrade: Rosgrade, tmp_path: Path
+) -> None:
+    ended = rosgrade(
+        "batch", "timed_publisher", REFERENCE / "bot_publisher", "--out", tmp_path / "out"
+    )
+    assert ended.returncode == 2
+    assert "looks like one submission" in ended.stderr and "Traceback" not in ended.stderr

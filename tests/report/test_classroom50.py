@@ -1,0 +1,128 @@
+"""Classroom 50's result.json, against its contract."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from grader.checks.finding import Finding
+from grader.errors import GraderFault, UsageError
+from grader.grade import grade
+from grader.report.classroom50 import identity, render_release, render_result, whole_factor
+from grader.report.result import make_result
+from tests.assignment.validator import valid
+from tests.grade.sample import Told, make_loaded, make_submission
+from tests.report.sample import (
+    Sample,
+    full_points,
+    lost_points,
+    make_facts,
+    make_run,
+    not_built,
+    not_graded,
+)
+
+ENVIRONMENT = {
+    "CLASSROOM": "ros2",
+    "ASSIGNMENT": "timed-publisher",
+    "SUBMISSION_TAG": "submit/2026-06-01T14-32-05Z-a1b2c3d",
+    "COMMIT_URL": "https://example.org/commit/1",
+    "RELEASE_URL": "https://example.org/releases/1",
+}
+WHEN = "2026-06-01T14:32:01Z"
+# Written from the table of the contract, wiki page "Advanced Autograding".
+TEXT = {"type": "string", "minLength": 1}
+SCHEMA = {
+    "type": "object",
+    "required": [
+        *("schema", "classroom", "assignment", "submission", "commit", "release", "review"),
+        *("datetime", "score", "max-score", "tests"),
+    ],
+    "properties": {
+        "schema": {"const": "classroom50/result/v1"},
+        **dict.fromkeys(
+            ("classroom", "assignment", "submission", "commit", "release", "review"), TEXT
+        ),
+        "datetime": {"type": "string", "pattern": r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"},
+        "score": {"type": "integer"},
+        "max-score": {"type": "integer"},
+        "tests": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "required": ["test-name", "passed", "score", "max-score"],
+                "properties": {
+                    "test-name": TEXT,
+                    "passed": {"type": "boolean"},
+                    "score": {"type": "integer", "minimum": 0},
+                    "max-score": {"type": "integer", "minimum": 0},
+                },
+            },
+        },
+    },
+}
+
+
+def result_of(sample):
+    return make_result(sample.grade, sample.recordings, sample.facts)
+
+
+def rendered(result):
+    return json.loads(render_result(result, identity(ENVIRONMENT), WHEN))
+
+
+def points(*worth, credit=0.0):
+    checks = [Told("first", Finding.failed("e", "o", credit=credit), points=worth[0])]
+    checks += [Told(f"c{number}", points=value) for number, value in enumerate(worth[1:])]
+    recordings = {"listen": make_run()}
+    return result_of(
+        Sample(grade(make_loaded(checks), make_submission(), recordings), recordings, make_facts())
+    )
+
+
+@pytest.mark.parametrize("make", [full_points, lost_points, not_built])
+def test_it_keeps_the_contract(make):
+    data = rendered(result_of(make()))
+    assert valid(data, SCHEMA, SCHEMA)
+    assert data["score"] == sum(test["score"] for test in data["tests"])
+    assert data["max-score"] == sum(test["max-score"] for test in data["tests"])
+    assert all(test["passed"] <= (test["score"] == test["max-score"]) for test in data["tests"])
+    assert data["datetime"] == WHEN
+
+
+@pytest.mark.parametrize(
+    ("worth", "factor"), [((1, 2), 1), ((0.5, 1), 2), ((0.25, 1), 4), ((0.1, 0.5), 10)]
+)
+def test_points_are_made_whole_by_one_factor(worth, factor):
+    result = points(*worth)
+    assert whole_factor(result) == factor
+    assert rendered(result)["max-score"] == round(sum(worth) * factor)
+    assert (f"every point as {factor}" in render_release(result)) == (factor > 1)
+
+
+def test_partial_credit_is_rounded_down_so_that_only_a_passed_check_is_full():
+    (first, _) = rendered(points(3, 1, credit=0.999))["tests"]
+    assert (first["score"], first["max-score"], first["passed"]) == (2, 3, False)
+
+
+def test_hidden_checks_are_neither_named_nor_counted():
+    result = result_of(lost_points())
+    text = render_result(result, identity(ENVIRONMENT), WHEN) + render_release(result)
+    assert "SIGINT" not in text and "ends" not in [t["id"] for t in rendered(result)["tests"]]
+    assert "1 hidden check, 1 point, runs at grading" in render_release(result)
+
+
+def test_without_a_grade_there_is_no_result():
+    with pytest.raises(GraderFault, match="no result for Classroom 50"):
+        rendered(result_of(not_graded()))
+
+
+def test_what_the_runner_did_not_say_is_named():
+    with pytest.raises(UsageError, match="the environment lacks COMMIT_URL, RELEASE_URL"):
+        identity({k: v for k, v in ENVIRONMENT.items() if not k.endswith("_URL")})
+
+
+def test_the_review_is_the_commit_where_there_is_none():
+    assert identity(ENVIRONMENT)["review"] == ENVIRONMENT["COMMIT_URL"]
+    assert identity({**ENVIRONMENT, "REVIEW_URL": "https://r"})["review"] == "https://r"

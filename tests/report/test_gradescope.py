@@ -1,0 +1,172 @@
+"""Gradescope's results.json, against its specification."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from grader.checks.finding import Finding
+from grader.errors import UsageError
+from grader.grade import grade
+from grader.report.gradescope import late_s, read_metadata, render_gradescope, unfinished
+from grader.report.result import make_result
+from tests.assignment.validator import valid
+from tests.grade.sample import Told, make_loaded, make_submission
+from tests.report.sample import (
+    Sample,
+    everywhere,
+    full_points,
+    lost_points,
+    make_facts,
+    make_run,
+    not_built,
+    not_graded,
+)
+
+# Written from https://gradescope-autograders.readthedocs.io/en/latest/specs/
+VISIBILITY = {"enum": ["hidden", "after_due_date", "after_published", "visible"]}
+FORMAT = {"enum": ["text", "html", "simple_format", "md", "ansi"]}
+SCHEMA = {
+    "type": "object",
+    "required": ["score"],
+    "additionalProperties": False,
+    "properties": {
+        "score": {"type": "number"},
+        "execution_time": {"type": "number"},
+        "output": {"type": "string"},
+        "output_format": FORMAT,
+        "test_output_format": FORMAT,
+        "test_name_format": FORMAT,
+        "visibility": VISIBILITY,
+        "stdout_visibility": VISIBILITY,
+        "extra_data": {"type": "object"},
+        "leaderboard": {"type": "array"},
+        "tests": {
+            "type": "array",
+            "items": {
+                "type": "object",
+                "additionalProperties": False,
+                "properties": {
+                    "score": {"type": "number"},
+                    "max_score": {"type": "number"},
+                    "status": {"enum": ["passed", "failed"]},
+                    "name": {"type": "string"},
+                    "name_format": FORMAT,
+                    "number": {"type": "string"},
+                    "output": {"type": "string"},
+                    "output_format": FORMAT,
+                    "tags": {"type": "array", "items": {"type": "string"}},
+                    "visibility": VISIBILITY,
+                    "extra_data": {"type": "object"},
+                },
+            },
+        },
+    },
+}
+
+
+def rendered(make, metadata=None):
+    sample = make()
+    result = make_result(sample.grade, sample.recordings, sample.facts)
+    return json.loads(render_gradescope(result, metadata))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [full_points, lost_points, not_built, not_graded, lambda: everywhere("\udcff<b>\x1b[0m`|")],
+)
+def test_it_follows_the_specification(make):
+    assert valid(rendered(make), SCHEMA, SCHEMA)
+
+
+def test_what_is_written_before_there_is_a_grade():
+    data = json.loads(unfinished())
+    assert valid(data, SCHEMA, SCHEMA)
+    assert "Grading did not finish" in data["output"]
+    assert (data["score"], data["extra_data"]["graded"]) == (0, False)
+
+
+def test_scores_and_whose_test_it_is():
+    data = rendered(lost_points)
+    assert data["score"] == 3.02
+    tests = {test["extra_data"]["id"]: test for test in data["tests"]}
+    assert (tests["period"]["score"], tests["period"]["max_score"]) == (1.02, 3.0)
+    assert tests["period"]["status"] == "failed"
+    assert tests["period"]["tags"] == ["listen"]
+    assert "**try next:** The period grows" in tests["period"]["output"]
+    assert tests["builds"]["status"] == "passed"
+    assert [test["number"] for test in data["tests"]] == ["1", "2", "3", "4"]
+    assert sum(test["score"] for test in data["tests"]) == pytest.approx(data["score"])
+
+
+@pytest.mark.parametrize("visibility", ["visible", "after_due_date", "after_published", "hidden"])
+def test_gradescope_hides_what_the_author_hides(visibility):
+    checks = [
+        Told("seen"),
+        Told("other", Finding.failed("zq1", "zq2", "zq3"), title="zq4", visibility=visibility),
+    ]
+    recordings = {"listen": make_run()}
+    sample = Sample(
+        grade(make_loaded(checks), make_submission(), recordings), recordings, make_facts()
+    )
+    data = rendered(lambda: sample)
+    assert data["tests"][1]["visibility"] == visibility
+    if visibility != "visible":
+        assert "zq" not in data["output"]
+        assert (
+            "1 of 1 visible checks passed; 1 hidden check, 1 point, runs at grading"
+            in (data["output"])
+        )
+    assert data["stdout_visibility"] == "hidden"
+
+
+def test_what_is_not_graded_is_no_silent_zero():
+    data = rendered(not_graded)
+    assert data["score"] == 0
+    assert data["output"].startswith("**Not graded.** This 0 is a placeholder")
+    assert all("score" not in test for test in data["tests"])
+    assert data["extra_data"]["graded"] is False
+
+
+DUE = "2026-03-04T23:59:00.000000-08:00"
+
+
+@pytest.mark.parametrize(
+    ("created", "late"),
+    [
+        ("2026-03-04T23:58:59.000000-08:00", 0.0),
+        ("2026-03-05T08:59:00.000000+00:00", 3600.0),
+        ("2026-03-05T08:59:00Z", 3600.0),
+    ],
+)
+def test_lateness_is_counted_from_the_submission_and_never_from_now(created, late):
+    metadata = {"created_at": created, "assignment": {"due_date": DUE}, "users": [{"name": "Ada"}]}
+    assert late_s(metadata) == late
+    assert rendered(full_points, metadata)["extra_data"]["late_s"] == late
+
+
+def test_an_extension_goes_before_the_due_date():
+    metadata = {
+        "created_at": "2026-03-05T12:00:00-08:00",
+        "assignment": {"due_date": DUE},
+        "users": [{"assignment": {"due_date": "2026-03-06T23:59:00-08:00"}}],
+    }
+    assert late_s(metadata) == 0.0
+
+
+def test_without_a_due_date_nothing_is_late():
+    assert late_s({"created_at": DUE, "assignment": {"due_date": None}}) is None
+
+
+def test_a_time_that_is_none_is_named():
+    with pytest.raises(UsageError, match="created_at 'soon' and due_date"):
+        late_s({"created_at": "soon", "assignment": {"due_date": DUE}})
+
+
+@pytest.mark.parametrize(("text", "said"), [("{", "is not JSON"), ("[]", "no object in it")])
+def test_metadata_that_is_none_is_named(text, said, tmp_path):
+    file = tmp_path / "submission_metadata.json"
+    file.write_text(text)
+    with pytest.raises(UsageError, match=said):
+        read_metadata(file)

@@ -1,0 +1,131 @@
+"""JUnit XML: valid for Jenkins, counted rightly by colcon, and whose fault it was."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+import xmlschema
+
+from grader.report.junit import render_junit
+from grader.report.result import make_result
+from tests.report.sample import everywhere, full_points, lost_points, not_built, not_graded
+
+ILLEGAL = "a\x00b\x0b\x1b[31mc\ud800\ufffe\uffff]]>\r\n<b>&amp;"
+SAMPLES = {
+    "full points": full_points,
+    "lost points": lost_points,
+    "not built": not_built,
+    "not graded": not_graded,
+    "hostile": lambda: everywhere(ILLEGAL),
+}
+
+
+@cache
+def jenkins() -> xmlschema.XMLSchema:
+    return xmlschema.XMLSchema(str(Path(__file__).with_name("junit10.xsd")))
+
+
+def rendered(make, **options):
+    sample = make()
+    result = make_result(sample.grade, sample.recordings, sample.facts)
+    return render_junit(result, **options)
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_xunit2_is_valid_for_jenkins(name):
+    jenkins().validate(rendered(SAMPLES[name]))
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_the_counts_are_those_of_the_elements(name):
+    root = ET.fromstring(rendered(SAMPLES[name]))
+    (suite,) = root
+    for attribute, tag in (
+        ("tests", "testcase"),
+        ("failures", "failure"),
+        ("errors", "error"),
+        ("skipped", "skipped"),
+    ):
+        assert int(suite.get(attribute)) == len(list(suite.iter(tag)))
+    assert root.get("tests") == suite.get("tests")
+
+
+def test_whose_fault_it_was():
+    cases = {
+        case.get("name"): case for case in ET.fromstring(rendered(lost_points)).iter("testcase")
+    }
+    assert [child.tag for child in cases["period"]] == ["failure"]
+    assert [child.tag for child in cases["steady"]] == ["skipped"]
+    assert not list(cases["builds"])
+    cases = {
+        case.get("name"): case for case in ET.fromstring(rendered(not_graded)).iter("testcase")
+    }
+    assert [child.tag for child in cases["depth"]] == ["error"]
+    assert "KeyError" in cases["depth"][0].text
+
+
+def test_a_failure_says_what_to_try():
+    root = ET.fromstring(rendered(lost_points))
+    failure = next(root.iter("failure"))
+    assert failure.get("message") == (
+        "It publishes every 300 ms: a median of 322.4 ms; 2 of 3 periods are longer than 315 ms, "
+        "the longest is 612 ms"
+    )
+    assert "try next: The period grows with the work in the callback." in failure.text
+    assert "where: src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)" in failure.text
+
+
+def test_points_are_properties_of_the_suite():
+    root = ET.fromstring(rendered(lost_points))
+    properties = {item.get("name"): item.get("value") for item in root.iter("property")}
+    assert properties["points.period"] == "1.02 / 3"
+    assert (properties["score"], properties["max_score"]) == ("3.02", "7")
+
+
+def test_the_time_is_without_offset():
+    (suite,) = ET.fromstring(rendered(lost_points))
+    assert suite.get("timestamp") == "2026-03-04T09:12:33"
+
+
+def test_xunit1_has_the_student_s_file_and_line_which_jenkins_forbids():
+    text = rendered(lost_points, xunit1=True)
+    cases = {case.get("name"): case for case in ET.fromstring(text).iter("testcase")}
+    assert cases["period"].get("file") == "src/bot_publisher/bot_publisher/node.py"
+    assert cases["period"].get("line") == "18"
+    properties = {item.get("name"): item.get("value") for item in cases["period"].iter("property")}
+    assert properties["points"] == "1.02 / 3"
+    assert not jenkins().is_valid(text)
+
+
+def test_characters_that_xml_cannot_hold_are_replaced():
+    for family in (False, True):
+        text = rendered(SAMPLES["hostile"], xunit1=family)
+        ET.fromstring(text)
+        assert "\x00" not in text and "\ud800" not in text and "\uffff" not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "said"),
+    [
+        ("full points", 0, "2 tests, 0 errors, 0 failures, 0 skipped"),
+        ("lost points", 1, "4 tests, 0 errors, 1 failure, 1 skipped"),
+        ("not graded", 1, "3 tests, 2 errors, 0 failures, 0 skipped"),
+    ],
+)
+def test_colcon_counts_the_same(name, code, said, tmp_path):
+    (tmp_path / "rosgrade.xml").write_text(rendered(SAMPLES[name]), encoding="utf-8")
+    ended = subprocess.run(
+        [sys.executable, "-m", "colcon", "test-result", "--test-result-base", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={"PATH": "/usr/bin:/bin", "COLCON_HOME": str(tmp_path), "HOME": str(tmp_path)},
+        check=False,
+    )
+    assert ended.returncode == code, ended.stderr
+    assert said in ended.stdout

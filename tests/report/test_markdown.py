@@ -1,0 +1,100 @@
+"""Markdown, read by a CommonMark parser: what a student chose is never markup."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+
+from grader.report.markdown import fence, literal, prose, render_markdown
+from grader.report.result import make_result
+from tests.report.sample import everywhere, full_points, lost_points, not_built, not_graded
+
+PARSER = MarkdownIt("commonmark").enable(["table", "strikethrough"])
+HOSTILE = [
+    "<script>alert(1)</script>",
+    "![x](https://e.org/a.png)",
+    "[x](https://e.org)",
+    "# heading",
+    "a | b | c",
+    "```\n# out of the fence\n```",
+    "*bold* __bold__ ~~gone~~",
+    "&lt;b&gt; &amp;",
+    "\\*",
+    "line\n\n## another",
+    "one ` tick",
+    "`code | bar`",
+]
+
+
+def rendered(sample):
+    return render_markdown(make_result(sample.grade, sample.recordings, sample.facts))
+
+
+def kinds(text):
+    """Every kind of token, those within a line too."""
+    tokens = PARSER.parse(text)
+    return [inner.type for token in tokens for inner in [token, *(token.children or [])]]
+
+
+def shown(text):
+    """What a reader sees of one line."""
+    (inline,) = (token for token in PARSER.parse(text) if token.type == "inline")
+    return "".join(child.content for child in inline.children if child.type != "softbreak")
+
+
+def test_what_a_student_reads_first():
+    text = rendered(lost_points())
+    assert text.startswith("## timed_publisher: 3.02 of 7 points\n\n1 check failed, 1 other waits")
+    assert "**Fix this first:** It publishes every 300 ms" in text
+    assert "| ✗ failed | It publishes every 300 ms | 1.02 / 3 |" in text
+    assert "- **try next:** Let a timer do the waiting: `create_timer(0.3, callback)`." in text
+    assert "```text\nloop took 0.31 s\n```" in text
+
+
+def test_what_is_not_graded_has_no_score():
+    text = rendered(not_graded())
+    assert text.startswith("## timed_publisher: Not graded\n\nSomething of the grader")
+    assert "| ! error | The queue depth is 10 | ? / 1 |" in text
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_nothing_of_a_student_is_markup(text):
+    plain, hostile = kinds(rendered(everywhere("word"))), kinds(rendered(everywhere(text)))
+    allowed = {"code_inline"} if "`" in text else set()
+    assert set(hostile) - allowed == set(plain) - allowed
+    for kind in ("heading_open", "tr_open", "td_open", "list_item_open", "fence"):
+        assert hostile.count(kind) == plain.count(kind), kind
+
+
+@pytest.mark.parametrize("make", [full_points, lost_points, not_built, not_graded])
+def test_every_table_row_has_three_cells(make):
+    found = kinds(rendered(make()))
+    assert found.count("td_open") == 3 * (found.count("tr_open") - 1)
+
+
+@settings(deadline=None)
+@given(st.text(alphabet="ab_*`[]()<>&|~$#!\\@1. -", min_size=1, max_size=30))
+def test_a_literal_text_shows_as_it_is(text):
+    line = f"x{text}x"
+    assert shown(f"- {literal(line)}").replace("\N{WORD JOINER}", "") == line
+
+
+def test_nobody_is_called():
+    assert "@ada" not in literal("ask @ada or ada@example.org")
+
+
+def test_code_is_code_and_an_unpaired_tick_is_a_tick():
+    assert prose("call `spin(node)` now") == "call `spin(node)` now"
+    assert "code_inline" not in kinds(prose("a ` tick"))
+    assert prose("`a|b`", cell=True) == "`a\\|b`"
+
+
+@settings(deadline=None)
+@given(st.lists(st.sampled_from(["```", "````", "~~~", "a", "", "# b"]), max_size=8))
+def test_a_block_of_code_ends_where_it_should(lines):
+    tokens = PARSER.parse(fence("\n".join(lines)) + "\n\nafter")
+    assert [token.type for token in tokens] == [
+        *("fence", "paragraph_open", "inline", "paragraph_close")
+    ]

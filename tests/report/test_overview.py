@@ -1,0 +1,102 @@
+"""The class overview: complete, inert, the same every time."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from grader.report.overview import OverviewRow, render_overview
+from tests.report.classroom import classroom
+from tests.report.page import Page
+from tests.report.test_html import ATTACKS, sha256
+
+
+def squeezed(html):
+    return " ".join(Page(html).text.split())
+
+
+def test_figures_of_the_class():
+    text = squeezed(render_overview(classroom(20)))
+    assert "Submissions 20 Graded 18" in text
+    assert "2 submissions without a grade" in text
+    assert "student 09: the archive is damaged" in text
+
+
+def test_median_and_mean_are_of_those_who_were_graded():
+    full = classroom(1)[0]
+    rows = [replace(full, id=str(i), result=full.result.model_copy(update={"score": score}))
+            for i, score in enumerate((0.0, 1.0, 3.0))]  # fmt: skip
+    text = squeezed(render_overview([*rows, OverviewRow("x", note="empty")]))
+    assert "Median 1 / 3 points" in text and "Mean 1.33 / 3 points" in text
+    assert "Full points 1" in text
+
+
+def test_the_check_that_most_fail_comes_first():
+    html = render_overview(classroom(20))
+    rows = re.findall(r'<th scope="row">([^<]*)</th>\s*<td class="num">(\d+) \(', html)
+    counts = [int(count) for _, count in rows]
+    assert counts == sorted(counts, reverse=True) and counts[0] > 0
+
+
+def test_every_cell_leads_to_its_check_in_the_report():
+    found = Page(render_overview(classroom(5)))
+    links = [link["href"] for link in found.all("a")]
+    assert "./student%2003/report.html#check-builds" in links
+    assert all(
+        re.match(r"\./student%20\d\d/report\.html(#check-[a-z]+)?$|#matrix$", link)
+        for link in links
+    )
+
+
+def test_without_a_report_there_are_no_links():
+    row = replace(classroom(1)[0], report=None)
+    links = [link["href"] for link in Page(render_overview([row])).all("a")]
+    assert links == ["#matrix"]
+
+
+def test_a_disturbed_run_is_listed_with_what_was_taken():
+    row = classroom(1)[0]
+    run = row.result.scenarios[0]
+    disturbance = run.disturbance.model_copy(update={"taken_s": 0.25})
+    scenario = run.model_copy(update={"disturbance": disturbance})
+    row = replace(row, result=row.result.model_copy(update={"scenarios": (scenario,)}))
+    assert "Disturbed runs" in squeezed(render_overview([row]))
+    assert "student 00 listen 250 ms 0 ms" in squeezed(render_overview([row]))
+    assert "Disturbed runs" not in squeezed(render_overview(classroom(1)))
+
+
+def test_an_empty_class():
+    text = squeezed(render_overview([]))
+    assert "Submissions 0" in text and "Nobody was graded." in text
+
+
+def test_it_is_the_same_every_time():
+    assert render_overview(classroom(30)) == render_overview(classroom(30))
+
+
+def test_five_hundred_submissions_stay_small():
+    # Six checks each here; with the 27 of the largest assignment four times as much.
+    assert len(render_overview(classroom(500)).encode()) < 400_000
+
+
+def test_only_its_own_style_and_script_may_run():
+    html = render_overview(classroom(3))
+    found = Page(html)
+    assert found.problems == []
+    (policy,) = found.all("meta", http_equiv="Content-Security-Policy")
+    (style,) = re.findall(r"<style>(.*?)</style>", html, re.DOTALL)
+    (script,) = re.findall(r"<script>(.*?)</script>", html, re.DOTALL)
+    assert sha256(style) in policy["content"] and sha256(script) in policy["content"]
+    assert "unsafe" not in policy["content"] and "style=" not in html
+
+
+@pytest.mark.parametrize("attack", [*ATTACKS, "//example.org/x", "javascript:alert(1)"])
+def test_hostile_names_add_nothing_and_lead_nowhere(attack):
+    row = classroom(2)[1]
+    rows = [OverviewRow(attack, attack, attack, row.result, attack)]
+    harmless = Page(render_overview([OverviewRow("a", "a", "a", row.result, "a")]))
+    found = Page(render_overview(rows))
+    assert found.problems == []
+    assert [tag for tag, _ in found.elements] == [tag for tag, _ in harmless.elements]
+    for link in found.all("a"):
+        assert link["href"].startswith(("#", "./")) and ":" not in link["href"]

@@ -1,0 +1,281 @@
+"""The pictures of a run: what is drawn, from runs of the real simulator core."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.checks.finding import Case, Cases, Comparison, Plot, Span
+from grader.recording.model import Qos
+from grader.report.build_log import arrange
+from grader.report.callbacks import draw_callbacks
+from grader.report.cases import draw_cases
+from grader.report.comparison import align
+from grader.report.motion import draw_motion, phases
+from grader.report.path import Target, draw_path
+from grader.report.pictures import Gallery
+from grader.report.plot import draw_plot
+from grader.report.qos_table import pairs
+from grader.report.svg import simplified
+from grader.report.timeline import draw_timeline
+from grader.submission.record import BuildRecord, SourceError
+from sim.motion import Pose
+from tests.checks.builder import drive, endpoint, node, on_odometry, reader, recording
+from tests.report.gallery import CALLS, CASES, DEFINITION, ahead_until
+from tests.report.sample import make_run
+
+
+def parsed(svg):
+    return ET.fromstring(str(svg))
+
+
+def of_class(svg, name):
+    return [item for item in parsed(svg).iter() if name in (item.get("class") or "").split()]
+
+
+def words(svg):
+    return " ".join(item.text or "" for item in parsed(svg).iter("text"))
+
+
+@pytest.fixture(scope="module")
+def stopped():
+    return ahead_until(0.2)
+
+
+@pytest.fixture(scope="module")
+def touched():
+    return ahead_until(0.0)
+
+
+class TestPath:
+    def test_it_says_how_far_before_the_wall_the_robot_stopped(self, stopped):
+        figure = draw_path(stopped, (), "p")
+        # The wall is at 0.6 m; the robot drives with 0.1 m/s and sees 5 times a second.
+        told = figure.caption.partition("obstacle ")[2].partition(" m ahead")[0]
+        assert 0.17 <= float(told) <= 0.2
+        assert of_class(figure.wide, "measure") and of_class(figure.narrow, "measure")
+        assert f"{told} m" in words(figure.wide)
+
+    def test_a_contact_is_marked_and_named(self, touched):
+        figure = draw_path(touched, (), "p")
+        assert "1 contact with segments[0] (marked ×)" in figure.caption
+        assert len(of_class(figure.wide, "out")) == 1
+
+    def test_headings_world_and_scale_are_drawn(self, stopped):
+        wide = draw_path(stopped, (), "p").wide
+        assert of_class(wide, "arrow")[0].get("d").count("M") >= 3
+        assert of_class(wide, "wall") and of_class(wide, "mover") and of_class(wide, "moved")
+        assert "start" in words(wide) and "end" in words(wide) and "0.2 m" in words(wide)
+
+    def test_where_it_should_end(self, stopped):
+        target = Target(Pose(0.4, 0.1, 0.0), 0.08)
+        figure = draw_path(stopped, (target,), "p")
+        (circle,) = of_class(figure.wide, "target")
+        assert [float(circle.get(key)) for key in ("cx", "cy", "r")] == [0.4, 0.1, 0.08]
+        assert "the dashed circle is where it should end" in figure.caption
+
+    def test_a_robot_that_stands(self):
+        run = drive(lambda _: None, world="{segments: [[1, -1, 1, 1]]}", seconds=1.0)
+        assert draw_path(run, (), "p").caption == "The robot did not move."
+
+    def test_without_a_robot_there_is_no_path(self):
+        assert draw_path(make_run(), (), "p") is None
+        assert draw_motion(make_run(), "m") is None
+
+
+class TestMotion:
+    def test_phases_follow_what_the_robot_did(self):
+        def law(pose):
+            return (0.1, 0.0) if pose.x_m < 0.2 else (0.0, 0.5)
+
+        run = drive(on_odometry(law), seconds=6.0, rest_s=None)
+        found = [phase.what for phase in phases(run)]
+        assert found[0] in ("rests", "drives")
+        assert [what for what in found if what not in ("rests", "drives and turns")] == [
+            "drives",
+            "turns",
+        ]
+        assert all(a.end_s == b.begin_s for a, b in zip(phases(run), phases(run)[1:], strict=False))
+
+    def test_the_limit_is_drawn_where_it_is_near(self):
+        fast = drive(on_odometry(lambda _: (0.5, 0.0)), seconds=3.0)
+        slow = drive(on_odometry(lambda _: (0.05, 0.0)), seconds=3.0)
+        assert "limit 0.22 m/s" in words(draw_motion(fast, "m").wide)
+        assert "limit" not in words(draw_motion(slow, "m").wide)
+
+    def test_command_and_truth_differ_in_more_than_colour(self, stopped):
+        wide = draw_motion(stopped, "m").wide
+        assert len(of_class(wide, "command")) == len(of_class(wide, "true")) == 2
+        assert "speed ahead (m/s)" in words(wide) and "turn (rad/s)" in words(wide)
+
+
+class TestTimeline:
+    def test_nodes_and_endpoints_come_and_go(self):
+        run = recording(
+            nodes=(node("/bot_publisher", appeared_s=0.3, vanished_s=1.0),),
+            endpoints=(replace(endpoint(), vanished_ns=endpoint().appeared_ns + 500_000_000),),
+        )
+        svg = draw_timeline(run, (), "t").wide
+        description = next(item.text for item in parsed(svg).iter() if item.tag.endswith("desc"))
+        assert "node /bot_publisher: in the graph until it vanished" in description
+        assert "publishers and subscriptions: 1 endpoint came, 1 went" in description
+
+    def test_errors_in_the_output_are_crosses(self, stopped):
+        svg = draw_timeline(stopped, (), "t").wide
+        assert "2 lines, 1 error" in words(svg)
+
+
+class TestHistogram:
+    def test_equal_values_are_one_long_bar(self):
+        y = (300.0,) * 9 + (340.0,)
+        plot = Plot("Period", "t (s)", "period (ms)", tuple(range(10)), y, (285.0, 315.0), True)
+        bars = of_class(draw_plot(plot, "p").wide, "count")
+        lengths = sorted(float(bar.get("width")) for bar in bars)
+        assert len(lengths) == 2 and lengths[1] / lengths[0] == pytest.approx(9.0, rel=0.01)
+
+
+class TestCallbacks:
+    def test_a_row_for_each_name_and_a_bar_for_each_call(self):
+        figure = draw_callbacks(CALLS, "c")
+        bars = of_class(figure.wide, "span")
+        assert len(bars) == 3 and len(of_class(figure.wide, "wrong")) == 1
+        assert len({bar.get("y") for bar in bars}) == 2
+        assert "2 calls, 400 ms each" in words(figure.wide)
+        assert "timer_2" in figure.caption
+
+    def test_bars_that_overlap_in_time_overlap_in_the_picture(self):
+        bars = {
+            bar.get("class"): bar for bar in of_class(draw_callbacks(CALLS[:2], "c").wide, "span")
+        }
+        first, second = bars["span"], bars["span wrong"]
+        first_end = float(first.get("x")) + float(first.get("width"))
+        assert float(first.get("x")) < float(second.get("x")) < first_end
+
+    def test_nothing_to_draw(self):
+        assert draw_callbacks((), "c") is None
+        assert draw_callbacks((Span("a", math.nan, 1.0), Span("a", 2.0, 1.0)), "c") is None
+
+    @given(st.lists(st.builds(Span, st.text(max_size=9), st.floats(), st.floats(), st.booleans())))
+    @settings(max_examples=60, deadline=None)
+    def test_whatever_was_reported_the_drawing_is_finite(self, spans):
+        figure = draw_callbacks(spans, "c")
+        for bar in of_class(figure.wide, "span") if figure else ():
+            assert all(math.isfinite(float(bar.get(key))) for key in ("x", "width"))
+
+
+class TestCases:
+    def test_wrong_and_missing_cases_are_marked_and_counted(self):
+        figure = draw_cases(CASES, "c")
+        assert of_class(figure.wide, "out")[0].get("d").count("m") == 5
+        assert of_class(figure.wide, "dots")[0].get("d").count("M") == 20
+        assert len(of_class(figure.wide, "missing")) == 1
+        assert figure.caption == (
+            "Rotations from axis and angle: 26 cases, 5 beyond the limit of 0.01 deg (marked ×), "
+            "1 without an answer (marked ?), of the kind gimbal lock, zero. "
+            "The scale is logarithmic."
+        )
+
+    @given(st.lists(st.none() | st.floats()), st.floats(1e-12, 1e12))
+    @settings(max_examples=60, deadline=None)
+    def test_whatever_the_errors_the_drawing_is_finite(self, errors, limit):
+        cases = Cases("t", "e (deg)", limit, tuple(Case("c", "g", error) for error in errors))
+        for item in parsed(draw_cases(cases, "c").wide).iter():
+            assert "nan" not in (item.get("d") or "") and "inf" not in (item.get("d") or "")
+
+
+class TestComparison:
+    def test_lines_are_put_beside_each_other_by_what_they_say(self):
+        rows = align(DEFINITION)
+        assert [(row.kind, row.sign) for row in rows] == [
+            ("changed", "≠"),
+            ("same", ""),
+            ("missing", "−"),
+            ("same", ""),
+            ("extra", "+"),
+        ]
+        changed = rows[0]
+        assert [piece.text for piece in changed.expected if piece.differs] == ["1"]
+        assert [piece.text for piece in changed.observed if piece.differs] == ["0"]
+
+    @given(st.lists(st.text("ab \n", max_size=5)), st.lists(st.text("ab \n", max_size=5)))
+    def test_no_line_is_lost(self, expected, observed):
+        rows = align(Comparison("t", tuple(expected), tuple(observed)))
+        assert sum(row.kind != "extra" for row in rows) == len(expected)
+        assert sum(row.kind != "missing" for row in rows) == len(observed)
+
+
+class TestQos:
+    def test_what_does_not_match_says_by_which_policy(self):
+        offered = endpoint(qos=Qos(reliability="best_effort", durability="volatile"))
+        wanted = reader(qos=Qos(reliability="reliable", durability="volatile"))
+        (pair,) = pairs(recording(endpoints=(offered, wanted)))
+        assert pair.publisher == "/bot_publisher" and pair.subscription == "the grader"
+        assert ("reliability", "best_effort", "reliable") in pair.cells
+        assert pair.refused == {"reliability"} and not pair.matches
+
+    def test_types_that_differ_do_not_match(self):
+        ends = (endpoint(), reader(type="geometry_msgs/msg/TwistStamped"))
+        (pair,) = pairs(recording(endpoints=ends))
+        assert pair.types_differ and not pair.matches
+
+    def test_a_pair_of_the_graders_own_is_not_shown(self):
+        own = replace(reader(), kind=endpoint().kind)
+        assert pairs(recording(endpoints=(own, reader()))) == ()
+
+
+class TestBuildLog:
+    def test_the_students_own_line_comes_first(self):
+        told = [
+            'File "src/b/setup.py", line 7',
+            "    entry_points={",
+            "SyntaxError: '{' was never closed",
+            "Failed",
+        ]
+        log = "\n".join([*(f"noise {i}" for i in range(50)), *told])
+        culprit = SourceError("src/b/setup.py", 7, "SyntaxError: '{' was never closed")
+        found = arrange(BuildRecord(False, 1.0, culprit=culprit, log=log))
+        hits = [text for text, hit in found.first if hit]
+        assert hits == ['File "src/b/setup.py", line 7', "SyntaxError: '{' was never closed"]
+        assert len(found.first) < 15 and found.whole == log
+
+    def test_a_log_that_does_not_tell_is_shown_as_it_is(self):
+        assert arrange(BuildRecord(False, 1.0, log="Failed <<< bot")).first == ()
+
+
+def test_the_same_plot_of_the_same_run_is_drawn_once():
+    plot = Plot("Speed", "t (s)", "v (m/s)", (0.0, 1.0), (0.0, 0.1))
+    gallery = Gallery()
+    assert gallery.plot(plot, "one", "ahead").figure is not None
+    again = gallery.plot(plot, "two", "ahead")
+    assert again.figure is None and again.name == "one"
+    assert gallery.plot(plot, "three", "other").figure is not None
+
+
+def test_a_plot_that_is_folded_up_is_drawn_again_where_it_is_open():
+    plot = Plot("Speed", "t (s)", "v (m/s)", (0.0, 1.0), (0.0, 0.1))
+    gallery = Gallery()
+    assert gallery.plot(plot, "one", "ahead", folded=True).figure is not None
+    assert gallery.plot(plot, "two", "ahead").figure is not None
+    assert gallery.plot(plot, "three", "ahead", folded=True).name == "two"
+
+
+@given(st.lists(st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)), min_size=1, max_size=40))
+def test_a_simplified_line_stays_within_the_tolerance(points):
+    kept = simplified(points, 0.5)
+    assert kept[0] == points[0] and kept[-1] == points[-1]
+    assert set(kept) <= set(points)
+    if len(kept) == 2 and len(points) > 2:
+        (x1, y1), (x2, y2) = kept
+        length = math.hypot(x2 - x1, y2 - y1)
+        for x, y in points:
+            off = (
+                abs((x2 - x1) * (y - y1) - (y2 - y1) * (x - x1)) / length
+                if length > 0.5
+                else math.hypot(x - x1, y - y1)
+            )
+            assert off <= 0.5 + 1e-9

@@ -1,0 +1,65 @@
+"""What a replay is made of, and that it is small and inert."""
+
+import json
+import math
+from itertools import accumulate
+
+import pytest
+
+from grader.report.html import render_report
+from grader.report.replay import DIGITS, NOTHING, embedded, make_replay
+from tests.report.gallery import ahead_until, gallery, reference
+from tests.report.sample import make_run
+
+
+@pytest.fixture(scope="module")
+def run():
+    return ahead_until(0.2)
+
+
+@pytest.fixture(scope="module")
+def replay(run):
+    return make_replay(run, gallery().grade.assignment.scenarios[1])
+
+
+def test_positions_are_those_of_the_truth_to_the_millimetre(run, replay):
+    x = [value / 1e3 for value in accumulate(replay["x"])]
+    assert x == pytest.approx([step.x_m for step in run.truth[::10]], abs=6e-4)
+    assert replay["step"] == 0.1
+    assert replay["began"] == pytest.approx(run.since_launch_s(run.truth[0].time_ns), abs=1e-3)
+
+
+def test_beams_are_those_of_the_scans_to_the_centimetre(run, replay):
+    scans = replay["scans"]
+    first = run.on("/scan")[0].value
+    every = len(first["ranges"]) // scans["beams"]
+    for beam, true in enumerate(first["ranges"][::every]):
+        high, low = scans["ranges"][2 * beam : 2 * beam + 2]
+        number = 64 * DIGITS.index(high) + DIGITS.index(low)
+        assert number == NOTHING if math.isinf(true) else abs(number / 100 - true) <= 0.0051
+    assert len(scans["ranges"]) == 2 * scans["beams"] * len(scans["times"])
+
+
+def test_headings_do_not_jump_at_the_wrap(replay):
+    assert max(map(abs, replay["yaw"])) < 1000
+
+
+def test_a_scenario_without_a_robot_has_none():
+    assert make_replay(make_run(), gallery().grade.assignment.scenarios[0]) is None
+
+
+def test_text_in_the_data_cannot_end_its_element():
+    text = embedded({"log": "</script><!--<script>&"})
+    assert not set("<>&") & set(text)
+    assert json.loads(text) == {"log": "</script><!--<script>&"}
+
+
+def test_a_report_of_eight_robot_runs_stays_below_a_megabyte(replay):
+    # Eight runs of ten seconds with their references, as bot_controller has them.
+    assert 8 * 2 * len(embedded(replay)) < 600_000
+
+
+def test_a_report_with_every_kind_of_picture_is_small():
+    sample = gallery()
+    html = render_report(sample.grade, sample.recordings, sample.facts, reference())
+    assert len(html.encode()) < 300_000

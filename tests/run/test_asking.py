@@ -1,0 +1,154 @@
+"""What the probe asks of real nodes: services, parameters, states, and what they log."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from grader import ros
+from grader.checks.finding import Status
+from grader.errors import GraderFault
+from grader.recording.model import Ending
+from grader.ros import RosInstallation
+from grader.run.runner import launch_file_program
+from tests.checks.builder import judge
+from tests.run.conftest import RunNode
+
+SET_BOOL = "std_srvs/srv/SetBool"
+
+SERVER = """\
+import time, rclpy
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.node import Node
+from std_srvs.srv import SetBool
+
+class Bot(Node):
+    def __init__(self):
+        super().__init__("bot")
+        limits = FloatingPointRange(from_value=0.0, to_value=1.0, step=0.0)
+        self.declare_parameter("speed", 0.5, ParameterDescriptor(floating_point_range=[limits]))
+        self.declare_parameter("names", ["a", "b"])
+        self.create_service(SetBool, "enable", self.enable)
+
+    def enable(self, request, response):
+        self.get_logger().info(f"enable {request.data}")
+        time.sleep(0.2)
+        response.success = request.data
+        response.message = "\\u00e9"
+        return response
+
+rclpy.init()
+rclpy.spin(Bot())
+"""
+
+LIFECYCLE = """\
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+
+rclpy.init()
+rclpy.spin(LifecycleNode("bot"))
+"""
+
+
+@pytest.mark.ros
+def test_calls_parameters_and_logs_of_one_node(run_node: RunNode) -> None:
+    recording = run_node(
+        SERVER,
+        record=[],
+        stimuli=[
+            {"call": "/enable", "type": SET_BOOL, "request": {"data": True}, "at_once": 2},
+            {"call": "/enable", "type": SET_BOOL, "requests": [{}], "after": "1 s"},
+            {"set_parameters": {"speed": 0.75, "names": ["c"]}, "node": "bot", "after": "1 s"},
+            {"set_parameters": {"speed": 7.0}, "node": "bot", "after": "1500 ms"},
+        ],
+        until={"stimuli": "done"},
+        timeout="20 s",
+    )
+    assert recording.ending is Ending.UNTIL
+    first, second, third = (call for call in recording.calls if call.service == "/enable")
+    assert (first.request, first.response) == (
+        {"data": True},
+        {"success": True, "message": "\u00e9"},
+    )
+    assert second.requested_ns < (first.answered_ns or 0) < (second.answered_ns or 0)
+    assert (third.request, (third.response or {})["success"]) == ({"data": False}, False)
+    (service,) = (item for item in recording.services if item.name == "/enable")
+    assert (service.type, service.node) == (SET_BOOL, "/bot")
+    waits = {"service": "/enable", "takes": "200 ms", "calls": "one_after_another"}
+    speed = {"node": "bot", "name": "speed"}
+    for name, parameters in [
+        ("service.concurrent", waits),
+        ("parameter.declared", {**speed, "type": "double", "default": 0.5, "range": [0, 1]}),
+        ("parameter.declared", {"node": "bot", "name": "names", "default": ["a", "b"]}),
+        ("parameter.set", {**speed, "value": 0.75}),
+        ("parameter.set", {"node": "bot", "name": "names", "value": ["c"]}),
+        ("parameter.set", {**speed, "value": 7.0, "accepted": False, "reason": "range"}),
+        ("log.contains", {"text": "enable", "level": "INFO", "at_least": 3, "at_most": 3}),
+    ]:
+        finding = judge(name, recording, **parameters)
+        # A busy machine may have disturbed it, which is told and costs nobody a point.
+        assert finding.status is Status.PASSED or finding.disturbed, finding
+    records = [line for line in recording.log if line.stream == "rosout"]
+    assert {(line.process, line.level) for line in records} == {("bot", "INFO")}
+
+
+@pytest.mark.ros
+def test_a_service_that_is_not_there_does_not_hold_the_run_up(run_node: RunNode) -> None:
+    recording = run_node(
+        SERVER,
+        record=[],
+        stimuli=[{"call": "/enabel", "type": SET_BOOL, "request": {"data": True}}],
+        until={"stimuli": "done"},
+        timeout="30 s",
+    )
+    assert recording.ending is Ending.UNTIL
+    (call,) = (call for call in recording.calls if call.service == "/enabel")
+    assert (call.answered_ns, call.error) == (None, "no server")
+    finding = judge("service.responds", recording, service="/enabel")
+    assert finding.observed == "found the service `/enable` instead of `/enabel`"
+
+
+@pytest.mark.ros
+@pytest.mark.skipif("lifecycle_msgs" not in ros.find().packages, reason="no lifecycle_msgs here")
+def test_a_lifecycle_node_goes_through_its_states(run_node: RunNode) -> None:
+    state = {"call": "/bot/get_state", "type": "lifecycle_msgs/srv/GetState"}
+    change = {"call": "/bot/change_state", "type": "lifecycle_msgs/srv/ChangeState"}
+    recording = run_node(
+        LIFECYCLE,
+        record=[],
+        stimuli=[
+            state,
+            {**change, "request": {"transition.id": 1}, "after": "500 ms"},
+            {**state, "after": "1 s"},
+            {**change, "request": {"transition.id": 3}, "after": "1500 ms"},
+            {**state, "after": "2 s"},
+        ],
+        until={"stimuli": "done"},
+        timeout="20 s",
+    )
+    wanted = {"node": "bot", "states": ["unconfigured", "inactive", "active"]}
+    finding = judge("lifecycle.state", recording, **wanted)
+    assert finding.status is Status.PASSED, finding
+
+
+def ros_with(*packages: str, folder: Path) -> RosInstallation:
+    index = folder / "share/ament_index/resource_index/packages"
+    index.mkdir(parents=True)
+    for package in packages:
+        (index / package).touch()
+    (folder / "bin").mkdir()
+    (folder / "bin" / "ros2").touch()
+    return RosInstallation("sourced", Path(sys.executable), (folder,))
+
+
+def test_a_launch_file_is_started_as_ros2_launch_does(tmp_path: Path) -> None:
+    program = launch_file_program(ros_with("ros2launch", folder=tmp_path), "bot", "demo.launch.py")
+    ros2 = str(tmp_path / "bin" / "ros2")
+    assert program == (sys.executable, ros2, "launch", "bot", "demo.launch.py")
+
+
+def test_without_ros2_launch_a_launch_file_is_our_fault(tmp_path: Path) -> None:
+    with pytest.raises(GraderFault, match=r"bot/demo.launch.py is a launch file, and this ROS"):
+        launch_file_program(ros_with("rclpy", folder=tmp_path), "bot", "demo.launch.py")

@@ -1,0 +1,65 @@
+"""The process that forks cells: it may die, and what it holds is nobody else's."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from grader import ros
+from grader.errors import GraderFault
+from grader.recording.mcap_reader import read_recording
+from grader.run.descendants import descendants
+from grader.run.runner import Runner
+from tests.run import nodes
+from tests.run.conftest import SUBMISSION, RunNode, assignment, install
+
+pytestmark = pytest.mark.ros
+
+
+def nursery_pid() -> int:
+    """The nursery: the one child of this process; its forks are its own children."""
+    (pid,) = (
+        pid
+        for pid, command in descendants(os.getpid()).items()
+        if "grader.run.nursery" in command
+        and f"PPid:\t{os.getpid()}\n" in Path(f"/proc/{pid}/status").read_text()
+    )
+    return pid
+
+
+def test_a_run_whose_nursery_is_killed_is_a_fault_and_the_next_one_is_not(tmp_path: Path) -> None:
+    course = assignment(until={"messages": 3})
+    scenario = course.scenarios[0]
+    space = install(tmp_path, nodes.timed())
+
+    def kill(_scenario: str, event: object) -> None:
+        if isinstance(event, dict) and event["event"] == "launching":
+            os.kill(nursery_pid(), signal.SIGKILL)
+
+    with Runner(ros.find(), progress=kill) as runner:
+        file = tmp_path / "run.mcap"
+        with pytest.raises(GraderFault, match="the cell of scenario 'run' ended"):
+            runner.run(course, scenario, SUBMISSION, space, file, seed=1)
+        runner.progress = lambda _scenario, _event: None
+        runner.run(course, scenario, SUBMISSION, space, file, seed=1)
+        assert len(read_recording(file).on("/cmd_vel")) >= 3
+
+
+def test_a_student_inherits_no_descriptor_but_its_own(run_node: RunNode) -> None:
+    listing = (
+        "import os\n"
+        "for fd in os.listdir('/proc/self/fd'):\n"
+        "    try: print('holds', fd, os.readlink(f'/proc/self/fd/{fd}'))\n"
+        "    except OSError: pass\n"
+    )
+    recording = run_node(listing + nodes.ONE_SHOT, until={"quiet": "300 ms"})
+    held = [line.text.split()[1:] for line in recording.log if line.text.startswith("holds ")]
+    standard = [target for fd, target in held if int(fd) <= 2]
+    others = [target for fd, target in held if int(fd) > 2]
+    assert standard[0] == "/dev/null"
+    # The tracer's two pipes, and nothing of the nursery's or of another cell's.
+    assert len([target for target in others if target.startswith("pipe:")]) == 2
+    assert not [target for target in others if target.startswith("socket:")]

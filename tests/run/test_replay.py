@@ -1,0 +1,160 @@
+"""A real node gets the very inputs of a recording again."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from grader import ros
+from grader.errors import UsageError
+from grader.recording.inputs import read_inputs
+from grader.recording.mcap_reader import read_recording
+from grader.recording.model import NS
+from grader.run.replay import ReplayOrder, make_order
+from grader.run.runner import Runner
+from tests.recording.written import write_robot_run
+from tests.run.conftest import SUBMISSION, assignment, install
+from tests.run.nodes import HEADER
+
+ROOT = Path(__file__).resolve().parents[2]
+ECHO = (
+    HEADER
+    + """
+from std_msgs.msg import String
+
+rclpy.init()
+node = Node("echo")
+publisher = node.create_publisher(String, "/echo", 10)
+
+def heard(message):
+    print("heard", message.data, flush=True)
+    publisher.publish(String(data=message.data.upper()))
+
+node.create_subscription(String, "/chatter", heard, 10)
+rclpy.spin(node)
+"""
+)
+WORDS = ["a", "b", "c", "d"]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The recording of a node that was told four words, and its install space."""
+    folder = tmp_path_factory.mktemp("replay")
+    course = assignment(
+        record=[{"topic": "/echo", "type": "std_msgs/msg/String"}],
+        stimuli=[
+            {
+                "publish": "/chatter",
+                "type": "std_msgs/msg/String",
+                "messages": [{"data": word} for word in WORDS],
+                "every": "200 ms",
+            }
+        ],
+        until={"messages": len(WORDS)},
+        timeout="10 s",
+    )
+    runner = Runner(ros.find())
+    file, place = folder / "run.mcap", install(folder, ECHO)
+    try:
+        runner.run(course, course.scenarios[0], SUBMISSION, place, file, seed=1)
+    finally:
+        runner.close()
+    return file, place
+
+
+def replay(*arguments: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "tests.run.one_replay", *map(str, arguments)],
+        cwd=ROOT,
+        env={**os.environ, "TMPDIR": str(arguments[-1].parent)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@pytest.mark.ros
+def test_a_node_hears_the_same_words_never_earlier_than_then(
+    run: tuple[Path, Path], tmp_path: Path
+) -> None:
+    file, place = run
+    recording = read_recording(file)
+    given = read_inputs(file, recording)
+    assert [message.cdr[8:9].decode() for message in given] == WORDS
+    player = replay(file, place, tmp_path / "home")
+    told, _ = player.communicate(timeout=60)
+    assert player.returncode == 0, told
+    heard = re.findall(r"^ *([\d.]+) s  bot_pub  heard (\w)$", told, re.MULTILINE)
+    assert [word for _, word in heard] == WORDS
+    assert recording.matched_ns is not None
+    for (time_s, _), message in zip(heard, given, strict=True):
+        assert float(time_s) >= (message.stamp_ns - recording.matched_ns) / NS - 0.001
+    assert "/echo  {data: A}" in told
+    assert re.search(r"rosgrade  4 messages on /echo$", told, re.MULTILINE)
+
+
+@pytest.mark.ros
+def test_ctrl_c_ends_the_node_and_leaves_nothing(run: tuple[Path, Path], tmp_path: Path) -> None:
+    file, place = run
+    player = replay(file, place, tmp_path / "home")
+    assert player.stdout is not None
+    for line in player.stdout:
+        if "heard a" in line:
+            break
+    player.send_signal(signal.SIGINT)
+    told, _ = player.communicate(timeout=60)
+    assert player.returncode == 130, told
+    assert "Traceback" not in re.sub(r"bot_pub  .*", "", told)
+    assert not _running(str(tmp_path)) and not _running(str(place))
+    assert not list(tmp_path.glob("rosgrade-replay-*"))
+
+
+@pytest.mark.ros
+def test_a_node_that_never_listens_is_told(run: tuple[Path, Path], tmp_path: Path) -> None:
+    file, _ = run
+    place = install(tmp_path, "import time\nprint('no robot today', flush=True)\n")
+    player = replay(file, place, tmp_path / "home")
+    told, _ = player.communicate(timeout=60)
+    assert player.returncode == 1
+    assert "bot_pub  no robot today" in told
+    assert "the node has ended by itself (exit code 0)" in told
+
+
+def test_without_inputs_there_is_nothing_to_replay(tmp_path: Path) -> None:
+    recording = write_robot_run(tmp_path / "run.mcap")
+    with pytest.raises(UsageError, match=r"run\.mcap: nothing was published to the node"):
+        make_order(tmp_path / "run.mcap", recording, assignment(), ros.find(), tmp_path, tmp_path)
+
+
+def test_a_scenario_that_is_no_longer_there_is_named(tmp_path: Path) -> None:
+    recording = write_robot_run(tmp_path / "run.mcap", scenario="walk")
+    with pytest.raises(UsageError, match="the assignment 'test' has no scenario 'walk'"):
+        make_order(tmp_path / "run.mcap", recording, assignment(), ros.find(), tmp_path, tmp_path)
+
+
+@pytest.mark.ros
+def test_an_order_reaches_the_player_as_it_is(run: tuple[Path, Path], tmp_path: Path) -> None:
+    file, place = run
+    order = make_order(file, read_recording(file), assignment(), ros.find(), place, tmp_path)
+    assert ReplayOrder.from_json(order.to_json()) == order
+    assert [one.topic for one in order.inputs] == ["/chatter"]
+    assert order.outputs["/echo"] == "std_msgs/msg/String"
+
+
+def _running(fragment: str) -> list[bytes]:
+    found = []
+    for file in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            line = file.read_bytes()
+        except OSError:
+            continue
+        if fragment.encode() in line:
+            found.append(line)
+    return found

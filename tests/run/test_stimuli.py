@@ -1,0 +1,156 @@
+"""Stimuli, played to real nodes: what is published, who joins, what is killed and restarted."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.recording.model import Ending, Kind, Owner
+from tests.run.conftest import RunNode
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
+
+STRING = "std_msgs/msg/String"
+INT = "std_msgs/msg/Int64"
+
+ECHO = """\
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+class Echo(Node):
+    def __init__(self):
+        super().__init__("echo")
+        self.publisher = self.create_publisher(String, "/echo", 10)
+        self.create_subscription(String, "/chatter", self.answer, 10)
+
+    def answer(self, message):
+        if message.data != "silence":
+            self.publisher.publish(String(data=message.data.upper()))
+
+rclpy.init()
+rclpy.spin(Echo())
+"""
+
+LATCHED = """\
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Int64
+
+class Latched(Node):
+    def __init__(self):
+        super().__init__("latched")
+        profile = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.publisher = self.create_publisher(Int64, "/count", profile)
+        self.create_subscription(Int64, "/history", self.take, profile)
+
+    def take(self, message):
+        self.publisher.publish(Int64(data=message.data))
+
+rclpy.init()
+rclpy.spin(Latched())
+"""
+
+
+def echoing(**scenario: object) -> dict[str, object]:
+    return {
+        "record": [{"topic": "/echo", "type": STRING}],
+        "until": {"stimuli": "done"},
+        "timeout": "10 s",
+        **scenario,
+    }
+
+
+def test_each_message_goes_out_when_the_one_before_was_answered(run_node: RunNode) -> None:
+    words = ["one", "silence", "three"]
+    stimulus = {
+        "publish": "/chatter",
+        "type": STRING,
+        "messages": [{"data": word} for word in words],
+        "answer": "/echo",
+        "within": "300 ms",
+    }
+    recording = run_node(ECHO, **echoing(stimuli=[stimulus]))
+    assert recording.ending is Ending.UNTIL
+    sent = recording.sent["/chatter"]
+    assert [message.value["data"] for message in sent] == words
+    assert [message.value["data"] for message in recording.on("/echo")] == ["ONE", "THREE"]
+    assert recording.answers == {"/chatter": "/echo"}
+    # Not before the student had matched, the second at once, the third when its time had passed.
+    assert recording.matched_ns is not None and sent[0].stamp_ns > recording.matched_ns
+    assert recording.on("/echo")[0].stamp_ns < sent[1].stamp_ns
+    assert sent[2].stamp_ns - sent[1].stamp_ns >= 0.3e9
+    # The probe's own publisher is none of the student's.
+    (ours,) = [item for item in recording.endpoints if item.topic == "/chatter"
+               and item.kind is Kind.PUBLISHER]  # fmt: skip
+    assert ours.owner is Owner.PROBE
+
+
+def test_what_was_published_before_the_launch_reaches_the_node_and_then_a_late_joiner(
+    run_node: RunNode,
+) -> None:
+    stimuli = [
+        {
+            "publish": "/history",
+            "type": INT,
+            "messages": [{"data": n} for n in range(14)],
+            "before_launch": 12,
+            "every": "100 ms",
+            "durability": "transient_local",
+            "depth": 12,
+        },
+        {
+            "join": "/count",
+            "type": INT,
+            "name": "late",
+            "after": "1 s",
+            "durability": "transient_local",
+        },
+    ]
+    recording = run_node(
+        LATCHED, **echoing(stimuli=stimuli, record=[{"topic": "/count", "type": INT}])
+    )
+    sent = recording.sent["/history"]
+    assert [message.value["data"] for message in sent] == list(range(14))
+    assert sum(message.stamp_ns < recording.launched_ns for message in sent) == 12
+    # The reader's own queue of 10 may drop some of a burst of 12; the live ones come last.
+    heard = [message.value["data"] for message in recording.on("/count")]
+    assert heard[-2:] == [12, 13]
+    assert set(range(2, 12)) <= set(heard)
+    (join,) = recording.joins
+    assert (join.name, join.topic, join.qos.durability) == ("late", "/count", "transient_local")
+    assert join.matched_ns is not None and join.matched_ns > join.joined_ns
+    # The publisher keeps the last 10 of all that it has published.
+    assert [message.value["data"] for message in recording.joined["late"]] == heard[-10:]
+
+
+def test_a_process_is_killed_and_started_again(run_node: RunNode) -> None:
+    stimuli = [
+        {"publish": "/chatter", "type": STRING, "message": {"data": "hello"}, "every": "50 ms"},
+        {"kill": "bot_pub", "after": "500 ms", "signal": "SIGINT"},
+        {"restart": "bot_pub", "after": "1500 ms"},
+    ]
+    recording = run_node(ECHO, **echoing(stimuli=stimuli, until={"elapsed": "4 s"}))
+    assert recording.ending is Ending.UNTIL
+    assert [(item.action, item.signal) for item in recording.interventions] == [
+        ("kill", "SIGINT"),
+        ("restart", ""),
+    ]
+    first, second = recording.processes
+    assert first.name == second.name
+    assert first.stopped_by == "SIGINT" and first.exited_ns is not None
+    assert first.exited_ns < second.started_ns < recording.stop_ns
+    # It answers in both of its lives.
+    answers = [message.stamp_ns for message in recording.on("/echo")]
+    assert any(stamp < first.exited_ns for stamp in answers)
+    assert any(stamp > second.started_ns for stamp in answers)
+
+
+def test_without_a_subscription_nothing_is_published_and_the_run_ends(run_node: RunNode) -> None:
+    deaf = ECHO.replace('"/chatter"', '"/chatting"')
+    stimulus = {"publish": "/chatter", "type": STRING, "message": {"data": "hello"}}
+    recording = run_node(deaf, **echoing(stimuli=[stimulus], timeout="20 s"))
+    assert recording.ending is Ending.UNTIL
+    assert recording.sent == {"/chatter": ()}
+    (wait,) = [wait for wait in recording.waits if wait.what == "a subscription on /chatter"]
+    assert wait.met_ns is None

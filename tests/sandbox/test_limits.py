@@ -1,0 +1,78 @@
+"""Limits as an author writes them, and as the sandbox's commands get them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from grader.assignment.limits import LimitOptions
+from grader.recording.model import Breach
+from grader.run.enclosure import Enclosure
+from grader.sandbox.limits import Limits
+from grader.sandbox.usage import descendants, folder_usage, memory_bytes, thread_count
+
+
+def test_an_author_s_limits_reach_the_command_in_front_of_the_program() -> None:
+    limits = LimitOptions.model_validate(
+        {"memory": "512 MiB", "processes": 40, "cpu_time": "2 min", "file_size": "1 MiB"}
+    ).limits()
+    assert limits.prlimit()[1:] == [
+        "--as=4294967296",
+        "--data=536870912",
+        "--nproc=40",
+        "--nofile=1024",
+        "--fsize=1048576",
+        "--cpu=120",
+        "--core=0",
+    ]
+
+
+def test_the_address_space_grows_with_the_memory() -> None:
+    assert LimitOptions.model_validate({"memory": "8 GiB"}).limits().address_bytes == 32 * 2**30
+
+
+@pytest.mark.parametrize(
+    ("written", "problem"),
+    [
+        ({"memory": "1 s"}, "is a unit of time, but a size is needed here"),
+        ({"memory": 5}, "has no unit"),
+        ({"processes": 2}, "greater than or equal to 16"),
+        ({"memroy": "1 GiB"}, "memroy"),
+    ],
+)
+def test_a_wrong_limit_is_refused_with_its_reason(written: object, problem: str) -> None:
+    with pytest.raises(ValidationError, match=problem):
+        LimitOptions.model_validate(written)
+
+
+def test_the_enclosure_of_an_order_survives_json() -> None:
+    import dataclasses
+    import json
+
+    enclosure = Enclosure(("--ro-bind", "/a", "/b"), "/cell/x", Limits(), {"/ws/a": "/cell/a"})
+    assert Enclosure.from_dict(json.loads(json.dumps(dataclasses.asdict(enclosure)))) == enclosure
+    assert enclosure.outside("/ws/a/lib/x") == Path("/cell/a/lib/x")
+    assert enclosure.outside("/ws/ab") == Path("/ws/ab")
+
+
+def test_a_breach_says_what_was_taken_and_what_is_allowed() -> None:
+    breach = Breach(1, "memory", "461 MiB of memory", "400 MiB")
+    assert str(breach) == "its processes took 461 MiB of memory, 400 MiB are allowed"
+    assert breach.ended
+
+
+def test_usage_is_measured(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "b").write_bytes(bytes(range(256)) * 4096)
+    (tmp_path / "link").symlink_to("/")
+    size, files = folder_usage([tmp_path], 2**30, 100)
+    assert files == 3
+    assert 2**20 <= size < 2**21
+    assert folder_usage([tmp_path], 2**30, 0)[1] >= 1
+    assert memory_bytes([os.getpid()], 0) > 2**20
+    assert memory_bytes([0], 0) == 0
+    assert thread_count([os.getpid()]) >= 1
+    assert os.getpid() in descendants(os.getppid())

@@ -1,0 +1,137 @@
+"""What the sandbox is made of: command lines, the filter, the student's Python, the choice."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from grader import ros
+from grader.errors import GraderFault
+from grader.sandbox import bubblewrap, trial
+from grader.sandbox.bubblewrap import Bind
+from grader.sandbox.choice import Choice
+from grader.sandbox.python_tree import student_prefix
+from grader.sandbox.sandbox import Sandbox, hide
+from grader.sandbox.trial import Trial, choose
+
+
+def test_what_is_bound_is_read_only_unless_it_is_to_be_written() -> None:
+    binds = [Bind.same(Path("/a")), Bind(Path("/b"), Path("/c"), writable=True)]
+    assert bubblewrap.bound(binds) == ["--ro-bind", "/a", "/a", "--bind", "/b", "/c"]
+
+
+def test_root_goes_on_as_nobody_before_bubblewrap(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    command = bubblewrap.launch(["--x"], [Bind.same(Path("/root/a"))], [], ["true"])
+    assert command.index("unshare") < command.index("setpriv") < command.index("--x")
+    assert "--reuid=61000" in command and "--no-new-privs" in command
+    assert command[-5:] == ["--ro-bind", "/run/rosgrade/0", "/root/a", "--", "true"]
+
+
+def test_a_user_starts_bubblewrap_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    command = bubblewrap.launch(["--x"], [Bind.same(Path("/home/a"))], [], ["true"])
+    assert command[1:] == ["--x", "--ro-bind", "/home/a", "/home/a", "--", "true"]
+
+
+def test_code_of_ours_is_covered_where_it_would_be_shown() -> None:
+    import grader
+
+    code = Path(grader.__file__).resolve().parent
+    assert str(code) in hide([Bind.same(code.parent)])
+    assert str(code) not in hide([Bind(Path("/elsewhere"), code.parent)])
+
+
+def test_auto_says_in_one_line_that_there_is_no_sandbox(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    missing = Trial("bwrap is not installed", "sudo apt install bubblewrap")
+    monkeypatch.setattr(trial, "try_sandbox", lambda: missing)
+    sandbox, notice = choose(Choice.AUTO, tmp_path)
+    assert sandbox is None
+    assert "no sandbox (bwrap is not installed)" in notice and "\n" not in notice
+    with pytest.raises(GraderFault, match="no sandbox: bwrap is not installed; sudo apt install"):
+        choose(Choice.BWRAP, tmp_path)
+    assert choose(Choice.NONE, tmp_path) == (None, "")
+
+
+def test_a_missing_program_is_named_with_its_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert trial.try_sandbox() == Trial("bwrap is not installed", "sudo apt install bubblewrap")
+
+
+def test_the_student_s_python_holds_ros_and_nothing_of_ours(tmp_path: Path) -> None:
+    tree = student_prefix(tmp_path)
+    (site,) = tree.glob("lib/python3*/site-packages")
+    there = {path.name for path in site.iterdir()}
+    assert {"rclpy", "geometry_msgs", "numpy", "colcon_core"} <= there
+    assert not {"pydantic", "typer", "mcap", "scipy", "_rosgrade.pth", "pyseccomp.py"} & there
+    assert not (tree / "bin" / "rosgrade").exists()
+    assert student_prefix(tmp_path) == tree
+    assert not list(tree.parent.glob(".unfinished*"))
+
+
+def test_a_library_that_the_assignment_allows_is_there(tmp_path: Path) -> None:
+    (site,) = student_prefix(tmp_path, ["scipy"]).glob("lib/python3*/site-packages")
+    assert (site / "scipy").is_dir()
+
+
+def test_a_build_room_writes_only_where_it_may(tmp_path: Path) -> None:
+    found = trial.try_sandbox()
+    if found.problem:
+        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
+    folder = tmp_path / "room"
+    folder.mkdir()
+    script = "; ".join(
+        f"(echo x > {path}) 2>/dev/null && echo {path}"
+        for path in (folder / "file", "/tmp/file", "/usr/file", "/etc/file", "/file", "/dev/file")
+    )
+    with Sandbox(tmp_path / "cache").build(ros.find(), (folder,)) as room:
+        ended = subprocess.run(
+            room.command(["/bin/sh", "-c", script + "; id -u; echo $SECRET"], {"PATH": "/usr/bin"}),
+            env={**room.environment, "SECRET": "secret"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    assert ended.stdout.split() == [str(folder / "file"), "/tmp/file", "1000"], ended.stderr
+    assert (folder / "file").read_text() == "x\n"
+    assert (folder / "file").stat().st_uid == os.getuid()
+    assert not Path("/tmp/file").exists()
+
+
+def test_the_filter_refuses_and_pretends(tmp_path: Path) -> None:
+    """Loaded into a process of its own, without any namespace around it."""
+    pytest.importorskip("pyseccomp")
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import ctypes, os, socket, struct, sys\n"
+        "code = open(sys.argv[1], 'rb').read()\n"
+        "buffer = ctypes.create_string_buffer(code)\n"
+        "class Prog(ctypes.Structure):\n"
+        "    _fields_ = [('n', ctypes.c_ushort), ('code', ctypes.c_void_p)]\n"
+        "prog = Prog(len(code) // 8, ctypes.addressof(buffer))\n"
+        "libc = ctypes.CDLL(None, use_errno=True)\n"
+        "assert libc.prctl(38, 1, 0, 0, 0) == 0\n"
+        "assert libc.prctl(22, 2, ctypes.byref(prog), 0, 0) == 0\n"
+        "def refused(call):\n"
+        "    try:\n        call()\n    except OSError as error:\n        return error.errno == 1\n"
+        "before = os.sched_getaffinity(0)\n"
+        "os.sched_setaffinity(0, {min(before)})\n"
+        "print(os.sched_getaffinity(0) == before)\n"
+        "print(refused(lambda: socket.socket(40)), refused(lambda: os.memfd_create('x')))\n"
+        "socket.socket().close(); socket.socketpair()[0].close(); os.setsid\n"
+        "print(os.waitpid(os.posix_spawn('/bin/true', ['true'], {}), 0)[1])\n"
+    )
+    filter_file = Sandbox(tmp_path).filter_file
+    said = subprocess.run(
+        [sys.executable, "-S", "-W", "ignore", str(program), str(filter_file)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert said.stdout.split() == ["True", "True", "True", "0"], said.stderr

@@ -1,0 +1,102 @@
+"""Interface packages of ours under what students hand in."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from grader import ros as ros_module
+from grader.errors import GraderFault
+from grader.recording.interface import sections_of
+from grader.ros import RosInstallation
+from grader.submission.build_cache import BuildCache
+from grader.submission.underlay import CARRIED, completed, install_prefix
+
+EXAMPLE = CARRIED / "example_interfaces"
+
+
+def definitions() -> list[Path]:
+    return sorted(path for kind in ("msg", "srv", "action") for path in EXAMPLE.glob(f"{kind}/*"))
+
+
+def test_every_definition_is_listed_for_cmake_and_every_listed_one_is_there() -> None:
+    listed = re.findall(r'"(\S+\.(?:msg|srv|action))"', (EXAMPLE / "CMakeLists.txt").read_text())
+    assert sorted(listed) == sorted(path.relative_to(EXAMPLE).as_posix() for path in definitions())
+
+
+@pytest.mark.parametrize("path", definitions(), ids=lambda path: path.name)
+def test_every_definition_can_be_read(path: Path) -> None:
+    parts = {".msg": 1, ".srv": 2, ".action": 3}[path.suffix]
+    name = f"example_interfaces/{path.suffix[1:]}/{path.stem}"
+    assert len(sections_of(name, path.read_text(encoding="utf-8"))) == parts
+
+
+# The same types under the same names are in std_msgs and std_srvs, which the wheels have.
+@pytest.mark.ros
+@pytest.mark.parametrize("path", definitions(), ids=lambda path: path.name)
+def test_what_std_msgs_and_std_srvs_have_is_the_same_here(path: Path) -> None:
+    package = {".msg": "std_msgs", ".srv": "std_srvs"}.get(path.suffix, "none")
+    theirs = [
+        prefix / "share" / package / path.suffix[1:] / path.name
+        for prefix in ros_module.find().prefixes
+    ]
+    found = next((file for file in theirs if file.is_file()), None)
+    if found is None:
+        assert path.name in ("AddTwoInts.srv", "Fibonacci.action", "WString.msg")
+        return
+    name = f"example_interfaces/{path.suffix[1:]}/{path.stem}"
+    ours, others = (
+        [[str(field) for field in part.fields] for part in sections_of(name, file.read_text())]
+        for file in (path, found)
+    )
+    assert ours == others
+
+
+def test_a_ros_that_has_the_package_is_left_as_it_is(named_ros: RosInstallation) -> None:
+    index = named_ros.prefixes[0] / "share/ament_index/resource_index/packages"
+    (index / "example_interfaces").touch()
+    cache = BuildCache(Path("/nowhere"))
+    assert completed(named_ros, ["example_interfaces"], cache) is named_ros
+
+
+def test_what_nobody_names_is_not_built(named_ros: RosInstallation) -> None:
+    cache = BuildCache(Path("/nowhere"))
+    assert completed(named_ros, ["rclpy", "turtlesim"], cache) is named_ros
+
+
+def test_underlays_are_seen_behind_the_submission(
+    named_ros: RosInstallation, tmp_path: Path
+) -> None:
+    under, over = tmp_path / "under", tmp_path / "over"
+    for prefix in (under, over):
+        (prefix / "lib/python3.11/site-packages").mkdir(parents=True)
+    index = under / "share/ament_index/resource_index/packages"
+    index.mkdir(parents=True)
+    (index / "example_interfaces").touch()
+    (under / "lib/python3.11/site-packages/example_interfaces").mkdir()
+    whole = replace(named_ros, underlays=(under,))
+    assert "example_interfaces" in whole.packages & whole.python_modules
+    environment = whole.environment({}, (over,))
+    for name, below in (
+        ("AMENT_PREFIX_PATH", ""),
+        ("CMAKE_PREFIX_PATH", ""),
+        ("PYTHONPATH", "/lib/python3.11/site-packages"),
+        ("LD_LIBRARY_PATH", "/lib"),
+    ):
+        paths = environment[name].split(":")
+        assert paths[:2] == [f"{over}{below}", f"{under}{below}"]
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+def test_a_package_of_ours_that_does_not_build_is_our_fault(tmp_path: Path) -> None:
+    folder = tmp_path / "bot_msgs"
+    folder.mkdir()
+    manifest = (EXAMPLE / "package.xml").read_text(encoding="utf-8")
+    (folder / "package.xml").write_text(manifest.replace("example_interfaces", "bot_msgs"))
+    (folder / "CMakeLists.txt").write_text('message(FATAL_ERROR "no")\n')
+    with pytest.raises(GraderFault, match=r"interface packages in .*bot_msgs could not be built"):
+        install_prefix(folder, ros_module.find(), BuildCache(tmp_path / "cache"))

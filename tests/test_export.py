@@ -1,0 +1,180 @@
+"""What a course uploads: complete, the same every time, and without anything hidden."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+import pytest
+import yaml
+
+from grader import export
+from grader.assignment.load import load_assignment
+from grader.errors import UsageError
+from tests.assignment.lessons import GOOD, HEAD
+
+ROOT = Path(__file__).resolve().parents[1]
+HIDDEN = HEAD + (
+    "  - {id: alive, uses: node.alive, points: 1}\n"
+    "  - {id: secret, uses: node.starts, points: 1, visibility: hidden}\n"
+)
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return load_assignment("timed_publisher")
+
+
+def lesson(folder, text=GOOD):
+    place = folder / "lesson"
+    place.mkdir()
+    (place / "assignment.yaml").write_text(text, encoding="utf-8")
+    return load_assignment(place)
+
+
+def test_the_gradescope_zip_has_what_gradescope_needs_at_its_top(loaded, tmp_path):
+    file = export.gradescope(loaded, tmp_path)
+    with zipfile.ZipFile(file) as archive:
+        modes = {info.filename: info.external_attr >> 16 for info in archive.infolist()}
+        assert archive.testzip() is None
+        scripts = {name: archive.read(name).decode() for name in ("setup.sh", "run_autograder")}
+    assert all(modes[name] & 0o111 for name in scripts)
+    assert all(text.startswith("#!/usr/bin/env bash\n") for text in scripts.values())
+    assert all("@" not in text.replace('"$@"', "") for text in scripts.values())
+    assert "check timed_publisher" in scripts["run_autograder"]
+    for needed in (
+        *("rosgrade/requirements.lock", "rosgrade/pyproject.toml", "rosgrade/grader/bootstrap.py"),
+        *("rosgrade/assignments/timed_publisher/assignment.yaml", "rosgrade/sim/node.py"),
+        *("rosgrade/templates/report.html.j2", "rosgrade/grader/run/fast_discovery.xml"),
+    ):
+        assert needed in modes
+    assert not [name for name in modes if "reference" in name.split("/")[1:2] or "/." in name]
+    assert not [name for name in modes if "__pycache__" in name]
+    others = {name.split("/")[2] for name in modes if name.startswith("rosgrade/assignments/")}
+    assert others == {"timed_publisher"}
+
+
+def test_the_same_files_give_the_same_zip(loaded, tmp_path):
+    first = export.gradescope(loaded, tmp_path / "a").read_bytes()
+    assert export.gradescope(loaded, tmp_path / "b").read_bytes() == first
+
+
+@pytest.mark.parametrize("name", ["setup.sh", "run_autograder"])
+def test_the_scripts_are_bash(loaded, tmp_path, name):
+    with zipfile.ZipFile(export.gradescope(loaded, tmp_path)) as archive:
+        archive.extract(name, tmp_path)
+    subprocess.run(["bash", "-n", str(tmp_path / name)], check=True)
+
+
+@pytest.fixture
+def root():
+    """What is /autograder there; not below /tmp, of which a sandbox has its own."""
+    with tempfile.TemporaryDirectory(dir="/var/tmp") as name:
+        yield Path(name)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(("submission", "score"), [("reference", 10.0), ("nothing", 0.0)])
+def test_the_autograder_runs_as_gradescope_runs_it(loaded, root, submission, score):
+    with zipfile.ZipFile(export.gradescope(loaded, root)) as archive:
+        archive.extractall(root / "source")
+    # The environment that setup.sh would make is the one that runs this test.
+    bin_folder = root / "source" / "rosgrade" / ".venv" / "bin"
+    bin_folder.mkdir(parents=True)
+    command = bin_folder / "rosgrade"
+    command.write_text(
+        f'#!/bin/sh\nPYTHONPATH={root}/source/rosgrade exec {sys.executable} -m grader "$@"\n'
+    )
+    command.chmod(0o755)
+    run = root / "run_autograder"
+    shutil.copy(root / "source" / "run_autograder", run)
+    run.chmod(0o755)
+    if submission == "reference":
+        shutil.copytree(ROOT / "reference" / "timed_publisher", root / "submission")
+    else:
+        (root / "submission").mkdir()
+    (root / "submission_metadata.json").write_text(
+        '{"created_at": "2026-03-05T09:00:00Z", "assignment": {"due_date": "2026-03-05T08:00:00Z"}}'
+    )
+    ended = subprocess.run(
+        [str(run)],
+        env={**os.environ, "AUTOGRADER_ROOT": str(root)},
+        capture_output=True,
+        text=True,
+        timeout=110,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    data = json.loads((root / "results" / "results.json").read_text(encoding="utf-8"))
+    assert data["score"] == score, ended.stdout + ended.stderr
+    assert data["extra_data"]["late_s"] == 3600.0
+
+
+def test_the_workflow_uses_the_action_that_the_course_names(loaded, tmp_path):
+    file = export.github(loaded, tmp_path, "my-course/rosgrade@v1")
+    assert file == tmp_path / ".github" / "workflows" / "rosgrade.yml"
+    steps = yaml.safe_load(file.read_text())["jobs"]["grade"]["steps"]
+    (grade,) = (step for step in steps if step.get("id") == "grade")
+    assert grade["uses"] == "my-course/rosgrade@v1"
+    assert grade["with"] == {"assignment": "timed_publisher"}
+    assert "container" not in yaml.safe_load(file.read_text())["jobs"]["grade"]
+
+
+def test_the_workflow_gives_the_action_only_inputs_that_it_has(loaded, tmp_path):
+    action = yaml.safe_load((ROOT / "action.yml").read_text())
+    file = export.github(loaded, tmp_path, "my-course/rosgrade@v1")
+    steps = yaml.safe_load(file.read_text())["jobs"]["grade"]["steps"]
+    given = next(step["with"] for step in steps if step.get("id") == "grade")
+    assert set(given) <= set(action["inputs"])
+    required = {name for name, one in action["inputs"].items() if one.get("required")}
+    assert required <= set(given)
+
+
+def test_no_input_of_the_action_reaches_a_shell_as_text():
+    action = yaml.safe_load((ROOT / "action.yml").read_text())
+    scripts = [step["run"] for step in action["runs"]["steps"] if "run" in step]
+    assert scripts and not any("${{" in script for script in scripts)
+    for script in scripts:
+        subprocess.run(["bash", "-n", "-c", script], check=True)
+
+
+def test_an_assignment_of_the_course_is_copied_into_the_repository(tmp_path):
+    file = export.github(lesson(tmp_path), tmp_path / "repo", "c/r@v1")
+    assert "assignment: .github/rosgrade/lesson\n" in file.read_text()
+    copy = tmp_path / "repo" / ".github" / "rosgrade" / "lesson"
+    assert load_assignment(copy).sha256 == load_assignment(tmp_path / "lesson").sha256
+
+
+@pytest.mark.parametrize("kind", ["github", "classroom50"])
+def test_hidden_checks_do_not_go_where_students_can_read_them(tmp_path, kind):
+    hidden = lesson(tmp_path, HIDDEN)
+    out = tmp_path / "out"
+    with pytest.raises(UsageError, match=r"'lesson' has checks that are not visible \(1\), and"):
+        export.github(hidden, out, "c/r@v1") if kind == "github" else export.classroom50(
+            hidden, out
+        )
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("action", ["rosgrade", "a/b", "a/b@v1\n  evil: 1", ""])
+def test_an_action_that_is_none_is_refused(loaded, tmp_path, action):
+    with pytest.raises(UsageError, match="is no action: write OWNER/REPOSITORY@REF"):
+        export.github(loaded, tmp_path, action)
+
+
+def test_the_classroom50_folder_can_be_written_again(loaded, tmp_path):
+    folder = export.classroom50(loaded, tmp_path)
+    (folder / "old").write_text("")
+    assert export.classroom50(loaded, tmp_path) == folder
+    assert not (folder / "old").exists()
+    script = (folder / "autograder.py").read_text(encoding="utf-8")
+    compile(script, "autograder.py", "exec")
+    assert '"check", "timed_publisher", "."' in script
+    assert (folder / "rosgrade" / "grader" / "bootstrap.py").is_file()
+    assert not [path for path in tmp_path.iterdir() if path != folder]
