@@ -81,8 +81,8 @@ def root():
 
 @pytest.mark.ros
 @pytest.mark.parametrize(("submission", "score"), [("reference", 10.0), ("nothing", 0.0)])
-def test_the_autograder_runs_as_gradescope_runs_it(loaded, root, submission, score):
-    with zipfile.ZipFile(export.gradescope(loaded, root)) as archive:
+def test_the_autograder_runs_as_gradescope_runs_it(root, submission, score):
+    with zipfile.ZipFile(export.gradescope(load_assignment("simple_publisher"), root)) as archive:
         archive.extractall(root / "source")
     # The environment that setup.sh would make is the one that runs this test.
     bin_folder = root / "source" / "rosgrade" / ".venv" / "bin"
@@ -96,7 +96,7 @@ def test_the_autograder_runs_as_gradescope_runs_it(loaded, root, submission, sco
     shutil.copy(root / "source" / "run_autograder", run)
     run.chmod(0o755)
     if submission == "reference":
-        shutil.copytree(ROOT / "reference" / "timed_publisher", root / "submission")
+        shutil.copytree(ROOT / "reference" / "simple_publisher", root / "submission")
     else:
         (root / "submission").mkdir()
     (root / "submission_metadata.json").write_text(

@@ -86,9 +86,9 @@ def gimbal_lock(seed: int) -> list[dict]:
             math.cos(pitch) * math.sin(turn),
             math.cos(pitch) * math.cos(turn),
         )
-        length = math.sqrt(sum(value * value for value in values))
         # Some nodes scale what has length 1 already, and so change the rounding errors.
-        sines = [_sine_of_pitch(values), _sine_of_pitch([value / length for value in values])]
+        lengths = (1.0, math.hypot(*values), math.sqrt(sum(value * value for value in values)))
+        sines = [_sine_of_pitch([value / length for value in values]) for length in lengths]
         if max(sines) < 1.0:
             less.append(values)
         elif min(sines) > 1.0:

@@ -14,7 +14,7 @@ from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.draft import Draft
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.source import Source, read_source
-from grader.assignment.withheld import Withheld
+from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, Problem, UsageError
@@ -49,7 +49,7 @@ class LoadedAssignment:
     file: Path
     sha256: str
     checks: tuple[BoundCheck, ...]
-    withheld: Withheld = Withheld()
+    withheld: Withheld = NOTHING_WITHHELD
 
     @property
     def folder(self) -> Path:

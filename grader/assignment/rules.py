@@ -16,7 +16,7 @@ from grader.checks.check import Subject
 from grader.errors import Problem
 from grader.nearest import did_you_mean
 
-_MESSAGE_FAMILIES = ("messages", "timing", "parameter")
+_MESSAGE_FAMILIES = ("messages", "timing", "callbacks", "rotation", "parameter")
 """Families that judge received messages: what is not recorded looks like silence to them."""
 
 

@@ -25,3 +25,6 @@ class Withheld:
     def __add__(self, other: Withheld) -> Withheld:
         """Both together."""
         return Withheld(self.checks + other.checks, self.points + other.points)
+
+
+NOTHING_WITHHELD = Withheld()

@@ -18,12 +18,16 @@ from grader.report.result_model import Result
 def find_reports(out: Path) -> tuple[Path, ...]:
     """The report folders at a path: itself, or those of a class in it, sorted.
 
+    Hidden folders are left out: a batch that still runs writes in them.
+
     Raises:
         UsageError: There is none.
     """
     if (out / RESULT_FILE).is_file():
         return (out,)
-    found = tuple(sorted(file.parent for file in out.rglob(RESULT_FILE)))
+    inside = sorted(file.parent.relative_to(out) for file in out.rglob(RESULT_FILE))
+    hidden = [path for path in inside if any(part.startswith(".") for part in path.parts)]
+    found = tuple(out / path for path in inside if path not in hidden)
     if not found:
         raise UsageError(f"{out}: there is no {RESULT_FILE} in it, nor in a folder below it")
     return found

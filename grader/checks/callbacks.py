@@ -30,8 +30,8 @@ class Runs(Reported):
     period: Duration | None = Field(
         None, description="Expected time between two starts of each callback."
     )
-    messages: TopicName | None = Field(
-        None, description="Topic of a stimulus: each message on it must be worked on once."
+    stimulus: TopicName | None = Field(
+        None, description="Topic on which the probe publishes: each message must be worked on once."
     )
     tolerance: Tolerance = Field(
         TimeTolerance(0.10, relative=True),
@@ -42,8 +42,8 @@ class Runs(Reported):
 
     @model_validator(mode="after")
     def _one_way(self) -> Runs:
-        if (self.period is None) == (self.messages is None):
-            raise ValueError("say what calls them: give either 'period' or 'messages'")
+        if (self.period is None) == (self.stimulus is None):
+            raise ValueError("say what calls them: give either 'period' or 'stimulus'")
         return self
 
 
@@ -90,7 +90,7 @@ def _run_words(parameters: Runs) -> str:
             f"{parameters.tolerance}), and report start and end on {code(parameters.topic)}"
         )
     return (
-        f"{names} {each}run once for each message on {code(parameters.messages or '')}, and report "
+        f"{names} {each}run once for each message on {code(parameters.stimulus or '')}, and report "
         f"start and end on {code(parameters.topic)}"
     )
 
@@ -143,10 +143,10 @@ def _judge_messages(
 ) -> Finding | None:
     """The finding of a callback that does not run once for each message, or None."""
     expected = _run_words(parameters)
-    sent = recording.sent.get(parameters.messages or "", ())
+    sent = recording.sent.get(parameters.stimulus or "", ())
     if not sent:
         return Finding.error(
-            expected, f"nothing was sent on {code(parameters.messages or '')}", disturbed=True
+            expected, f"nothing was sent on {code(parameters.stimulus or '')}", disturbed=True
         )
     begun, ended = len(reports.of(callback)), len(reports.ended([callback]))
     evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))

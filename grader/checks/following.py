@@ -24,6 +24,8 @@ _TELLING = 4.0
 _MOST_EXPLAINED = 100
 # Share of the messages for which an explanation must hold.
 _NEARLY_ALL = 0.9
+_NOT_FINITE = "not a finite number"
+_NOT_THERE = "not a finite number, or not there at all: the array is too short"
 _NEVER_SET = "never set"
 _ALWAYS_THE_SAME = "always the same"
 
@@ -232,7 +234,7 @@ def _explanation(made_of: MadeOf, seen: Sequence[Sample], bad: Sequence[int]) ->
     for index in bad:
         numbers = [sample.values[index] for sample in seen]
         if any(not math.isfinite(number) for number in numbers):
-            found[index] = "not a finite number"
+            found[index] = _NOT_THERE if "[" in made_of.fields[index] else _NOT_FINITE
         elif len(numbers) > 1 and spread(numbers) <= 0.0:
             found[index] = _ALWAYS_THE_SAME if numbers[0] else _NEVER_SET
         else:

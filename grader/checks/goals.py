@@ -53,7 +53,9 @@ def judged_goals(
         if ended:
             return cause_of_death(recording, ended[0])
         asked = f" with {fields_words(fields)}" if fields else ""
-        return Cause(f"the probe sent no such goal{asked} to {code(action)}", ours=True)
+        return Cause(
+            f"the probe sent no such goal{asked} to {code(action)}", ours=True, disturbed=True
+        )
     for goal in found:
         if goal.error:
             return Cause(
@@ -83,7 +85,8 @@ def why_no_result(recording: Recording, goal: Goal, within_s: float) -> Cause | 
     if goal.result_ns is None:
         what = f"the goal ({fields_words(goal.goal)}) was accepted, but never had a result"
         if not dead(recording) and (recording.stop_ns - goal.sent_ns) / NS < within_s:
-            return Cause(f"{what}: the scenario ended before one was due", ours=True)
+            ended = f"{what}: the scenario ended before one was due"
+            return Cause(ended, ours=True, disturbed=True)
         return _unanswered(recording, goal, what, within_s)
     took_s = (goal.result_ns - goal.sent_ns) / NS
     if took_s <= within_s:

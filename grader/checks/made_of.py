@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
-from grader.checks.field import number_at
+from grader.checks.field import number_at, value_at
 from grader.checks.source_value import SourceValue
+from grader.checks.value import NoSuchField
 from grader.recording.model import NS, Message, Recording
 
 # rmw gives the largest number where it does not know a sequence number.
@@ -23,7 +24,7 @@ class Sample:
     Attributes:
         number: Which message on its topic, from 1.
         message: The message.
-        values: The numbers in its fields.
+        values: The numbers in its fields; NaN for one that is not there.
         window: Indices of those sources; the last one is the newest that there was.
         is_known: Whether the recording has all of those sources. It may lack one that was lost
             on its way, and what was published after the newest one that it has.
@@ -87,7 +88,7 @@ class MadeOf:
         within_ns = round(within_s * NS)
         samples = []
         for number, message in enumerate(messages, start=1):
-            numbers = tuple(number_at(message.value, field) for field in fields)
+            numbers = tuple(_number(message, field) for field in fields)
             last = bisect_right(stamps, message.stamp_ns)
             if not last:
                 continue
@@ -144,6 +145,28 @@ class MadeOf:
             for row in sample.window
         )
         return min(errors, key=abs)
+
+
+def _number(message: Message, field: str) -> float:
+    """The number in a field; NaN for an item that an array of the student's does not have.
+
+    Raises:
+        NoSuchField: The type has no such field, or it holds no number.
+    """
+    try:
+        return number_at(message.value, field)
+    except NoSuchField:
+        array = field.rpartition("[")[0]
+        if array and _is_short(message, array):
+            return math.nan
+        raise
+
+
+def _is_short(message: Message, array: str) -> bool:
+    try:
+        return isinstance(value_at(message.value, array), Sequence)
+    except NoSuchField:
+        return False
 
 
 def _lost(before: Message, after: Message) -> int:

@@ -292,7 +292,7 @@ def set_(recording: Recording, parameters: Set) -> Finding:
     ]
     if not tried:
         ended = dead(recording)
-        missing = Cause("the probe did not try to set it", ours=True)
+        missing = Cause("the probe did not try to set it", ours=True, disturbed=True)
         return (cause_of_death(recording, ended[0]) if ended else missing).finding(expected)
     asked = tuple(item.call for item in tried)
     cause = why_services_silent(recording, parameters.node, asked)

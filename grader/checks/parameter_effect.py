@@ -86,7 +86,7 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     tried = [item for item in every if same_value(parameters.value, item.value)]
     if not tried:
         ended = dead(recording)
-        missing = Cause("the probe did not try to set it", ours=True)
+        missing = Cause("the probe did not try to set it", ours=True, disturbed=True)
         return (cause_of_death(recording, ended[0]) if ended else missing).finding(expected)
     item = tried[0]
     if not item.accepted:
@@ -164,7 +164,7 @@ def _too_few(
         return cause_of_death(recording, ended[0]).after(seen)
     due_s = _LEAST_PERIODS * (parameters.period or 0.0)
     if watched_s <= due_s:
-        return Cause(f"{seen}: the scenario is too short to judge", ours=True)
+        return Cause(f"{seen}: the scenario is too short to judge", ours=True, disturbed=True)
     taken_s = recording.taken_s(begin_ns, end_ns)
     if taken_s > 0.0 and watched_s - taken_s <= due_s:
         return Cause(f"{seen}, but the machine took {format_duration(taken_s)}", ours=True,

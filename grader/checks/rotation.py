@@ -45,8 +45,8 @@ Tolerance = Annotated[float, QuantityOf(Dimension.ANGLE, minimum=0.0, exclusive=
 class Answers(Parameters):
     """Parameters of rotation.answers."""
 
-    question: TopicName = Field(description="Topic on which the probe sends what to convert.")
-    answer: TopicName = Field(description="Topic on which the node answers.")
+    stimulus: TopicName = Field(description="Topic on which the probe sends what to convert.")
+    topic: TopicName = Field(description="Topic on which the node answers.")
     conversion: Literal["axis_angle_to_quaternion", "rpy_to_quaternion", "quaternion_to_rpy"] = (
         Field(
             description="What is asked. `axis_angle_to_quaternion`: `data` = [x, y, z, angle] to a "
@@ -79,7 +79,7 @@ class Answers(Parameters):
             "" if self.conversion == "quaternion_to_rpy" else f", length 1 within {self.length:g}"
         )
         return (
-            f"each message on {code(self.question)}{which} answered on {code(self.answer)} with "
+            f"each message on {code(self.stimulus)}{which} answered on {code(self.topic)} with "
             f"the same rotation, within {degrees(self.tolerance)}{unit}"
         )
 
@@ -107,12 +107,12 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     called), and messages that nobody asked for.
     """
     expected = parameters.words
-    sent = recording.sent.get(parameters.question, ())
-    received = recording.on(parameters.answer)
+    sent = recording.sent.get(parameters.stimulus, ())
+    received = recording.on(parameters.topic)
     if not sent:
         return _not_asked(recording, parameters).finding(expected)
     if not received:
-        return why_silent(recording, parameters.answer).finding(expected)
+        return why_silent(recording, parameters.topic).finding(expected)
     limits = Limits(parameters.tolerance, parameters.length)
     try:
         found = cases(parameters.conversion, sent, received, limits)
@@ -122,7 +122,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     wrong = [case for case in judged if case.answers and not case.good]
     missing = [case for case in judged if not case.answers and not case.optional]
     evidence = evidence_of(
-        recording, parameters.conversion, parameters.answer, parameters.tolerance, judged
+        recording, parameters.conversion, parameters.topic, parameters.tolerance, judged
     )
     if _is_behind(found):
         return _behind(parameters, found, evidence)
@@ -139,9 +139,9 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
 
 
 def _not_asked(recording: Recording, parameters: Answers) -> Cause:
-    cause = why_not_delivered(recording, parameters.question)
+    cause = why_not_delivered(recording, parameters.stimulus)
     return cause or Cause(
-        f"nothing was sent on {code(parameters.question)}", ours=True, disturbed=True
+        f"nothing was sent on {code(parameters.stimulus)}", ours=True, disturbed=True
     )
 
 
@@ -261,8 +261,8 @@ def _by_kind(wrong: list[Case]) -> tuple[str, str]:
 def _unasked(parameters: Answers, unasked: int, evidence: Evidence) -> Finding:
     return Finding.failed(
         parameters.words,
-        f"{counted(unasked, 'message')} on {code(parameters.answer)} before anything was asked on "
-        f"{code(parameters.question)}",
+        f"{counted(unasked, 'message')} on {code(parameters.topic)} before anything was asked on "
+        f"{code(parameters.stimulus)}",
         "Publish in the callback of the subscription, once for each message, and not in a timer.",
         evidence,
     )
@@ -285,7 +285,7 @@ def _missing(
     if ended:
         cause = cause_of_death(recording, ended[0])
         return cause.after(observed).finding(expected)
-    received = recording.on(parameters.answer)
+    received = recording.on(parameters.topic)
     lost = published(received) - len(received)
     if len(missing) <= lost:
         return Finding.error(

@@ -157,7 +157,7 @@ def judged_calls(
         if ended:
             return cause_of_death(recording, ended[0])
         asked = f" with {fields_words(request)}" if request else ""
-        return Cause(f"the probe sent no call{asked} to {code(service)}", ours=True)
+        return Cause(f"the probe sent no call{asked} to {code(service)}", ours=True, disturbed=True)
     lost = next((call for call in found if call.error), None)
     if lost is not None:
         return Cause(
@@ -180,6 +180,7 @@ def why_late(
                 f"the scenario ended {format_duration(_until_stop_s(recording, first))} after the "
                 f"call to {code(service)}, before an answer was due",
                 ours=True,
+                disturbed=True,
             )
         what = f"{_which(calls, first)} to {code(service)} was never answered"
         return why_unanswered(recording, what, node, first.requested_ns, within_s)

@@ -79,15 +79,16 @@ def batch(
         Ledger(out).opened() as ledger,
         ClassProgress(quiet) as progress,
     ):
-        known, rows = _rows(submissions, roster, Path(staging))
-        for problem in known.problems if known else ():
+        names, rows = _rows(submissions, roster, Path(staging))
+        for problem in names.problems if names else ():
             progress.note(f"{roster or submissions}: {problem}")
         work = Batch(loaded, ledger, frozenset(retry or ()))
         progress.begin("reading", len(rows))
         entries, to_do = work.read(rows, progress.advance)
         crew = _crew(order, loaded, scheduler, at_once) if to_do else None
         done: list[Done] = []
-        progress.begin("grading", len(entries), already=len(entries) - len(to_do))
+        known = [e for e in entries if e.key not in to_do and ledger.result(e.key) is not None]
+        progress.begin("grading", len(entries), already=len(known))
         try:
             for item in work.grade(to_do, crew):
                 done.append(item)

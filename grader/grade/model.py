@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.assignment.model import Assignment, Visibility
-from grader.assignment.withheld import Withheld
+from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
 from grader.checks.finding import Finding, Status
 from grader.grade.points import total
 from grader.submission.record import SubmissionRecord
@@ -83,7 +83,7 @@ class Grade:
     assignment_sha256: str
     submission: SubmissionRecord
     results: tuple[CheckResult, ...]
-    withheld: Withheld = Withheld()
+    withheld: Withheld = NOTHING_WITHHELD
 
     @property
     def graded(self) -> bool:

@@ -208,7 +208,8 @@ class Declaration:
             ``executor``, ``callback_group``, ``held`` (a publisher waited for its match),
             ``exiting`` (Python ends in its usual way).
         data: For publisher and subscription: node, topic, type, reliability, durability,
-            history, depth. For timer: node, period_s, callback, group. For spin: executor,
+            history, depth; for subscription also group. For timer: node, period_s, callback,
+            group (type and id of the callback group). For spin: executor,
             threads. For held: topic, waited_s, matched.
     """
 

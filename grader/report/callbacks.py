@@ -31,9 +31,7 @@ def draw_callbacks(spans: Sequence[Span], name: str) -> Figure | None:
     Returns:
         The drawing, or None where there is nothing to draw.
     """
-    drawable = [
-        span for span in spans if 0.0 <= span.begin_s <= span.end_s <= LONGEST_S
-    ]
+    drawable = [span for span in spans if 0.0 <= span.begin_s <= span.end_s <= LONGEST_S]
     rows: dict[str, list[Span]] = {}
     for span in sorted(drawable, key=lambda item: item.begin_s):
         rows.setdefault(span.name, []).append(span)

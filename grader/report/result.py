@@ -168,4 +168,5 @@ def _scenario(recording: Recording, file: str | None) -> ScenarioPart:
             worst_late_s=max((item.late_ns for item in recording.disturbance), default=0) / NS,
         ),
         faults=recording.faults,
+        breaches=tuple(str(breach) for breach in recording.breaches),
     )

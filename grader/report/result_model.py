@@ -199,6 +199,7 @@ class ScenarioPart(_Part):
     duration_s: Number
     disturbance: DisturbancePart
     faults: tuple[Text, ...]
+    breaches: tuple[Text, ...] = ()
 
 
 class BuildPart(_Part):

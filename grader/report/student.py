@@ -12,9 +12,9 @@ def for_student(result: Result) -> Result:
     """Leave out what a student does not get to see before grading.
 
     Checks that are not visible go with all that they say, scenarios that only they judged go
-    with their recordings, and so do the tracebacks of checks that broke; score and what to fix first are those of the visible checks. What is
-    left of the rest is its number and its points. It is the result that
-    :func:`~grader.assignment.selection.visible_part` gives.
+    with their recordings, and so do the tracebacks of checks that broke. Score and what to fix
+    first are those of the visible checks; what is left of the rest is its number and its points.
+    It is the result that :func:`~grader.assignment.selection.visible_part` gives.
 
     Args:
         result: The whole result; no visible check waits for one that is not.

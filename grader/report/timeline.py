@@ -94,6 +94,8 @@ def _flags(recording: Recording) -> tuple[Flag, ...]:
     add(recording.matched_ns, "matched")
     firsts = [messages[0].stamp_ns for messages in recording.messages.values() if messages]
     add(min(firsts, default=None), "first message")
+    for item in recording.interventions:
+        add(item.time_ns, f"{item.signal or item.action} from the scenario")
     if any(process.stopped_by != "itself" for process in recording.processes):
         add(recording.stop_ns, "SIGINT")
     for process in recording.processes:
@@ -119,6 +121,9 @@ def _lanes(recording: Recording, moments: Sequence[Moment]) -> list[Lane]:
     for topic, messages in sorted(recording.messages.items()):
         times = tuple(since(message.stamp_ns) for message in messages)
         lanes.append(Lane(topic, counted(len(times), "message"), ticks=times))
+    for topic, messages in sorted(recording.sent.items()):
+        times = tuple(since(message.stamp_ns) for message in messages)
+        lanes.append(Lane(f"to {topic}", f"{counted(len(times), 'message')} sent", ticks=times))
     for asked, calls in _calls(recording).items():
         lost = [call for call in calls if call.answered_ns is None]
         note = counted(len(calls), "call")

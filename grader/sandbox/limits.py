@@ -56,7 +56,7 @@ class Limits:
 
 BUILD = Limits(
     memory_bytes=2048 * MIB,
-    processes=512,
+    processes=128,
     cpu_s=600,
     file_bytes=256 * MIB,
     disk_bytes=1024 * MIB,

@@ -55,10 +55,18 @@ class Sandbox:
 
     @cached_property
     def filter_file(self) -> Path:
-        """A file with the filter of system calls."""
+        """A file with the filter of system calls for a run."""
+        return self._filter_file(one_session=False)
+
+    @cached_property
+    def build_filter_file(self) -> Path:
+        """A file with the filter of system calls for a build."""
+        return self._filter_file(one_session=True)
+
+    def _filter_file(self, *, one_session: bool) -> Path:
         from grader.sandbox.seccomp import student_filter
 
-        program = student_filter()
+        program = student_filter(one_session=one_session)
         file = self.cache / "sandbox" / f"{hashlib.sha256(program).hexdigest()[:32]}.bpf"
         if not file.is_file():
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -170,7 +178,7 @@ class BuildRoom:
         last = [*hidden, "--remount-ro", "/", "--remount-ro", "/dev"]
         last += ["--chdir", str(self.folders[0]), *bubblewrap.variables(environment)]
         inner = [*self.limits.prlimit(), "--", *command]
-        return bubblewrap.launch(arguments, binds, last, inner, self.sandbox.filter_file)
+        return bubblewrap.launch(arguments, binds, last, inner, self.sandbox.build_filter_file)
 
     def excess(self, pid: int) -> str | None:
         """Say which limit a build has passed, or None.

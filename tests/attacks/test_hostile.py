@@ -189,7 +189,7 @@ ATTACKS = {
         lost=frozenset({"starts"}),
     ),
     "build_fork_bomb": Attack(
-        at_build=BOMB, lost=frozenset({"builds"}), named=("it started 512 processes",)
+        at_build=BOMB, lost=frozenset({"builds"}), named=("it started 128 processes",)
     ),
     "build_plants_links": Attack(
         at_build="import os\nos.makedirs('../install', exist_ok=True)\n"

@@ -211,7 +211,12 @@ def declared(kind: str, time_s: float = 0.4, name: str = BOT, **data: Any) -> De
 
 
 def declarations(
-    *, timer_s: float | None = PERIOD_S, spin: bool = True, depth: int = 10, name: str = BOT
+    *,
+    timer_s: float | None = PERIOD_S,
+    spin: bool = True,
+    depth: int = 10,
+    name: str = BOT,
+    exiting_ns: int | None = None,
 ) -> tuple[Declaration, ...]:
     """What the tracer reports of a publisher."""
     found = [
@@ -229,7 +234,8 @@ def declarations(
         )
     if spin:
         found.append(declared("spin", 0.41, name, executor="SingleThreadedExecutor", threads=1))
-    return (*found, declared("exiting", STOP_S + 0.05, name))
+    exiting_ns = at(STOP_S) + NS // 20 if exiting_ns is None else exiting_ns
+    return (*found, Declaration(exiting_ns, name, "exiting", {}))
 
 
 def sent(
@@ -348,7 +354,7 @@ def recording(**changes: Any) -> Recording:
         nodes=(node(), node("/probe", 0.0, owner=Owner.PROBE)),
         endpoints=(endpoint(), endpoint("/rosout", type="rcl_interfaces/msg/Log"), reader()),
         processes=(process(),),
-        declarations=declarations(),
+        declarations=declarations(exiting_ns=changes.get("stop_ns", at(STOP_S)) + NS // 20),
         calls=calls(),
     )
     return replace(healthy, **changes)

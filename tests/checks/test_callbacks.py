@@ -159,32 +159,32 @@ class TestRun:
 
     def test_one_run_for_each_message(self):
         subject = run(*parallel(), sent_s=[2.5] * 8)
-        finding = judged("run", subject, ["chatter"], messages="/chatter")
+        finding = judged("run", subject, ["chatter"], stimulus="/chatter")
         assert finding.status is Status.PASSED
 
     def test_messages_that_were_dropped(self):
-        words = failed("run", run(*parallel(), sent_s=[2.5] * 10), ["chatter"], messages="/chatter")
+        words = failed("run", run(*parallel(), sent_s=[2.5] * 10), ["chatter"], stimulus="/chatter")
         assert "started 8 times and ended 8 times for 10 messages" in words
         assert "queue size" in words
 
     def test_messages_that_wait_behind_others_do_not_count(self):
         busy = [("timer_1", 1 + 0.4 * index, 1.4 + 0.4 * index) for index in range(13)]
         runs = [*busy, *(("chatter", 6.2 + 0.05 * i, 6.25 + 0.05 * i) for i in range(4))]
-        finding = judged("run", run(*runs, sent_s=[2.5] * 8), ["chatter"], messages="/chatter")
+        finding = judged("run", run(*runs, sent_s=[2.5] * 8), ["chatter"], stimulus="/chatter")
         assert finding.status is Status.PASSED
 
     def test_a_second_run_for_a_message(self):
-        words = failed("run", run(*parallel(), sent_s=[2.5] * 4), ["chatter"], messages="/chatter")
+        words = failed("run", run(*parallel(), sent_s=[2.5] * 4), ["chatter"], stimulus="/chatter")
         assert "for 4 messages" in words
         assert "Create one subscription" in words
 
     def test_nothing_was_sent(self):
-        finding = judged("run", run(*parallel()), ["chatter"], messages="/chatter")
+        finding = judged("run", run(*parallel()), ["chatter"], stimulus="/chatter")
         assert finding.status is Status.ERROR
 
     def test_it_must_be_said_what_calls_them(self):
-        for more in ({}, {"period": "1 s", "messages": "/chatter"}):
-            with pytest.raises(ValueError, match="either 'period' or 'messages'"):
+        for more in ({}, {"period": "1 s", "stimulus": "/chatter"}):
+            with pytest.raises(ValueError, match="either 'period' or 'stimulus'"):
                 judged("run", run(*parallel()), TIMERS, **more)
 
 

@@ -87,8 +87,8 @@ PARAMETERS = {
     "callbacks.never_overlap": {"topic": "/cmd_vel", "callbacks": ["timer_1"]},
     "callbacks.overlap": {"topic": "/cmd_vel", "callbacks": ["timer_1"], "others": ["timer_2"]},
     "rotation.answers": {
-        "question": "/rpy",
-        "answer": "/cmd_vel",
+        "stimulus": "/rpy",
+        "topic": "/cmd_vel",
         "conversion": "rpy_to_quaternion",
     },
     "executor.responsive": {"within": "1 s"},

@@ -179,6 +179,14 @@ class TestExplains:
         assert "`pose.x`" in found and "it is `twist.twist.linear.x`" in found
         assert "`speed`" in found and "it is `pose.pose.position.x`" in found
 
+    @pytest.mark.parametrize("items", [[], [1.0]])
+    def test_an_array_that_is_too_short(self, items):
+        subject = run(lambda t: {**right(t), "speeds": items})
+        fields = {"speeds[1]": "twist.twist.linear.x"}
+        found = verdict(subject, fields=fields)
+        assert found.status is Status.FAILED
+        assert "the array is too short" in found.observed
+
     def test_values_that_never_change(self):
         found = told(run(lambda _: right(FIRST_S)))
         assert "`pose.x` = 0 instead of" in found

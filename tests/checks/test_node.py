@@ -265,7 +265,7 @@ class TestAlive:
         """Under load the way out takes a while; with exit code -2 it shows no more than SIGINT."""
         said = (*declarations()[:-1], declared("exiting", 3.0))
         for exit_code in (0, -2, 1):
-            late = replace(process(exited_s=4.3), exit_code=exit_code)
+            late = process(exited_s=4.7, exit_code=exit_code)
             run = recording(processes=(late,), declarations=said)
             found = failing("node.alive", run)
             assert "ended 3.00 s after launch" in found

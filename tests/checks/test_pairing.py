@@ -120,5 +120,5 @@ def test_the_answer_before_sent_again_for_an_optional_question_is_no_second_copy
 def test_a_node_that_says_everything_twice_may_be_late_with_a_copy():
     answers = [(1, 0), (11, 0), (21, 2), (22, 2), (31, 3), (32, 3)]
     assert paired([0, 10, 20, 30], answers, optional={1}) == (0, 0, 2, 2, 3, 3)
-    answers = [(1, 0), (2, 0), (11, 1), (12, 1), (21, 2), (31, 2)]
-    assert paired([0, 10, 20, 30], answers) == (0, 0, 1, 1, 2, 2)
+    answers = [(1, 0), (2, 0), (11, 1), (12, 1), (21, 2), (22, 2), (31, 3), (41, 3)]
+    assert paired([0, 10, 20, 30, 40], answers) == (0, 0, 1, 1, 2, 2, 3, 3)

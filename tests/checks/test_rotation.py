@@ -88,7 +88,7 @@ def run(conversion, asked, answered, *, late_s=0.001, stop_s=None, **changes):
 
 def parameters(conversion, **more):
     topic, answers = ASKED[conversion]
-    return {"question": topic, "answer": answers, "conversion": conversion, **more}
+    return {"stimulus": topic, "topic": answers, "conversion": conversion, **more}
 
 
 def judged(conversion, asked, answered, with_=None, **changes):

@@ -25,27 +25,27 @@ scenarios:
   - id: seen
     launch: [{executable: bot_pub}]
     record: [{topic: /cmd_vel, type: geometry_msgs/msg/Twist}]
-    until: {messages: 8}
+    until: {messages: 2}
     timeout: 5 s
   - id: zqhard
     launch: [{executable: bot_pub}]
     record: [{topic: /cmd_vel, type: geometry_msgs/msg/Twist}]
-    until: {messages: 8}
+    until: {messages: 2}
     timeout: 5 s
 checks:
   - {id: starts, uses: node.starts, scenarios: [seen], points: 1}
-  - id: period
-    title: A message comes every second
-    uses: timing.period
-    with: {topic: /cmd_vel, period: 1 s, tolerance: 5 %}
+  - id: named
+    title: The node is called robby
+    uses: node.exists
+    with: {name: robby}
     scenarios: [seen]
     requires: [starts]
     points: 2
   - id: zqsecret
     title: zqtitle
     hint: zqhint
-    uses: timing.period
-    with: {topic: /cmd_vel, period: 300 ms, tolerance: 20 %}
+    uses: topic.published
+    with: {topic: /cmd_vel}
     scenarios: [zqhard]
     requires: [starts]
     points: 3
@@ -152,7 +152,10 @@ def test_classroom50_must_have_started_it(
 
 
 def batch(folder: Path) -> Path:
-    """The output folder of a class of three."""
+    """The output folder of a class of three, of whom a fourth is being written."""
+    unfinished = folder / "class" / ".partial" / "dee"
+    unfinished.mkdir(parents=True)
+    (unfinished / "result.json").write_text("{")
     for name, make in (("90211", full_points), ("bob", lost_points), ("cy", not_graded)):
         sample = make()
         result = make_result(sample.grade, sample.recordings, sample.facts)

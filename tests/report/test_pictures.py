@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.checks.finding import Case, Cases, Comparison, Plot, Span
-from grader.recording.model import Qos
+from grader.recording.model import Intervention, Qos
 from grader.report.build_log import arrange
 from grader.report.callbacks import draw_callbacks
 from grader.report.cases import draw_cases
@@ -27,7 +27,7 @@ from grader.submission.record import BuildRecord, SourceError
 from sim.motion import Pose
 from tests.checks.builder import drive, endpoint, node, on_odometry, reader, recording
 from tests.report.gallery import CALLS, CASES, DEFINITION, ahead_until
-from tests.report.sample import make_run
+from tests.report.sample import at, make_run
 
 
 def parsed(svg):
@@ -124,6 +124,15 @@ class TestTimeline:
         description = next(item.text for item in parsed(svg).iter() if item.tag.endswith("desc"))
         assert "node /bot_publisher: in the graph until it vanished" in description
         assert "publishers and subscriptions: 1 endpoint came, 1 went" in description
+
+    def test_signals_and_messages_of_the_scenario_are_shown(self):
+        run = make_run(
+            interventions=(Intervention(at(1.5), "bot_publisher/bot_pub", "kill", "SIGKILL"),),
+            sent={"/chatter": make_run().messages["/cmd_vel"]},
+        )
+        shown = words(draw_timeline(run, (), "t").wide)
+        assert "SIGKILL from the scenario 1.50 s" in shown
+        assert "to /chatter 4 messages sent" in shown
 
     def test_errors_in_the_output_are_crosses(self, stopped):
         svg = draw_timeline(stopped, (), "t").wide

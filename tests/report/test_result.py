@@ -88,6 +88,7 @@ def test_a_run():
         "duration_s": 2.0,
         "disturbance": {"taken_s": 0.0021, "worst_late_s": 0.0004},
         "faults": [],
+        "breaches": [],
     }
 
 
