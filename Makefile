@@ -32,8 +32,9 @@ bench: setup ## measure rosgrade's own overhead
 soak: setup ## grade a class of 200 under load (N=100: seven submissions N times) and look for a verdict that changes
 	@$(run) -m grader.soak $(if $(N),--runs $(N))
 
-docs: setup ## regenerate docs/
+docs: setup ## regenerate docs/, and build the site in build/site
 	@$(run) -m grader.docs
+	@NO_MKDOCS_2_WARNING=1 $(run) -m mkdocs build --strict --quiet
 
 clean: ## remove .venv, caches and reports
 	@rm -rf .venv .hypothesis .mypy_cache .pytest_cache .ruff_cache build dist rosgrade-report

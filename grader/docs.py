@@ -17,10 +17,13 @@ from typing import Any
 from pydantic import BaseModel
 
 from grader import resources
-from grader.assignment import asking, model, mutant, stimulus
+from grader.assignment import asking, limits, model, mutant, stimulus
 from grader.assignment.quantity import UNITS, Dimension, format_duration
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
+from grader.checks.tolerance import TimeTolerance
+from sim import description, world_model
+from sim.motion import Pose
 
 _MADE = "<!-- Made by `python -m grader.docs` from the code: change it there. -->"
 
@@ -41,6 +44,19 @@ _ASSIGNMENT_SECTIONS: dict[str, type[BaseModel]] = {
     "stimuli: set_parameters": asking.SetParameters,
     "stimuli: send_goal": asking.SendGoal,
     "until": model.Until,
+    "limits": limits.LimitOptions,
+    "robot": description.RobotOptions,
+    "robot: drives": description.Drive,
+    "lidar": description.LidarOptions,
+    "odometry": description.OdometryOptions,
+    "odometry: drift": description.DriftOptions,
+    "odometry: covariance": description.CovarianceOptions,
+    "topics": description.Topics,
+    "topics: command": description.CommandTopic,
+    "topics: odometry": description.OdometryTopic,
+    "topics: scan": description.ScanTopic,
+    "topics: clock": description.ClockTopic,
+    "topics: tf": description.TransformTopic,
     "checks": model.CheckSpec,
 }
 _MUTANT_SECTIONS: dict[str, type[BaseModel]] = {
@@ -49,9 +65,19 @@ _MUTANT_SECTIONS: dict[str, type[BaseModel]] = {
     "variants": mutant.Variant,
     "edits": mutant.Edit,
 }
+_WORLD_SECTIONS: dict[str, type[BaseModel]] = {
+    "The whole of a world": world_model.WorldModel,
+    "boxes": world_model.BoxModel,
+    "circles": world_model.CircleModel,
+    "polygons": world_model.PolygonModel,
+    "moving": world_model.MovingModel,
+    "moving: circle": world_model.RoundModel,
+    "moving: box": world_model.CornerModel,
+    "moving: path": world_model.WaypointModel,
+}
 _HEADINGS = {
     one.__name__: heading
-    for sections in (_ASSIGNMENT_SECTIONS, _MUTANT_SECTIONS)
+    for sections in (_ASSIGNMENT_SECTIONS, _MUTANT_SECTIONS, _WORLD_SECTIONS)
     for heading, one in sections.items()
 }
 _OWN_CHECKS = """\
@@ -100,6 +126,7 @@ _TYPES = {
 def assignment_markdown() -> str:
     """The description of ``assignment.yaml`` and ``mutants.yaml``."""
     example = resources.assignments() / "timed_publisher" / "assignment.yaml"
+    world = resources.assignments() / "bot_controller" / "worlds" / "crossing.yaml"
     parts = [
         "# assignment.yaml",
         _MADE,
@@ -118,6 +145,13 @@ def assignment_markdown() -> str:
         f"```yaml\n{example.read_text(encoding='utf-8').strip()}\n```",
         "# mutants.yaml",
         *(_model_section(*item) for item in _MUTANT_SECTIONS.items()),
+        "# World files",
+        "A world is a file of its own. `rosgrade sim` takes it too, and any key may be left out: "
+        "`start: [0, 0, 0 deg]` alone is a world without obstacles. In a list, a length without a "
+        "unit is in metres; an angle needs its unit.",
+        *(_model_section(*item) for item in _WORLD_SECTIONS.items()),
+        "For example:",
+        f"```yaml\n{world.read_text(encoding='utf-8').strip()}\n```",
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -169,9 +203,10 @@ def _fields_table(one: type[BaseModel]) -> str:
     schema = one.model_json_schema(by_alias=True)
     definitions = schema.get("$defs", {})
     required = schema.get("required", [])
+    fields = {field.alias or name: field for name, field in one.model_fields.items()}
     rows = []
     for key, found in schema.get("properties", {}).items():
-        default = "required" if key in required else _default(found)
+        default = "required" if key in required else _default(found, fields[key].default)
         meaning = _outside_code(str(found.get("description", "")).replace("\n", " "))
         rows.append((f"`{key}`", _value(found, definitions), default, meaning))
     return _table(("key", "value", "default", "meaning"), rows)
@@ -216,18 +251,35 @@ def _bounds(schema: Mapping[str, Any]) -> str:
     return f", {' and '.join(found)}" if found else ""
 
 
-def _default(schema: Mapping[str, Any]) -> str:
+def _default(schema: Mapping[str, Any], value: Any) -> str:
+    """A default as an author would write it.
+
+    Args:
+        schema: Of the key.
+        value: The default itself.
+    """
     default = schema.get("default")
     if default in (None, "", [], {}):
         return ""
+    if isinstance(value, Pose):
+        return f"`[{value.x_m:g}, {value.y_m:g}, {value.yaw_rad:g} rad]`"
+    if isinstance(value, TimeTolerance):
+        return f"`{value}`"
     dimensions = [form.get("x-dimension") for form in (schema, *schema.get("anyOf", ()))]
-    if Dimension.TIME.value in dimensions:
-        return f"`{format_duration(default)}`"
-    if Dimension.RATIO.value in dimensions:
-        return f"`{default * 100:g} %`"
+    found = next(filter(None, dimensions), None)
+    if found is not None:
+        return f"`{_quantity(default, Dimension(found))}`"
     if isinstance(default, bool):
         return f"`{str(default).lower()}`"
     return f"`{default}`"
+
+
+def _quantity(value: float, dimension: Dimension) -> str:
+    """A value in SI units, in the unit that makes it shortest."""
+    if dimension is Dimension.TIME:
+        return format_duration(value)
+    forms = [f"{value / factor:g} {unit}" for unit, factor in UNITS[dimension].items()]
+    return min(forms, key=len)
 
 
 def _quantity_rows() -> Iterator[tuple[str, ...]]:

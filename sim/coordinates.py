@@ -80,7 +80,11 @@ class Metres:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """Describe the length to an editor."""
-        return {"type": ["number", "string"], "description": "Metres, or a length with its unit."}
+        return {
+            "type": ["number", "string"],
+            "description": "Metres, or a length with its unit.",
+            "x-words": "length, such as `0.2 m`; a bare number is in metres",
+        }
 
 
 @dataclass(frozen=True)
@@ -115,6 +119,7 @@ class Entries:
             "minItems": len(self.names) - self.optional,
             "maxItems": len(self.names),
             "description": f"{self._form}: metres, or entries with their unit.",
+            "x-words": f"`{self._form}`",
         }
 
     @property

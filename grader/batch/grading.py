@@ -85,6 +85,7 @@ class Grading:
         folder: Path,
         on_build: Callable[[str], None] = lambda _: None,
         name: str | None = None,
+        on_output: Callable[[str], None] = lambda _: None,
     ) -> Graded:
         """Grade one submission.
 
@@ -93,6 +94,7 @@ class Grading:
             folder: Where the recordings go, ``<scenario>.mcap``.
             on_build: Told the progress of the build.
             name: What to call the submission; by default after its folder or archive.
+            on_output: Told each line of the build's log.
 
         Raises:
             UsageError: There is nothing at ``path``.
@@ -108,6 +110,7 @@ class Grading:
                 on_progress=on_build,
                 sandbox=self._runner.sandbox,
                 stop=self._stop,
+                on_output=on_output,
             )
         if name is not None:
             prepared = replace(prepared, record=replace(prepared.record, id=name))
@@ -117,6 +120,15 @@ class Grading:
         """End every build and cell that runs; what is being graded ends as interrupted."""
         self._stop.set()
         self._runner.close()
+
+    def cancel(self) -> Runner:
+        """End every build and cell that runs, as :meth:`close` does.
+
+        Returns:
+            A runner for what is graded next, with what was warm.
+        """
+        self._stop.set()
+        return self._runner.successor()
 
     def grade_prepared(self, prepared: Prepared, folder: Path) -> Graded:
         """Run and judge a submission that is built already.

@@ -38,8 +38,8 @@ _ORDER_HINT = (
 )
 _RADIANS_HINT = "Angles in ROS are in radians, and so are those of math.sin and math.atan2."
 _FIXED_HINT = (
-    "Fixed axes: turn about x first (roll), then about the x-y-z axes that stood still, y "
-    "(pitch) and z (yaw); that is q = q_yaw * q_pitch * q_roll, in this order."
+    "Fixed axes stand still while the body turns: first roll about x, then pitch about y, then yaw "
+    "about z, so q = q_yaw * q_pitch * q_roll, in this order."
 )
 _INVERSE_HINT = "The vector part of the quaternion has the wrong sign, so it turns backwards."
 

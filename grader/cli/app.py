@@ -18,11 +18,14 @@ from grader.cli import (
     check,
     doctor,
     export,
+    new,
     regrade,
     replay,
     report,
     selftest,
     sim,
+    start,
+    watch,
 )
 from grader.cli.console import print_error
 from grader.errors import GraderFault, RosgradeError
@@ -59,13 +62,16 @@ def _options(
 
 app.command("list")(assignments.list_command)
 app.command("show")(assignments.show)
+app.command("start")(start.start)
 app.command("check")(check.check)
+app.command("watch")(watch.watch)
 app.command("batch")(batch.batch)
 app.command("regrade")(regrade.regrade)
 app.command("report")(report.report)
 app.command("replay")(replay.replay)
 app.add_typer(export.app, name="export")
 app.command("selftest")(selftest.selftest)
+app.command("new")(new.new)
 app.command("validate")(catalogue.validate)
 app.command("schema")(catalogue.schema)
 app.command("checks")(catalogue.checks)

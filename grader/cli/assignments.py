@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -27,27 +28,41 @@ def list_command() -> None:
 
 def show(
     assignment: Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")],
+    html: Annotated[
+        bool, typer.Option("--html", help="Write it as a page, for students to open or print.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Where the page goes; by default ID.html, here."),
+    ] = None,
 ) -> None:
-    """Show the handout of an assignment, with its checks and points."""
+    """Show the handout of an assignment, with its checks and points.
+
+    Checks that students do not get to see before grading are only counted.
+    """
+    from grader.assignment.load import load_assignment
+    from grader.errors import UsageError
+    from grader.report.files import write_whole
+    from grader.report.handout import Handout, make_handout, render_handout
+
+    if out is not None and not html:
+        raise UsageError("--out is for the page: add --html")
+    handout: Handout = make_handout(load_assignment(assignment))
+    console = output_console()
+    if html:
+        file = out or Path(f"{handout.id}.html")
+        write_whole(file, render_handout(handout))
+        console.print(f"Handout: {file}", soft_wrap=True)
+        return
     from rich.markdown import Markdown
     from rich.table import Table
 
-    from grader.assignment.load import load_assignment
-    from grader.assignment.model import Visibility
-
-    loaded = load_assignment(assignment)
-    console = output_console()
-    handout = loaded.folder / "README.md"
-    if handout.is_file():
-        console.print(Markdown(handout.read_text(encoding="utf-8"), hyperlinks=False))
+    if handout.text:
+        console.print(Markdown(handout.text, hyperlinks=False))
         console.print()
     table = Table("CHECK", "WHAT IS ASKED FOR", box=None, pad_edge=False)
     table.add_column("POINTS", justify="right")
-    hidden = [b for b in loaded.checks if b.spec.visibility is not Visibility.VISIBLE]
-    for bound in loaded.checks:
-        if bound not in hidden:
-            table.add_row(bound.spec.id, bound.title, f"{bound.spec.points:g}")
+    for bound in handout.checks:
+        table.add_row(bound.spec.id, bound.title, f"{bound.spec.points:g}")
     console.print(table)
-    if hidden:
-        points = sum(bound.spec.points for bound in hidden)
-        console.print(f"{len(hidden)} more checks ({points:g} points) run at grading.")
+    console.print(handout.total)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from grader.cli.console import Progress, output_console
+from grader.cli.console import output_console
 from grader.cli.formats import (
     Classroom50,
     Formats,
@@ -19,11 +20,9 @@ from grader.cli.formats import (
     JunitFile,
     MarkdownFile,
 )
+from grader.cli.live import GradingProgress
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.resources import cache_folder
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
 
@@ -65,6 +64,12 @@ def check(
         bool, typer.Option("--keep", help="Keep what colcon installed, in the report's folder.")
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose", "-v", help="Show the build's log and what your nodes print, as it comes."
+        ),
+    ] = False,
     open_report: Annotated[
         bool, typer.Option("--open", help="Open the report in a browser.")
     ] = False,
@@ -82,12 +87,13 @@ def check(
         junit, junit_family, markdown, gradescope, gradescope_metadata, github, classroom50
     )
     with formats.grading():
-        progress = Progress(quiet)
+        progress = GradingProgress(quiet, verbose)
         installation = ros.find()
         runner = Runner(
             installation,
-            progress=_narrator(progress),
+            progress=progress.narrate,
             sandbox=chosen_sandbox(sandbox, progress),
+            verbose=verbose,
         )
         runner.get_ready()
         try:
@@ -106,7 +112,12 @@ def check(
             grading = Grading(loaded, runner, cache_folder(), seed=seed)
             with progress.shown():
                 progress.say(f"reading {submission}")
-                graded = grading.grade(submission, report / RECORDINGS_FOLDER, progress.say)
+                graded = grading.grade(
+                    submission,
+                    report / RECORDINGS_FOLDER,
+                    progress.say,
+                    on_output=partial(progress.output, "build"),
+                )
         finally:
             runner.close()
         written = write_graded(graded, report, clock, json_file)
@@ -121,24 +132,3 @@ def check(
     grade = graded.grade
     status = FULL_POINTS if grade.full_points or classroom50 else POINTS_LOST
     raise typer.Exit(status if grade.graded else NOT_GRADED)
-
-
-def _narrator(progress: Progress) -> Any:
-    """Tell what a cell does in a student's words."""
-
-    def narrate(scenario: str, event: Mapping[str, Any]) -> None:
-        kind = event["event"]
-        if kind == "launching":
-            progress.say(f"{scenario}: starting {event['process']}")
-        elif kind == "waiting":
-            progress.say(f"{scenario}: waiting for {event['what']}", passing=True)
-        elif kind == "recording":
-            progress.say(
-                f"{scenario}: recording, {event['messages']} messages, "
-                f"{event['elapsed_s']:.1f} of at most {event['limit_s']:.1f} s",
-                passing=True,
-            )
-        elif kind == "stopping":
-            progress.say(f"{scenario}: stopping", passing=True)
-
-    return narrate

@@ -1,8 +1,10 @@
-"""Files written whole or not at all."""
+"""Files and new folders, written whole or not at all."""
 
 from __future__ import annotations
 
 import secrets
+import shutil
+from collections.abc import Mapping
 from pathlib import Path
 
 from grader.errors import UsageError
@@ -34,3 +36,31 @@ def write_whole(file: Path, content: str | bytes) -> None:
             draft.unlink(missing_ok=True)
     except OSError as error:
         raise UsageError(f"{file} cannot be written: {error.strerror}") from error
+
+
+def write_folders(place: Path, files: Mapping[str, str]) -> None:
+    """Write new folders full of files under a temporary name, then move them into place.
+
+    Args:
+        place: Where the folders go; made where it is missing.
+        files: Contents by path, with forward slashes; the first part of each is a folder that
+            is not there yet.
+
+    Raises:
+        UsageError: They cannot be written there, or one of the folders is there already.
+    """
+    draft = place / f".rosgrade-{secrets.token_hex(4)}"
+    try:
+        try:
+            for path, content in files.items():
+                file = draft / path
+                file.parent.mkdir(parents=True, exist_ok=True)
+                file.write_text(content, encoding="utf-8")
+            for folder in sorted(draft.iterdir()):
+                # Onto an empty folder a rename would succeed.
+                (place / folder.name).mkdir()
+                folder.rename(place / folder.name)
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+    except OSError as error:
+        raise UsageError(f"{error.filename2 or error.filename}: {error.strerror}") from error

@@ -63,7 +63,7 @@ def render_report(
         and section.recording is not None
         and (made := make_replay(section.recording, section.scenario)) is not None
     }
-    style, script = _asset("report.css"), _asset("report.js")
+    style, script = asset("report.css"), asset("report.js")
     return (
         environment()
         .get_template("report.html.j2")
@@ -91,7 +91,8 @@ def render_report(
 
 
 @cache
-def _asset(name: str) -> str:
+def asset(name: str) -> str:
+    """A style or script of the pages."""
     return (resources.templates() / name).read_text(encoding="utf-8")
 
 

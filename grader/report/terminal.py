@@ -6,7 +6,7 @@ cleaned and wrapped in a :class:`rich.text.Text`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rich.cells import cell_len
 from rich.console import Console, RenderableType
@@ -16,6 +16,7 @@ from rich.text import Text
 from grader.checks.finding import Status
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.report import words
+from grader.report.changes import Change, changes
 from grader.report.clean import clean, one_line
 
 _STYLE = {
@@ -49,6 +50,45 @@ def print_grade(console: Console, grade: Grade) -> None:
         _explain(console, result)
     console.print()
     _conclude(console, grade)
+
+
+def print_changes(console: Console, before: Grade, after: Grade) -> None:
+    """Print what changed since an earlier grade, and what to fix now.
+
+    Args:
+        console: Where to; its width, colours and encoding are respected.
+        before: The earlier grade.
+        after: The later one.
+    """
+    changed = changes(before, after)
+    if changed:
+        console.print(_changes_table(console, changed))
+    else:
+        console.print("No check changed.")
+    first = after.first_to_fix()
+    explained = (first,) if first is not None else after.of(Status.ERROR)[:1]
+    for result in explained:
+        console.print()
+        _explain(console, result)
+    console.print()
+    _conclude(console, after, before)
+
+
+def _changes_table(console: Console, changed: Sequence[Change]) -> Table:
+    table = Table.grid(padding=(0, 2, 0, 0), expand=False)
+    table.add_column(no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    table.add_column(no_wrap=True, justify="right")
+    for change in changed:
+        before = change.before
+        table.add_row(
+            _status(console, change.after.status),
+            Text(f"was {words.STATUS[before.status].word}" if before else "new", "dim"),
+            Text(_line(console, change.after.title)),
+            Text(_points(change.after), "bold"),
+        )
+    return table
 
 
 def _heading(console: Console, grade: Grade) -> Text:
@@ -133,7 +173,7 @@ def _rows(result: CheckResult, item: ScenarioFinding) -> Iterator[tuple[str, str
         yield "printed", "\n".join(finding.evidence.log[-_LOG_LINES:])
 
 
-def _conclude(console: Console, grade: Grade) -> None:
+def _conclude(console: Console, grade: Grade, before: Grade | None = None) -> None:
     first = grade.first_to_fix()
     if first is not None:
         text = f"{_line(console, first.title)}. {words.waiting(grade, first)}".rstrip()
@@ -141,6 +181,8 @@ def _conclude(console: Console, grade: Grade) -> None:
     if grade.graded:
         score = f"{words.number(grade.score)} of {words.number(grade.max_score)} points"
         style = "bold green" if grade.full_points else "bold"
+        if before is not None and before.graded and before.score != grade.score:
+            score = f"{score}, before {words.number(before.score)}"
         console.print(Text(f"Score: {score}", style))
         if grade.withheld.checks:
             console.print(Text(words.headline(grade)))

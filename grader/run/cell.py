@@ -10,18 +10,20 @@ ends.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import json
 import os
 import select
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording, Wait
+from grader.recording.model import Call, Ending, Endpoint, Kind, LogLine, Owner, Recording, Wait
 from grader.run.descendants import become_subreaper, kill_descendants
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.domain import DomainLock, joined_domains, lock_domain
@@ -45,6 +47,8 @@ _GRAPH_PERIOD_S = 0.1
 # Who comes and goes later than the first match matters to no wait.
 _SETTLED_GRAPH_PERIOD_S = 0.25
 _PIPES_LIMIT_S = 1.0
+# Lines of the student are told by the thread that reads them.
+_TELLING = threading.Lock()
 
 
 class Abandoned(Exception):
@@ -53,7 +57,14 @@ class Abandoned(Exception):
 
 def tell(event: str, **data: Any) -> None:
     """One line of progress for whoever ordered the run."""
-    print(json.dumps({"event": event, **data}), flush=True)
+    with _TELLING:
+        print(json.dumps({"event": event, **data}), flush=True)
+
+
+def _tell_line(line: LogLine) -> None:
+    # Whoever ordered the run may be gone; the pipes must be drained all the same.
+    with contextlib.suppress(OSError):
+        tell("printed", process=line.process, text=line.text)
 
 
 class Cell:
@@ -68,7 +79,8 @@ class Cell:
         self._order = order
         self._domain_id = domain_id
         self._probe = probe
-        self._output = OutputReader(order.limits.output_bytes)
+        on_line = _tell_line if order.tells_output else None
+        self._output = OutputReader(order.limits.output_bytes, on_line)
         self._students = StudentProcesses(self._output, order.enclosure)
         self._other_domains: tuple[int, ...] = ()
         self._watchdog: Watchdog | None = None
@@ -177,7 +189,7 @@ class Cell:
 
         ending = ending or self._await_node() or self._await_match()
         if ending is None:
-            tell("matched")
+            tell("matched", limit_s=self._order.limits.timeout_s)
             self._player.begin()
             if self._robot is not None:
                 self._robot.start()

@@ -135,6 +135,7 @@ class CellOrder:
         facts: Environment facts to go into the recording.
         type_support: Install spaces of ours with interfaces that the probe needs.
         enclosure: The sandbox of each process of the student, or None.
+        tells_output: Whether lines that the student prints are told as they come.
     """
 
     scenario: str
@@ -153,6 +154,7 @@ class CellOrder:
     facts: dict[str, str] = field(default_factory=dict)
     type_support: tuple[str, ...] = ()
     enclosure: Enclosure | None = None
+    tells_output: bool = False
 
     def to_json(self) -> str:
         """As one line."""

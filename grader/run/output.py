@@ -8,6 +8,7 @@ import selectors
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,6 +17,7 @@ from grader.recording.model import Declaration, LogLine
 _READ_BYTES = 1 << 16
 _LONGEST_LINE = 8192
 _MOST_DECLARATIONS = 2000
+_MOST_TOLD = 2000
 _LARGEST_NUMBER = 2**63
 
 
@@ -57,9 +59,17 @@ class KeptLines:
 class _Stream:
     """One pipe being read."""
 
-    def __init__(self, process: str, name: str, limit: int) -> None:
+    def __init__(
+        self,
+        process: str,
+        name: str,
+        limit: int,
+        on_line: Callable[[LogLine], None] | None = None,
+    ) -> None:
         self.process = process
         self.name = name
+        self._on_line = on_line
+        self._untold = _MOST_TOLD
         self.kept = KeptLines(limit)
         self.written_bytes = 0
         self._partial = b""
@@ -94,19 +104,26 @@ class _Stream:
         over = max(0, len(line) - _LONGEST_LINE)
         text = line[:_LONGEST_LINE].decode(errors="replace")
         self.kept.dropped_bytes += over
-        self.kept.add(LogLine(now_ns, self.process, self.name, text))
+        kept = LogLine(now_ns, self.process, self.name, text)
+        self.kept.add(kept)
+        if self._on_line is not None and self._untold:
+            self._untold -= 1
+            self._on_line(kept)
 
 
 class OutputReader:
     """Reads all pipes of all processes in one thread."""
 
-    def __init__(self, limit_bytes: int) -> None:
+    def __init__(self, limit_bytes: int, on_line: Callable[[LogLine], None] | None = None) -> None:
         """Start reading.
 
         Args:
             limit_bytes: What is kept of each stream.
+            on_line: Told the first lines of each stream as they come, but not a tracer's; called
+                in the thread that reads.
         """
         self._limit = limit_bytes
+        self._on_line = on_line
         self._selector = selectors.DefaultSelector()
         self._streams: list[_Stream] = []
         self._declarations: list[Declaration] = []
@@ -123,7 +140,8 @@ class OutputReader:
         The descriptor belongs to the reader from here on.
         """
         os.set_blocking(fd, False)
-        target = _Stream(process, stream, self._limit)
+        on_line = self._on_line if stream != "tracer" else None
+        target = _Stream(process, stream, self._limit, on_line)
         with self._lock:
             self._streams.append(target)
             self._selector.register(fd, selectors.EVENT_READ, target)

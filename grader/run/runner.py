@@ -176,6 +176,7 @@ class Runner:
         progress: Told what happens in each scenario.
         cpu_s: CPU time of all cells so far, with the students in them.
         sandbox: What cells and students run in, or None.
+        verbose: Whether progress also tells what the student's processes print.
     """
 
     ros: RosInstallation
@@ -183,6 +184,7 @@ class Runner:
     progress: Progress = lambda _scenario, _event: None
     cpu_s: float = 0.0
     sandbox: Sandbox | None = None
+    verbose: bool = False
     _ready: list[CellProcess] = field(default_factory=list)
     _cells: set[CellProcess] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -190,9 +192,12 @@ class Runner:
     _aborted: bool = False
 
     def get_ready(self) -> None:
-        """Start a cell for the next run, while what is to be run is still being prepared."""
+        """Start a cell for the next run, while what is to be run is still being prepared.
+
+        Does nothing where one is ready already.
+        """
         with self._lock:
-            if not self._aborted:
+            if not (self._aborted or self._ready):
                 self._ready.append(self._new_cell(()))
 
     def run(
@@ -269,6 +274,24 @@ class Runner:
         if self._nursery is not None:
             self._nursery.close()
 
+    def successor(self) -> Runner:
+        """End every cell, and hand what is warm on to a runner that begins anew.
+
+        This one can run nothing any more.
+        """
+        with self._lock:
+            self._aborted = True
+            nursery, self._nursery = self._nursery, None
+        self.close()
+        return replace(
+            self,
+            _ready=[],
+            _cells=set(),
+            _lock=threading.Lock(),
+            _nursery=nursery,
+            _aborted=False,
+        )
+
     def _take_cell(self, scenario: Scenario) -> CellProcess:
         with self._lock:
             if self._aborted:
@@ -344,6 +367,7 @@ class Runner:
                 "cpus": str(cpu_count()),
             },
             type_support=tuple(map(str, type_support)),
+            tells_output=self.verbose,
         )
         if self.sandbox is None:
             return order

@@ -77,6 +77,7 @@ def build(
     environ: Mapping[str, str] = os.environ,
     sandbox: Sandbox | None = None,
     stop: threading.Event | None = None,
+    on_output: Callable[[str], None] = lambda _: None,
 ) -> CachedBuild:
     """Build all packages of a submission, unless just this was built before.
 
@@ -93,6 +94,7 @@ def build(
         environ: The caller's environment.
         sandbox: What the build runs in, or None.
         stop: Ends the build from another thread when it is set.
+        on_output: Called with each line of colcon's as it comes.
 
     Raises:
         GraderFault: It could not be built here, for no fault of the student: colcon or a
@@ -101,7 +103,17 @@ def build(
     limits = limits or BuildLimits()
     wall_s = limits.python_s if only_python else limits.other_s
     workshop = _Workshop(
-        located, sources, ros, limits, only_python, wall_s, on_progress, environ, sandbox, stop
+        located,
+        sources,
+        ros,
+        limits,
+        only_python,
+        wall_s,
+        on_progress,
+        environ,
+        sandbox,
+        stop,
+        on_output,
     )
     key = build_key(located.sha256, ros, sandboxed=sandbox is not None)
     on_progress("looking for an earlier build")
@@ -159,6 +171,7 @@ class _Workshop:
     environ: Mapping[str, str]
     sandbox: Sandbox | None = None
     stop: threading.Event | None = None
+    on_output: Callable[[str], None] = lambda _: None
 
     def build(self, install: Path) -> BuildRecord:
         # Beside the copy, so that relative paths in the log are the same on every run.
@@ -187,6 +200,7 @@ class _Workshop:
         started: set[str] = set()
 
         def on_line(line: str) -> None:
+            self.on_output(line)
             match = _PROGRESS.match(line)
             if match and match[1].startswith("Finished"):
                 finished.add(match[2])

@@ -34,6 +34,7 @@ TOOL_FOLDERS = frozenset(
         ".tox",
         ".colcon",
         "__MACOSX",
+        "rosgrade-report",
     }
 )
 """Folders that tools make and that are never a student's work, wherever they are."""

@@ -68,6 +68,7 @@ def prepare(
     environ: Mapping[str, str] = os.environ,
     sandbox: Sandbox | None = None,
     stop: threading.Event | None = None,
+    on_output: Callable[[str], None] = lambda _: None,
 ) -> Prepared:
     """Find the packages of a submission, read them, build them.
 
@@ -83,6 +84,8 @@ def prepare(
         environ: The caller's environment; only its locale and time zone are passed on.
         sandbox: What it is built in, or None.
         stop: Ends the build from another thread when it is set.
+        on_output: Called with each line of the build's log as it comes; an earlier build's log
+            comes at once.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.
@@ -94,7 +97,9 @@ def prepare(
     try:
         with opened(source, limits.archive) as located:
             builds = BuildCache(cache, limits.cache)
-            return _prepare(located, ros, builds, limits, on_progress, environ, sandbox, stop)
+            return _prepare(
+                located, ros, builds, limits, on_progress, environ, sandbox, stop, on_output
+            )
     except SubmissionError as error:
         record = SubmissionRecord(submission_id(source), _hash(source), problem=str(error))
         return Prepared(record, None)
@@ -140,6 +145,7 @@ def _prepare(
     environ: Mapping[str, str],
     sandbox: Sandbox | None,
     stop: threading.Event | None,
+    on_output: Callable[[str], None],
 ) -> Prepared:
     packages = [read_package(located, folder, ros) for folder in located.packages[:_MAX_PACKAGES]]
     problem = find_problem(located, packages)
@@ -170,7 +176,11 @@ def _prepare(
         environ=environ,
         sandbox=sandbox,
         stop=stop,
+        on_output=on_output,
     )
+    if built.build.cached:
+        for line in built.build.log.splitlines():
+            on_output(line)
     installed = None
     if built.install is not None:
         hashes = {path: digest for p in packages for path, digest in p.hashes.items()}

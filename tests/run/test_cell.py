@@ -130,6 +130,7 @@ def test_a_segfault_is_recorded_with_its_signal(run_node: RunNode) -> None:
     recording = run_node(nodes.SEGFAULT)
     assert recording.ending is Ending.EXITED
     assert (recording.processes[0].exit_code, recording.processes[0].stopped_by) == (-11, "itself")
+    assert recording.declared("started") and not recording.declared("exiting")
 
 
 def test_an_exception_is_recorded_with_its_traceback(run_node: RunNode) -> None:
@@ -137,6 +138,7 @@ def test_an_exception_is_recorded_with_its_traceback(run_node: RunNode) -> None:
     errors = [line.text for line in recording.log if line.stream == "stderr"]
     assert errors[0] == "Traceback (most recent call last):"
     assert errors[-1] == "RuntimeError: no robot here"
+    assert recording.declared("exiting")
     assert recording.processes[0].exit_code == 1
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.recording.model import NS, Ending, Kind
+from sim.motion import Pose
 from tests.run import nodes
 from tests.run.conftest import RunNode
 
@@ -50,17 +51,26 @@ def world(tmp_path: Path) -> str:
 
 def test_the_robot_stops_where_the_node_stops_it(run_node: RunNode, world: str) -> None:
     recording = run_node(
-        driver(), record=[], world=world, until={"at_rest": "500 ms"}, timeout="15 s"
+        driver(),
+        record=[],
+        world=world,
+        lidar={"pose": [-0.03, 0, "0 deg"]},
+        until={"at_rest": "500 ms"},
+        timeout="15 s",
     )
     assert recording.ending is Ending.UNTIL
     last = recording.truth[-1]
-    # The wall begins at x = 0.9; a scan comes every 0.2 s, in which it goes 4 cm.
-    assert 0.9 - 0.4 < last.x_m < 0.9 - 0.4 + 0.1
+    # The wall begins at x = 0.9, the LiDAR sits 3 cm behind the middle of the robot, and a scan
+    # comes every 0.2 s, in which it goes 4 cm.
+    assert 0.93 - 0.4 < last.x_m < 0.93 - 0.4 + 0.1
     assert (last.y_m, last.linear_m_s, last.contact) == (0.0, 0.0, None)
     steps = [b.time_ns - a.time_ns for a, b in itertools.pairwise(recording.truth)]
     assert set(steps) == {10_000_000}
     assert recording.scene is not None
     assert recording.scene.began_ns == recording.truth[0].time_ns - 10_000_000
+    assert recording.scene.outlines.keys() == {"boxes[0]"}
+    assert recording.scene.lidar == Pose(-0.03, 0.0, 0.0)
+    assert recording.scene.command_topic == "/cmd_vel"
 
 
 def test_what_the_sensors_said_is_recorded(run_node: RunNode, world: str) -> None:

@@ -1,0 +1,225 @@
+"""Grading a submission again whenever a file of it was saved."""
+
+from __future__ import annotations
+
+import queue
+import re
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from watchfiles import Change, watch
+
+from grader.batch.grading import Graded
+from grader.errors import GraderFault, RosgradeError
+from grader.submission.members import TOOL_FOLDERS
+from grader.submission.prepare import fingerprint
+
+_SETTLED_MS = 50
+"""An editor writes, renames and deletes to save one file: all of it is one change."""
+_LONGEST_MS = 400
+"""Of a stream of changes, the first are acted on after this time."""
+_TEMPORARY = re.compile(
+    r"""
+    .*~ | .*\.sw[a-z] | 4913 | .*\.py[co]                        # Vim, backups, Python
+    | \.\#.* | \#.*\# | flycheck_.*                              # Emacs
+    | \.goutputstream-.* | .*\.kate-swp | .*___jb_(tmp|old)___   # gedit, Kate, JetBrains
+    | .*\.tmp | \.DS_Store | \.rosgrade-.*
+    """,
+    re.VERBOSE,
+)
+
+
+def is_work(path: Path) -> bool:
+    """Whether a saved file can be a student's work, by its path in the submission alone.
+
+    Args:
+        path: Relative to the submission.
+    """
+    return TOOL_FOLDERS.isdisjoint(path.parts) and not _TEMPORARY.fullmatch(path.name)
+
+
+class Worker(Protocol):
+    """Grades the submission as it is now."""
+
+    def begin(self) -> None:
+        """Get ready; called before a thread of its own calls :meth:`grade`."""
+
+    def grade(self) -> Graded:
+        """Grade it.
+
+        Raises:
+            RosgradeError: It could not be graded.
+        """
+
+    def cancel(self) -> None:
+        """End :meth:`grade`, which may then return or raise anything."""
+
+
+@dataclass(frozen=True)
+class Began:
+    """A grading begins."""
+
+
+@dataclass(frozen=True)
+class Cancelled:
+    """A grading was ended by a change; the next one begins."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A grading ended by itself.
+
+    Attributes:
+        graded: What came of it, or None.
+        problem: Why nothing came of it, or None.
+    """
+
+    graded: Graded | None = None
+    problem: RosgradeError | None = None
+
+
+@dataclass(frozen=True)
+class _Saved:
+    """A file was saved."""
+
+
+@dataclass(frozen=True)
+class _Blind:
+    """The files cannot be watched any more."""
+
+    error: Exception
+
+
+@dataclass(frozen=True)
+class _Done:
+    """The grading is over."""
+
+    graded: Graded | None = None
+    error: BaseException | None = None
+
+
+class Watching:
+    """Grades at first and then at every change, until the one who iterates has enough."""
+
+    def __init__(self, submission: Path, report: Path, worker: Worker) -> None:
+        """Set up; nothing is watched yet.
+
+        Args:
+            submission: A folder, or an archive that may be replaced.
+            report: Whatever is written below it is no change.
+            worker: Grades.
+        """
+        self._submission = submission
+        self._report = report.resolve()
+        self._worker = worker
+        self._told: queue.SimpleQueue[_Saved | _Blind | _Done] = queue.SimpleQueue()
+        self._stop = threading.Event()
+        self._grading: threading.Thread | None = None
+
+    def events(self) -> Iterator[Began | Cancelled | Ended]:
+        """Watch and grade.
+
+        Yields:
+            What happens, without end.
+
+        Raises:
+            GraderFault: The files cannot be watched.
+        """
+        watching = threading.Thread(target=self._watch, name="watch", daemon=True)
+        watching.start()
+        try:
+            while True:
+                sha256 = self._fingerprint()
+                yield Began()
+                self._begin()
+                event = self._await_end(sha256)
+                yield event
+                if isinstance(event, Ended):
+                    # It may have been saved between the look at it and the copy that was graded.
+                    graded = event.graded
+                    self._await_other(graded.prepared.record.sha256 if graded else sha256)
+        finally:
+            self._stop.set()
+            self._cancel()
+            watching.join()
+
+    def _begin(self) -> None:
+        self._worker.begin()
+        self._grading = threading.Thread(target=self._grade, name="grade")
+        self._grading.start()
+
+    def _grade(self) -> None:
+        try:
+            self._told.put(_Done(graded=self._worker.grade()))
+        except BaseException as error:
+            self._told.put(_Done(error=error))
+
+    def _await_end(self, sha256: str) -> Cancelled | Ended:
+        """Wait for the end of the grading, or for another content, which ends it."""
+        assert self._grading is not None
+        while True:
+            told = self._next()
+            if isinstance(told, _Done):
+                self._grading.join()
+                self._grading = None
+                if told.error is not None and not isinstance(told.error, RosgradeError):
+                    raise told.error
+                return Ended(told.graded, told.error)
+            if self._fingerprint() != sha256:
+                self._cancel()
+                return Cancelled()
+
+    def _await_other(self, sha256: str) -> None:
+        while self._fingerprint() == sha256:
+            self._next()
+
+    def _next(self) -> _Saved | _Done:
+        told = self._told.get()
+        if isinstance(told, _Blind):
+            raise GraderFault(f"{self._submission} cannot be watched: {told.error}")
+        return told
+
+    def _cancel(self) -> None:
+        """End the grading; what it says at its end is nobody's concern."""
+        grading, self._grading = self._grading, None
+        if grading is None:
+            return
+        self._worker.cancel()
+        grading.join()
+        while not self._told.empty():
+            self._told.get()
+
+    def _fingerprint(self) -> str:
+        """What is there now; nothing where it cannot be read, as in the middle of a save."""
+        try:
+            return fingerprint(self._submission)
+        except RosgradeError:
+            return ""
+
+    def _watch(self) -> None:
+        is_folder = self._submission.is_dir()
+        root = self._submission.resolve() if is_folder else self._submission.resolve().parent
+        name = self._submission.resolve().name
+
+        def concerns(_: Change, path: str) -> bool:
+            changed = Path(path)
+            if changed.is_relative_to(self._report):
+                return False
+            return is_work(changed.relative_to(root)) if is_folder else changed.name == name
+
+        try:
+            for _ in watch(
+                root,
+                watch_filter=concerns,
+                debounce=_LONGEST_MS,
+                step=_SETTLED_MS,
+                stop_event=self._stop,
+                recursive=is_folder,
+                raise_interrupt=False,
+            ):
+                self._told.put(_Saved())
+        except OSError as error:
+            self._told.put(_Blind(error))

@@ -1,0 +1,187 @@
+"""``rosgrade watch``: grade again at every saved change."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from grader.cli.console import output_console, print_error
+from grader.cli.live import GradingProgress
+from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
+from grader.resources import cache_folder
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from grader.assignment.load import LoadedAssignment
+    from grader.batch.grading import Graded, Grading
+    from grader.cli.page import ReportPage
+    from grader.grade import Grade
+    from grader.run.runner import Runner
+
+
+def watch(
+    assignment: Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")],
+    submission: Annotated[
+        Path, typer.Argument(help="What you work on: a package, a workspace or its src.")
+    ] = Path(),
+    report: Annotated[
+        Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
+    ] = Path("rosgrade-report"),
+    scenario: Annotated[
+        list[str] | None, typer.Option(help="Run only this scenario; may be repeated.")
+    ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(help="Judge only this check and what it requires; may be repeated."),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of all random values; by default the submission's.")
+    ] = None,
+    hidden: Annotated[
+        bool,
+        typer.Option("--hidden", help="Run and show the hidden checks too: for instructors."),
+    ] = False,
+    sandbox: SandboxChoice = Choice.AUTO,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of the report page; 0 takes a free one.")
+    ] = 0,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose", "-v", help="Show the build's log and what your nodes print, as it comes."
+        ),
+    ] = False,
+    open_report: Annotated[
+        bool, typer.Option("--open", help="Open the report page in a browser.")
+    ] = False,
+) -> None:
+    """Grade now, and again whenever you save a file, until Ctrl-C.
+
+    Tells what changed since the grade before. The report page follows by itself. A save during
+    a run ends the run and begins anew.
+    """
+    from grader import ros
+    from grader.assignment.load import load_assignment
+    from grader.assignment.selection import select, visible_part
+    from grader.cli.page import ReportPage
+    from grader.errors import UsageError
+    from grader.run.runner import Runner
+    from grader.submission.locate import check_path
+
+    whole = load_assignment(assignment)
+    shown = whole if hidden else visible_part(whole)
+    loaded = select(shown, tuple(only or ()), tuple(scenario or ()))
+    check_path(submission)
+    progress = GradingProgress(quiet, verbose)
+    runner = Runner(
+        ros.find(),
+        progress=progress.narrate,
+        sandbox=chosen_sandbox(sandbox, progress),
+        verbose=verbose,
+    )
+    work = _Work(loaded, submission, report, seed, progress, runner)
+    with ExitStack() as stack:
+        stack.callback(work.close)
+        try:
+            page = ReportPage(report / "report.html", port)
+        except OSError as error:
+            raise UsageError(f"--port {port}: {error.strerror}") from error
+        stack.callback(page.close)
+        console = output_console()
+        console.print(f"Report page: {page.url}", soft_wrap=True)
+        if open_report:
+            typer.launch(page.url)
+        try:
+            _follow(work, page, console)
+        except KeyboardInterrupt:
+            console.print("\nNo longer watching.")
+
+
+@dataclass
+class _Work:
+    """Grades the submission, each time with what is warm from the time before."""
+
+    loaded: LoadedAssignment
+    submission: Path
+    report: Path
+    seed: int | None
+    progress: GradingProgress
+    runner: Runner
+    grading: Grading | None = None
+
+    def begin(self) -> None:
+        from grader.batch.grading import Grading
+
+        self.runner.get_ready()
+        self.grading = Grading(self.loaded, self.runner, cache_folder(), seed=self.seed)
+
+    def grade(self) -> Graded:
+        from grader.batch.grading import RECORDINGS_FOLDER
+
+        assert self.grading is not None
+        self.progress.say(f"reading {self.submission}")
+        return self.grading.grade(
+            self.submission,
+            self.report / RECORDINGS_FOLDER,
+            self.progress.say,
+            on_output=partial(self.progress.output, "build"),
+        )
+
+    def cancel(self) -> None:
+        assert self.grading is not None
+        self.runner = self.grading.cancel()
+
+    def close(self) -> None:
+        self.runner.close()
+
+
+def _follow(work: _Work, page: ReportPage, console: Console) -> None:
+    from grader.batch.files import write_graded
+    from grader.batch.watching import Began, Cancelled, Watching
+    from grader.report.facts import Clock
+    from grader.report.terminal import print_changes, print_grade
+    from grader.report.words import number
+
+    title = work.loaded.assignment.title
+    before: Grade | None = None
+    clock = Clock()
+    with ExitStack() as shown:
+        for event in Watching(work.submission, work.report, work).events():
+            if isinstance(event, Began):
+                clock = Clock()
+                page.tell("grading what was saved", f"… {title}")
+                shown.enter_context(work.progress.shown())
+                continue
+            shown.close()
+            if isinstance(event, Cancelled):
+                work.progress.say("saved meanwhile: beginning anew")
+                continue
+            if event.graded is None:
+                print_error(str(event.problem))
+                page.tell(f"not graded: {event.problem}", f"! {title}")
+            else:
+                grade = event.graded.grade
+                write_graded(event.graded, work.report, clock)
+                console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
+                if before is None:
+                    print_grade(console, grade)
+                else:
+                    print_changes(console, before, grade)
+                before = grade
+                score = f"{number(grade.score)} of {number(grade.max_score)} points"
+                told = score if grade.graded else "not graded"
+                page.tell(
+                    f"{told}, graded at {time.strftime('%H:%M:%S')}",
+                    f"{told}: {title}",
+                    is_new=True,
+                )
+                work.runner.get_ready()
+            work.progress.say(f"watching {work.submission}; Ctrl-C ends")

@@ -1,0 +1,68 @@
+"""A new assignment's folder, which works as it is: an author changes it bit by bit."""
+
+from __future__ import annotations
+
+import keyword
+import sys
+from pathlib import Path
+
+from grader.assignment.load import ASSIGNMENT_FILE
+from grader.assignment.model import Package
+from grader.assignment.mutation import MUTANTS_FILE, REFERENCE_FOLDER
+from grader.assignment.name import check_id
+from grader.errors import UsageError
+from grader.report.files import write_folders
+from grader.report.handout import HANDOUT_FILE
+from grader.starter import package_files, programs, rendered
+
+
+def write_assignment(name: str, folder: Path) -> Path:
+    """Write a new assignment with a handout, a reference solution and mutants.
+
+    Args:
+        name: Its id, which is also the name of its folder and of its package.
+        folder: Where its folder goes.
+
+    Returns:
+        Its folder.
+
+    Raises:
+        UsageError: That is no id, the folder is there already, or it cannot be written.
+    """
+    try:
+        check_id(name)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    if keyword.iskeyword(name) or name in sys.stdlib_module_names:
+        raise UsageError(
+            f"{name!r} is a name of Python's own, and the assignment's package could not be "
+            "imported: take another one"
+        )
+    target = folder / name
+    if target.exists():
+        raise UsageError(f"{target} is there already, and is left as it is: take another id")
+    files = assignment_files(name)
+    write_folders(folder, {f"{name}/{path}": text for path, text in files.items()})
+    return target
+
+
+def assignment_files(name: str) -> dict[str, str]:
+    """Make the files of a new assignment.
+
+    Args:
+        name: Its id.
+
+    Returns:
+        Contents by path in its folder.
+    """
+    package = Package(name=name, depends=("rclpy", "std_msgs"), executables=(name,))
+    (program,) = programs(package)
+    solution = {name: rendered("new/node.py", id=name, program=program)}
+    files = {
+        file: rendered(f"new/{file}", id=name)
+        for file in (ASSIGNMENT_FILE, HANDOUT_FILE, MUTANTS_FILE)
+    }
+    description = "Says hello twice a second."
+    for path, content in package_files(package, description, solution, ()).items():
+        files[f"{REFERENCE_FOLDER}/{name}/{path}"] = content
+    return files

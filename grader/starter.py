@@ -1,0 +1,214 @@
+"""The starter package of an assignment: real ROS packages that build and run, and solve nothing.
+
+Made from the assignment's ``packages`` and from what a student may see of its checks.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from grader import resources
+from grader.assignment.load import LoadedAssignment
+from grader.assignment.model import Assignment, Package, Visibility
+from grader.errors import UsageError
+from grader.report.files import write_folders
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+_SEPARATORS = {"msg": 0, "srv": 1, "action": 2}
+_PARTS = {
+    "msg": "fields",
+    "srv": "fields of the request, and then of the response",
+    "action": "fields of the goal, of the result, and of the feedback",
+}
+
+
+@dataclass(frozen=True)
+class Program:
+    """An executable that runs one node.
+
+    Attributes:
+        executable: As `ros2 run` calls it.
+        module: Python module that holds it; also the name of its node.
+    """
+
+    executable: str
+    module: str
+
+    @property
+    def node_class(self) -> str:
+        """Name of the node's class."""
+        return "".join(word[:1].upper() + word[1:] for word in re.split(r"\W|_", self.module))
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A definition that the student writes.
+
+    Attributes:
+        kind: msg, srv or action.
+        name: Such as ``BotStatus``.
+    """
+
+    kind: str
+    name: str
+
+    @property
+    def file(self) -> str:
+        """Its place in the package."""
+        return f"{self.kind}/{self.name}.{self.kind}"
+
+    @property
+    def parts(self) -> str:
+        """What stands in it, in words."""
+        return _PARTS[self.kind]
+
+    @property
+    def separators(self) -> int:
+        """How many lines of dashes part it."""
+        return _SEPARATORS[self.kind]
+
+
+def write_starter(loaded: LoadedAssignment, folder: Path) -> tuple[Path, ...]:
+    """Write the starter packages of an assignment.
+
+    Args:
+        loaded: The assignment.
+        folder: Where the packages' folders go, such as the ``src`` of a workspace.
+
+    Returns:
+        The packages' folders.
+
+    Raises:
+        UsageError: A folder of that name is there already, or it cannot be written.
+    """
+    packages = loaded.assignment.packages
+    there = [folder / package.name for package in packages if (folder / package.name).exists()]
+    if there:
+        raise UsageError(
+            f"{there[0]} is there already, and is left as it is: go on with it, or name another "
+            "folder"
+        )
+    files = starter_files(loaded)
+    write_folders(folder, files)
+    return tuple(folder / package.name for package in packages)
+
+
+def starter_files(loaded: LoadedAssignment) -> dict[str, str]:
+    """Make the starter packages of an assignment.
+
+    Returns:
+        Contents by path, with forward slashes; each begins with a package's name.
+    """
+    assignment = loaded.assignment
+    files: dict[str, str] = {}
+    for package in assignment.packages:
+        interfaces = tuple(_interfaces(assignment, package))
+        files.update(_package(assignment, package, interfaces))
+    first = assignment.packages[0].name
+    places = sorted(path for path, text in files.items() if "TODO" in text)
+    files[f"{first}/README.md"] = rendered(
+        "starter/README.md", title=assignment.title, assignment=assignment.id, places=places
+    )
+    return files
+
+
+def package_files(
+    package: Package, description: str, nodes: Mapping[str, str], interfaces: tuple[Interface, ...]
+) -> dict[str, str]:
+    """Make a package around what its programs do.
+
+    Args:
+        package: What it is called, how it is built, what it needs.
+        description: One line for its manifest.
+        nodes: Python code by executable.
+        interfaces: Definitions in it.
+
+    Returns:
+        Contents by path inside the package, without the definitions.
+    """
+    known = {"package": package, "description": description, "programs": programs(package)}
+    files = {"package.xml": rendered("starter/package.xml", interfaces=interfaces, **known)}
+    if package.build_type == "ament_cmake":
+        files["CMakeLists.txt"] = rendered("starter/CMakeLists.txt", interfaces=interfaces, **known)
+        code = "scripts"
+    else:
+        files["setup.py"] = rendered("starter/setup.py", **known)
+        files["setup.cfg"] = rendered("starter/setup.cfg", **known)
+        files[f"resource/{package.name}"] = ""
+        files[f"{package.name}/__init__.py"] = ""
+        code = package.name
+    for program in programs(package):
+        files[f"{code}/{program.module}.py"] = nodes[program.executable]
+    return files
+
+
+def programs(package: Package) -> tuple[Program, ...]:
+    """The programs of a package; a single one lies in the module that is called like it."""
+    if len(package.executables) == 1:
+        return (Program(package.executables[0], package.name),)
+    return tuple(
+        Program(name, re.sub(r"\W", "_", name.removesuffix(".py"))) for name in package.executables
+    )
+
+
+def _package(
+    assignment: Assignment, package: Package, interfaces: tuple[Interface, ...]
+) -> Iterator[tuple[str, str]]:
+    nodes = {
+        program.executable: rendered(
+            "starter/node.py", package=package, program=program, assignment=assignment.id
+        )
+        for program in programs(package)
+    }
+    files = package_files(package, assignment.title, nodes, interfaces)
+    for interface in interfaces:
+        files[interface.file] = rendered("starter/interface", interface=interface)
+    for path, content in files.items():
+        yield f"{package.name}/{path}", content
+
+
+def _interfaces(assignment: Assignment, package: Package) -> Iterator[Interface]:
+    """The interfaces of a package that the visible checks name."""
+    if package.build_type != "ament_cmake":
+        return
+    visible = [spec.with_ for spec in assignment.checks if spec.visibility is Visibility.VISIBLE]
+    named = re.findall(
+        rf'"{package.name}/(msg|srv|action)/([A-Z][A-Za-z0-9]*)"', json.dumps(visible, default=str)
+    )
+    for kind, name in dict.fromkeys(named):
+        yield Interface(kind, name)
+
+
+def rendered(name: str, **values: object) -> str:
+    """Fill in a template of a file that is no page.
+
+    Args:
+        name: Of the file below ``templates/``, without ``.j2``.
+        values: What stands in it.
+    """
+    return _environment().get_template(f"{name}.j2").render(values)
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    made = Environment(
+        loader=FileSystemLoader(resources.templates()),
+        # XML alone has something to escape.
+        autoescape=lambda name: bool(name) and str(name).endswith(".xml.j2"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    made.filters["quoted"] = repr
+    return made

@@ -1,0 +1,201 @@
+"""Watching real files; what grades them is played, so that it takes as long as a test wants."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from grader.batch.grading import Graded
+from grader.batch.watching import Began, Cancelled, Ended, Watching, is_work
+from grader.errors import GraderFault, UsageError
+from grader.submission.prepare import Prepared, fingerprint
+from tests.grade.sample import make_submission
+from tests.report.sample import full_points
+
+
+class Played:
+    """Grades when it is told to."""
+
+    def __init__(self, submission: Path) -> None:
+        self.submission = submission
+        self.let_go = threading.Event()
+        self.begun = threading.Event()
+        self.error: BaseException | None = None
+        self.grades = 0
+        self.let_go.set()
+
+    def begin(self) -> None:
+        self.cancelled = threading.Event()
+
+    def grade(self) -> Graded:
+        self.grades += 1
+        sha256 = fingerprint(self.submission)
+        self.begun.set()
+        while not self.let_go.wait(0.01):
+            if self.cancelled.is_set():
+                raise GraderFault("interrupted")
+        if self.error is not None:
+            raise self.error
+        record = make_submission(sha256=sha256)
+        return Graded(full_points().grade, Prepared(record, None), {}, {}, {}, {})
+
+    def cancel(self) -> None:
+        self.cancelled.set()
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Iterator[SimpleNamespace]:
+    submission = tmp_path / "ws"
+    file = submission / "bot" / "node.py"
+    file.parent.mkdir(parents=True)
+    (submission / "bot" / "package.xml").write_text("<package/>")
+    file.write_text("one")
+    played = Played(submission)
+    events = Watching(submission, submission / "rosgrade-report", played).events()
+    yield SimpleNamespace(submission=submission, file=file, played=played, events=events)
+    events.close()
+    assert not [thread for thread in threading.enumerate() if thread.name in ("watch", "grade")]
+
+
+def test_a_saved_file_is_graded_again(watched: SimpleNamespace) -> None:
+    assert isinstance(next(watched.events), Began)
+    assert isinstance(next(watched.events), Ended)
+    watched.file.write_text("two")
+    assert isinstance(next(watched.events), Began)
+    assert isinstance(next(watched.events), Ended)
+    assert watched.played.grades == 2
+
+
+def test_what_is_no_work_is_not_graded(watched: SimpleNamespace) -> None:
+    next(watched.events), next(watched.events)
+    for place in (
+        "build/bot/x.py",
+        "install/x",
+        "log/x",
+        ".git/index",
+        "bot/__pycache__/x.pyc",
+        "rosgrade-report/result.json",
+    ):
+        path = watched.submission / place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("x")
+    # The same text again is no change either.
+    watched.file.write_text("one")
+    saved = threading.Timer(0.5, lambda: watched.file.write_text("two"))
+    saved.start()
+    assert isinstance(next(watched.events), Began)
+    assert watched.file.read_text() == "two"
+    saved.join()
+
+
+def test_what_an_editor_keeps_beside_a_file_is_no_change(watched: SimpleNamespace) -> None:
+    next(watched.events), next(watched.events)
+    watched.file.with_name(".node.py.swp").write_text("x")
+    watched.file.with_name("node.py~").write_text("x")
+    saved = threading.Timer(0.5, lambda: watched.file.write_text("two"))
+    saved.start()
+    assert isinstance(next(watched.events), Began)
+    assert watched.file.read_text() == "two"
+    saved.join()
+
+
+def test_a_save_as_editors_do_it_is_noticed(watched: SimpleNamespace) -> None:
+    next(watched.events), next(watched.events)
+    draft = watched.file.with_name("4913")
+    draft.write_text("two")
+    draft.replace(watched.file)
+    assert isinstance(next(watched.events), Began)
+    assert isinstance(next(watched.events), Ended)
+
+
+def test_a_save_during_a_run_ends_it_and_begins_anew(watched: SimpleNamespace) -> None:
+    played = watched.played
+    played.let_go.clear()
+
+    def save() -> None:
+        played.begun.wait()
+        watched.file.write_text("two")
+
+    saving = threading.Thread(target=save)
+    saving.start()
+    assert isinstance(next(watched.events), Began)
+    assert isinstance(next(watched.events), Cancelled)
+    saving.join()
+    played.let_go.set()
+    assert isinstance(next(watched.events), Began)
+    assert isinstance(next(watched.events), Ended)
+    assert played.grades == 2
+
+
+def test_the_end_ends_what_runs(watched: SimpleNamespace) -> None:
+    watched.played.let_go.clear()
+    assert isinstance(next(watched.events), Began)
+    ended = threading.Thread(
+        target=lambda: (watched.played.begun.wait(), watched.file.write_text("x"))
+    )
+    ended.start()
+    assert isinstance(next(watched.events), Cancelled)
+    assert isinstance(next(watched.events), Began)
+    ended.join()
+    watched.events.close()
+    assert watched.played.cancelled.is_set()
+
+
+def test_an_error_is_told_and_watching_goes_on(watched: SimpleNamespace) -> None:
+    watched.played.error = UsageError("no such thing")
+    next(watched.events)
+    event = next(watched.events)
+    assert isinstance(event, Ended) and str(event.problem) == "no such thing"
+    watched.played.error = None
+    watched.file.write_text("two")
+    assert isinstance(next(watched.events), Began)
+    assert next(watched.events).problem is None
+
+
+def test_a_bug_is_not_hidden(watched: SimpleNamespace) -> None:
+    watched.played.error = ZeroDivisionError("a bug")
+    next(watched.events)
+    with pytest.raises(ZeroDivisionError, match="a bug"):
+        next(watched.events)
+
+
+def test_an_archive_that_is_replaced_is_graded_again(tmp_path: Path) -> None:
+    import zipfile
+
+    archive = tmp_path / "ada.zip"
+
+    def write(text: str) -> None:
+        with zipfile.ZipFile(archive.with_suffix(".new"), "w") as file:
+            file.writestr("bot/node.py", text)
+        archive.with_suffix(".new").replace(archive)
+
+    write("one")
+    events = Watching(archive, tmp_path / "rosgrade-report", Played(archive)).events()
+    next(events), next(events)
+    (tmp_path / "notes.txt").write_text("x")
+    write("two")
+    assert isinstance(next(events), Began)
+    events.close()
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("src/bot/bot/node.py", True),
+        ("bot/log/__init__.py", True),
+        ("bot/msg/.gitignore", True),
+        ("bot/#node.py#", False),
+        ("bot/.#node.py", False),
+        ("bot/.node.py.swx", False),
+        ("bot/node.py___jb_tmp___", False),
+        (".git/HEAD", False),
+        ("bot/__pycache__/node.cpython-312.pyc", False),
+        ("rosgrade-report/report.html", False),
+    ],
+)
+def test_editors_and_tools_leave_files_that_are_no_work(path: str, expected: bool) -> None:
+    assert is_work(Path(path)) is expected

@@ -1,0 +1,51 @@
+"""Commands that the documentation names exist, with the options that it names."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from typing import Any
+
+import pytest
+import typer.main
+
+from grader import resources
+from grader.cli.app import app
+
+ROOT = resources.root()
+FENCE = re.compile(r"^( *)```\w*[^\n]*\n(.*?)^\1```", re.DOTALL | re.MULTILINE)
+INLINE = re.compile(r"`(rosgrade [^`]+)`", re.DOTALL)
+PAGES = ["README.md", *(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md"))]
+
+
+def named(text: str) -> list[str]:
+    """Command lines in code blocks and in running text."""
+    lines = [line.strip() for _, block in FENCE.findall(text) for line in block.splitlines()]
+    lines = [line.removeprefix("$ ") for line in lines]
+    return [
+        line.partition("   #")[0]
+        for line in lines + [" ".join(found.split()) for found in INLINE.findall(text)]
+        if line.startswith("rosgrade ")
+    ]
+
+
+def test_commands_are_found_in_blocks_and_in_text() -> None:
+    text = "Use `rosgrade\ndoctor` and:\n\n```console\n$ rosgrade list   # all\nother\n```\n"
+    assert named(text) == ["rosgrade list"]
+    assert named(text.replace("rosgrade\ndoctor", "rosgrade doctor")) == [
+        "rosgrade list",
+        "rosgrade doctor",
+    ]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_named_commands_and_options_exist(page: str) -> None:
+    for line in named((ROOT / page).read_text(encoding="utf-8")):
+        words = shlex.split(line.replace("...", ""))[1:]
+        command: Any = typer.main.get_command(app)
+        while hasattr(command, "commands") and words and not words[0].startswith("-"):
+            assert words[0] in command.commands, line
+            command = command.commands[words.pop(0)]
+        known = {option for parameter in command.params for option in parameter.opts}
+        asked = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
+        assert asked <= known | {"-h", "--help"}, line

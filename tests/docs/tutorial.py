@@ -1,0 +1,59 @@
+"""What the tutorial asks its reader to do: write files, run commands, compare what they print."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from dataclasses import dataclass
+
+_FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+_TITLE = re.compile(r'title="([^"]+)"')
+
+
+@dataclass(frozen=True)
+class WriteFile:
+    """A block with a title: the whole content of a file."""
+
+    path: str
+    content: str
+
+
+@dataclass(frozen=True)
+class Command:
+    """A line after a prompt, with what it is said to print."""
+
+    line: str
+    printed: str
+
+    @property
+    def words(self) -> list[str]:
+        """The command as a list of arguments."""
+        return shlex.split(self.line)
+
+    def printed_by(self, output: str) -> bool:
+        """Whether the output is what the page shows; `...` stands for anything, also nothing.
+
+        How wide a table is does not count: any space is as good as another.
+        """
+        parts = [re.escape(_spaced(part)) for part in self.printed.split("...")]
+        return re.fullmatch(r"\s*.*?\s*".join(parts), _spaced(output), re.DOTALL) is not None
+
+
+def _spaced(text: str) -> str:
+    return " ".join(text.split())
+
+
+def steps(page: str) -> list[WriteFile | Command]:
+    """All steps of a page, in order."""
+    found: list[WriteFile | Command] = []
+    for language, rest, block in _FENCE.findall(page):
+        title = _TITLE.search(rest)
+        if title:
+            found.append(WriteFile(title[1], block))
+        elif language == "console":
+            for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+                line, _, printed = part.partition("\n")
+                found.append(Command(line, printed))
+        else:
+            raise ValueError(f"a block that no step is made of: {language}{rest}")
+    return found

@@ -1,0 +1,137 @@
+"""Starter packages: real packages, for every assignment, that give nothing away."""
+
+from __future__ import annotations
+
+import ast
+import configparser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from catkin_pkg.package import parse_package_string
+
+from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
+from grader.errors import UsageError
+from grader.starter import starter_files, write_starter
+
+LESSON = """\
+rosgrade: 1
+id: lesson
+title: {title}
+packages:
+  - {{name: talker, executables: [hear, speak], depends: [rclpy]}}
+  - {{name: talker_msgs, build_type: ament_cmake, depends: [std_msgs], executables: [tool]}}
+scenarios:
+  - id: run
+    launch: [{{package: talker, executable: speak}}]
+    timeout: 5 s
+checks:
+  - {{id: builds, uses: package.builds, with: {{package: talker}}, points: 1}}
+  - {{id: ask, uses: interface.found, with: {{interface: talker_msgs/srv/Ask}}, points: 1}}
+  - {{id: go, uses: interface.found, with: {{interface: talker_msgs/action/Go}}, points: 1}}
+  - id: secret
+    uses: interface.found
+    with: {{interface: talker_msgs/msg/Secret}}
+    points: 1
+    visibility: hidden
+"""
+
+
+def lesson(folder: Path, title: str = "Talk") -> LoadedAssignment:
+    place = folder / "lesson"
+    place.mkdir()
+    (place / "assignment.yaml").write_text(LESSON.format(title=title), encoding="utf-8")
+    return load_assignment(place)
+
+
+@pytest.mark.parametrize("name", list_assignments())
+def test_each_assignment_has_a_starter_that_ros_can_read(name: str) -> None:
+    loaded = load_assignment(name)
+    files = starter_files(loaded)
+    for package in loaded.assignment.packages:
+        manifest = parse_package_string(files[f"{package.name}/package.xml"])
+        manifest.validate()
+        assert manifest.name == package.name
+        assert manifest.get_build_type() == package.build_type
+        named = {dependency.name for dependency in manifest.exec_depends}
+        assert set(package.depends) <= named
+    for path, text in files.items():
+        if path.endswith(".py"):
+            ast.parse(text, path)
+    first = loaded.assignment.packages[0].name
+    assert f"rosgrade show {name}" in files[f"{first}/README.md"]
+    assert f"rosgrade watch {name} ." in files[f"{first}/README.md"]
+
+
+def test_a_single_program_lies_in_the_module_that_the_handouts_name() -> None:
+    files = starter_files(load_assignment("timed_publisher"))
+    assert "'bot_pub = bot_publisher.bot_publisher:main'," in files["bot_publisher/setup.py"]
+    assert "class BotPublisher(Node):" in files["bot_publisher/bot_publisher/bot_publisher.py"]
+    setup = configparser.ConfigParser()
+    setup.read_string(files["bot_publisher/setup.cfg"])
+    assert setup["install"]["install_scripts"] == "$base/lib/bot_publisher"
+
+
+def test_several_programs_have_a_module_each(tmp_path: Path) -> None:
+    files = starter_files(lesson(tmp_path))
+    assert "class Hear(Node):" in files["talker/talker/hear.py"]
+    assert "'speak = talker.speak:main'," in files["talker/setup.py"]
+
+
+def test_an_interface_package_generates_what_the_visible_checks_name(tmp_path: Path) -> None:
+    files = starter_files(lesson(tmp_path))
+    assert files["talker_msgs/srv/Ask.srv"].splitlines()[-1:] == ["---"]
+    assert files["talker_msgs/action/Go.action"].splitlines()[-2:] == ["---", "---"]
+    cmake = files["talker_msgs/CMakeLists.txt"]
+    assert '"srv/Ask.srv"' in cmake and "DEPENDENCIES std_msgs" in cmake
+    manifest = parse_package_string(files["talker_msgs/package.xml"])
+    assert [group.name for group in manifest.member_of_groups] == ["rosidl_interface_packages"]
+
+
+def test_a_package_for_cmake_installs_its_programs(tmp_path: Path) -> None:
+    files = starter_files(lesson(tmp_path))
+    assert files["talker_msgs/scripts/talker_msgs.py"].startswith("#!/usr/bin/env python3\n")
+    assert "RENAME tool" in files["talker_msgs/CMakeLists.txt"]
+
+
+def test_nothing_of_a_hidden_check_is_in_it(tmp_path: Path) -> None:
+    assert "Secret" not in str(starter_files(lesson(tmp_path)))
+
+
+def test_a_title_may_hold_any_character(tmp_path: Path) -> None:
+    title = 'Say "it\'s" <twice> & \'again\' \\ """'
+    loaded = lesson(tmp_path, title="|-\n  " + title)
+    files = starter_files(loaded)
+    manifest = ElementTree.fromstring(files["talker/package.xml"])
+    assert manifest.findtext("description") == title
+    assert title in {
+        node.value
+        for node in ast.walk(ast.parse(files["talker/setup.py"]))
+        if isinstance(node, ast.Constant)
+    }
+
+
+def test_what_is_there_already_is_left_as_it_is(tmp_path: Path) -> None:
+    loaded = lesson(tmp_path)
+    there = tmp_path / "src" / "talker_msgs"
+    there.mkdir(parents=True)
+    with pytest.raises(UsageError, match="talker_msgs is there already, and is left as it is"):
+        write_starter(loaded, tmp_path / "src")
+    assert list((tmp_path / "src").iterdir()) == [there]
+    assert list(there.iterdir()) == []
+
+
+def test_it_is_written_whole(tmp_path: Path) -> None:
+    written = write_starter(lesson(tmp_path), tmp_path / "ws" / "src")
+    assert [path.name for path in written] == ["talker", "talker_msgs"]
+    assert sorted(path.name for path in (tmp_path / "ws" / "src").iterdir()) == [
+        "talker",
+        "talker_msgs",
+    ]
+    assert (written[0] / "resource" / "talker").read_text() == ""
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="file"):
+        write_starter(lesson(tmp_path), tmp_path / "file")
