@@ -257,9 +257,7 @@ def _create(venv: Path, chosen: Plan) -> None:
 def _install_lock(venv: Path, lock_text: str) -> None:
     entries = read_lock(lock_text)
     names = {entry.name for entry in entries}
-    ros = any(name.startswith("ros-") for name in names)
-    size = "about 140 MB" if ros else "about 80 MB"
-    _say(f"installing {len(names)} packages ({size}, about a minute)")
+    _say(f"installing {len(names)} packages (a minute or two)")
     for stage, tools in enumerate((True, False)):
         text = "".join(entry.text for entry in entries if (entry.name in _BUILD_TOOLS) == tools)
         path = venv / f"requirements-{stage}.txt"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import queue
-import re
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,31 +13,13 @@ from watchfiles import Change, watch
 
 from grader.batch.grading import Graded
 from grader.errors import GraderFault, RosgradeError
-from grader.submission.members import TOOL_FOLDERS
+from grader.submission.members import is_left_out
 from grader.submission.prepare import fingerprint
 
 _SETTLED_MS = 50
 """An editor writes, renames and deletes to save one file: all of it is one change."""
 _LONGEST_MS = 400
 """Of a stream of changes, the first are acted on after this time."""
-_TEMPORARY = re.compile(
-    r"""
-    .*~ | .*\.sw[a-z] | 4913 | .*\.py[co]                        # Vim, backups, Python
-    | \.\#.* | \#.*\# | flycheck_.*                              # Emacs
-    | \.goutputstream-.* | .*\.kate-swp | .*___jb_(tmp|old)___   # gedit, Kate, JetBrains
-    | .*\.tmp | \.DS_Store | \.rosgrade-.*
-    """,
-    re.VERBOSE,
-)
-
-
-def is_work(path: Path) -> bool:
-    """Whether a saved file can be a student's work, by its path in the submission alone.
-
-    Args:
-        path: Relative to the submission.
-    """
-    return TOOL_FOLDERS.isdisjoint(path.parts) and not _TEMPORARY.fullmatch(path.name)
 
 
 class Worker(Protocol):
@@ -208,7 +189,9 @@ class Watching:
             changed = Path(path)
             if changed.is_relative_to(self._report):
                 return False
-            return is_work(changed.relative_to(root)) if is_folder else changed.name == name
+            if not is_folder:
+                return changed.name == name
+            return not is_left_out(changed.relative_to(root).as_posix())
 
         try:
             for _ in watch(

@@ -21,6 +21,7 @@ from grader.resources import cache_folder
 from grader.run.admission import Admission
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
+from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import choose
 from grader.submission.locate import opened
 
@@ -170,7 +171,18 @@ def make_grading(
     Raises:
         GraderFault: There is no sandbox here, and not having one was not asked for.
     """
-    wanted = Choice.BWRAP if order.sandbox is Choice.AUTO else order.sandbox
-    sandbox, _ = choose(wanted, cache_folder())
+    sandbox = _sandbox(order.sandbox)
     runner = Runner(ros.find(), admission or Admission(), sandbox=sandbox)
     return Grading(loaded, runner, cache_folder(), seed=order.seed)
+
+
+def _sandbox(choice: Choice) -> Sandbox | None:
+    """The sandbox for unknown programs; without one only by explicit wish."""
+    wanted = Choice.BWRAP if choice is Choice.AUTO else choice
+    try:
+        sandbox, _ = choose(wanted, cache_folder())
+    except GraderFault as fault:
+        raise GraderFault(
+            f"{fault}\nOr run the submissions with your own rights: --sandbox none"
+        ) from fault
+    return sandbox

@@ -17,12 +17,10 @@ from grader.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from grader.assignment.load import LoadedAssignment
     from grader.batch.batch import Done
     from grader.batch.crew import Crew
     from grader.batch.intake import HandedIn
     from grader.batch.roster import Roster
-    from grader.batch.worker import Order
 
 NOT_GRADED = 3
 _AUTO = "auto"
@@ -67,12 +65,17 @@ def batch(
     from grader.assignment.load import load_assignment
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
+    from grader.batch.crew import DaskCrew, LocalCrew
     from grader.batch.ledger import Ledger
-    from grader.batch.worker import Order
+    from grader.batch.worker import Order, make_grading
+    from grader.run.admission import Admission
 
     at_once = _at_once(jobs)
     loaded = load_assignment(assignment)
     order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
+    admission = Admission(cells=at_once)
+    # Before anything is read or written: without a sandbox there is no batch.
+    grading = make_grading(order, loaded, admission) if scheduler is None else None
     began_s = time.monotonic()
     with (
         tempfile.TemporaryDirectory(prefix="rosgrade-batch-") as staging,
@@ -85,7 +88,11 @@ def batch(
         work = Batch(loaded, ledger, frozenset(retry or ()))
         progress.begin("reading", len(rows))
         entries, to_do = work.read(rows, progress.advance)
-        crew = _crew(order, loaded, scheduler, at_once) if to_do else None
+        crew: Crew | None = None
+        if to_do and scheduler is not None:
+            crew = DaskCrew(scheduler, order)
+        elif to_do and grading is not None:
+            crew = LocalCrew(grading, admission.most)
         done: list[Done] = []
         known = [e for e in entries if e.key not in to_do and ledger.result(e.key) is not None]
         progress.begin("grading", len(entries), already=len(known))
@@ -124,17 +131,6 @@ def _rows(
         return known, take_in_roster(known, submissions.parent, staging)
     read = read_roster(roster) if roster else None
     return read, take_in(submissions, staging, read)
-
-
-def _crew(order: Order, loaded: LoadedAssignment, scheduler: str | None, jobs: int | None) -> Crew:
-    from grader.batch.crew import DaskCrew, LocalCrew
-    from grader.batch.worker import make_grading
-    from grader.run.admission import Admission
-
-    if scheduler is not None:
-        return DaskCrew(scheduler, order)
-    admission = Admission(cells=jobs)
-    return LocalCrew(make_grading(order, loaded, admission), admission.most)
 
 
 def _at_once(jobs: str) -> int | None:

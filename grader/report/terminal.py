@@ -101,13 +101,17 @@ def _heading(console: Console, grade: Grade) -> Text:
 
 def _table(console: Console, grade: Grade) -> Table:
     wide = console.width >= _WIDE
-    table = Table.grid(padding=(0, 2, 0, 0), expand=False)
+    # Whatever is left over is the last column's, and it takes nothing from the others.
+    table = Table.grid(padding=(0, 2, 0, 0), expand=wide)
     table.add_column(no_wrap=True)
-    longest = max(cell_len(one_line(result.title)) for result in grade.results)
-    table.add_column(overflow="fold", min_width=min(longest, _TITLE if wide else 10))
+    longest = max(cell_len(_line(console, result.title)) for result in grade.results)
+    if wide:
+        table.add_column(overflow="fold", width=min(longest, _TITLE))
+    else:
+        table.add_column(overflow="fold", min_width=min(longest, 10))
     table.add_column(no_wrap=True, justify="right")
     if wide:
-        table.add_column(no_wrap=True, overflow="ellipsis")
+        table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
     for result in grade.results:
         row: list[RenderableType] = [
             _status(console, result.status),

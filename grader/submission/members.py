@@ -39,6 +39,14 @@ TOOL_FOLDERS = frozenset(
 )
 """Folders that tools make and that are never a student's work, wherever they are."""
 
+_EDITORS = re.compile(
+    r"""
+    .*~ | .*\.sw[a-z] | 4913                                     # backups, Vim
+    | \.\#.* | \#.*\# | flycheck_.*                              # Emacs
+    | \.goutputstream-.* | .*\.kate-swp | .*___jb_(tmp|old)___   # gedit, Kate, JetBrains
+    """,
+    re.VERBOSE | re.DOTALL,
+)
 _MAX_HOPS = 40
 _DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 
@@ -186,10 +194,13 @@ def safe_path(name: str, limits: ArchiveLimits) -> str:
 
 
 def is_left_out(path: str) -> bool:
-    """Whether a path is something that a tool or macOS left behind."""
+    """Whether a path is something that a tool, an editor or macOS left behind."""
     parts = path.split("/")
     return (
-        not TOOL_FOLDERS.isdisjoint(parts) or parts[-1] == ".DS_Store" or parts[-1].startswith("._")
+        not TOOL_FOLDERS.isdisjoint(parts)
+        or parts[-1] == ".DS_Store"
+        or parts[-1].startswith("._")
+        or _EDITORS.fullmatch(parts[-1]) is not None
     )
 
 

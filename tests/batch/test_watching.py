@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from grader.batch.grading import Graded
-from grader.batch.watching import Began, Cancelled, Ended, Watching, is_work
+from grader.batch.watching import Began, Cancelled, Ended, Watching
 from grader.errors import GraderFault, UsageError
 from grader.submission.prepare import Prepared, fingerprint
 from tests.grade.sample import make_submission
@@ -180,22 +180,3 @@ def test_an_archive_that_is_replaced_is_graded_again(tmp_path: Path) -> None:
     write("two")
     assert isinstance(next(events), Began)
     events.close()
-
-
-@pytest.mark.parametrize(
-    ("path", "expected"),
-    [
-        ("src/bot/bot/node.py", True),
-        ("bot/log/__init__.py", True),
-        ("bot/msg/.gitignore", True),
-        ("bot/#node.py#", False),
-        ("bot/.#node.py", False),
-        ("bot/.node.py.swx", False),
-        ("bot/node.py___jb_tmp___", False),
-        (".git/HEAD", False),
-        ("bot/__pycache__/node.cpython-312.pyc", False),
-        ("rosgrade-report/report.html", False),
-    ],
-)
-def test_editors_and_tools_leave_files_that_are_no_work(path: str, expected: bool) -> None:
-    assert is_work(Path(path)) is expected

@@ -13,8 +13,9 @@ from grader import resources
 from grader.cli.app import app
 
 ROOT = resources.root()
+INDENTED = re.compile(r"^ {4,}(rosgrade .*)$", re.MULTILINE)
 FENCE = re.compile(r"^( *)```\w*[^\n]*\n(.*?)^\1```", re.DOTALL | re.MULTILINE)
-INLINE = re.compile(r"`(rosgrade [^`]+)`", re.DOTALL)
+INLINE = re.compile(r"`(rosgrade\s[^`]+)`")
 PAGES = ["README.md", *(f"docs/{page.name}" for page in (ROOT / "docs").glob("*.md"))]
 
 
@@ -22,20 +23,15 @@ def named(text: str) -> list[str]:
     """Command lines in code blocks and in running text."""
     lines = [line.strip() for _, block in FENCE.findall(text) for line in block.splitlines()]
     lines = [line.removeprefix("$ ") for line in lines]
-    return [
-        line.partition("   #")[0]
-        for line in lines + [" ".join(found.split()) for found in INLINE.findall(text)]
-        if line.startswith("rosgrade ")
-    ]
+    lines += INDENTED.findall(FENCE.sub("", text))
+    lines += [" ".join(found.split()) for found in INLINE.findall(text)]
+    return [line.partition(" #")[0].strip() for line in lines if line.startswith("rosgrade ")]
 
 
 def test_commands_are_found_in_blocks_and_in_text() -> None:
     text = "Use `rosgrade\ndoctor` and:\n\n```console\n$ rosgrade list   # all\nother\n```\n"
-    assert named(text) == ["rosgrade list"]
-    assert named(text.replace("rosgrade\ndoctor", "rosgrade doctor")) == [
-        "rosgrade list",
-        "rosgrade doctor",
-    ]
+    text += "rosgrade itself:\n\n    rosgrade show x\n"
+    assert named(text) == ["rosgrade list", "rosgrade show x", "rosgrade doctor"]
 
 
 @pytest.mark.parametrize("page", PAGES)

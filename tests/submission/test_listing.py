@@ -33,6 +33,13 @@ def test_files_are_listed_in_the_same_order_everywhere(tree: Tree) -> None:
         "x.pyc",
         ".DS_Store",
         "._x.py",
+        "rosgrade-report/result.json",
+        ".node.py.swp",
+        "node.py~",
+        "4913",
+        ".#node.py",
+        "#node.py#",
+        "node.py___jb_tmp___",
     ],
 )
 def test_what_tools_leave_behind_is_no_part_of_a_submission(tree: Tree, name: str) -> None:

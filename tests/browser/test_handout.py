@@ -1,0 +1,58 @@
+"""The handout and the page that follows a watched submission, in a real browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, expect
+
+from grader.assignment.load import load_assignment
+from grader.cli.page import ReportPage
+from grader.report.handout import make_handout, render_handout
+from grader.report.html import render_report
+from tests.report.sample import full_points, lost_points
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1280, "dark")])
+def test_a_handout_is_accessible_quiet_and_fits(look, width, scheme):
+    html = render_handout(make_handout(load_assignment("timed_publisher")))
+    found = look(html, width, color_scheme=scheme)
+    found.keep(f"handout-{width}-{scheme}", full_page=True)
+    assert Axe().run(found.page).response["violations"] == []
+    assert found.complaints == [] and found.requests == []
+    wide = "document.documentElement.scrollWidth > document.documentElement.clientWidth"
+    assert not found.page.evaluate(wide)
+
+
+def test_the_page_of_a_watched_submission_follows_by_itself(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    def write(sample):
+        html = render_report(sample.grade, sample.recordings, sample.facts)
+        (tmp_path / "report.html").write_text(html, encoding="utf-8")
+
+    write(lost_points())
+    served = ReportPage(tmp_path / "report.html")
+    context = chromium.new_context()
+    complaints: list[str] = []
+    try:
+        page = context.new_page()
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(served.url)
+        frame = page.frame_locator("iframe")
+        expect(frame.locator(".score .value")).to_have_text("3.02")
+        expect(page.get_by_role("status")).to_have_text("grading")
+        write(full_points())
+        served.tell("3 of 3 points", "3 of 3 points: Publish", is_new=True)
+        expect(frame.locator(".score .value")).to_have_text("3")
+        expect(page.get_by_role("status")).to_have_text("3 of 3 points")
+        expect(page).to_have_title("3 of 3 points: Publish")
+        assert complaints == []
+    finally:
+        served.close()
+        context.close()

@@ -1,0 +1,103 @@
+"""`rosgrade watch` as a student uses it: real files, real nodes, a real Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import ROOT, Rosgrade
+from tests.cli.test_check import NODE, REFERENCE, _running
+
+
+def read_until(lines: Iterable[str], text: str) -> str:
+    """All that was printed, up to the line with a text."""
+    seen = []
+    for line in lines:
+        seen.append(line)
+        if text in line:
+            return "".join(seen)
+    raise AssertionError(f"no {text!r} in:\n{''.join(seen)}")
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(300)
+def test_a_save_is_graded_again_and_ctrl_c_leaves_nothing(tmp_path: Path) -> None:
+    submission = tmp_path / "submission"
+    shutil.copytree(REFERENCE, submission)
+    node = submission / NODE
+    watch = subprocess.Popen(
+        [sys.executable, "-m", "grader", "watch", "timed_publisher", str(submission)],
+        cwd=tmp_path,
+        env={
+            **os.environ,
+            "PYTHONPATH": str(ROOT),
+            "TMPDIR": str(tmp_path),
+            "COLUMNS": "80",
+            "PYTHONUNBUFFERED": "1",
+        },
+        stderr=subprocess.STDOUT,
+        stdout=subprocess.PIPE,
+        text=True,
+        # Tests in the background of a shell inherit that Ctrl-C is ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
+    )
+    assert watch.stdout is not None
+    try:
+        url = read_until(watch.stdout, "Report page: ").split()[-1]
+        assert "Score: 10 of 10 points" in read_until(watch.stdout, "Ctrl-C ends")
+
+        node.write_text(node.read_text().replace("PERIOD_S = 0.3", "PERIOD_S = 2.5"))
+        read_until(watch.stdout, "run: starting bot_publisher/bot_pub")
+        node.write_text(node.read_text().replace("PERIOD_S = 2.5", "PERIOD_S = 0.4"))
+        told = read_until(watch.stdout, "Ctrl-C ends")
+        assert "saved meanwhile: beginning anew" in told
+        assert "✗ failed  was passed  A message comes every 300 ms  0 / 1.5" in told
+        assert "Score: 8.5 of 10 points, before 10" in told
+        with urllib.request.urlopen(f"{url}report.html") as served:
+            assert served.read() == (tmp_path / "rosgrade-report" / "report.html").read_bytes()
+
+        node.write_text(node.read_text().replace("PERIOD_S = 0.4", "PERIOD_S = 2.5"))
+        read_until(watch.stdout, "run: recording")
+        watch.send_signal(signal.SIGINT)
+        told, _ = watch.communicate(timeout=60)
+    finally:
+        watch.kill()
+        watch.wait()
+        watch.stdout.close()
+    assert watch.returncode == 0, told
+    assert told.endswith("No longer watching.\n")
+    assert "Traceback" not in told
+    assert not _running(str(tmp_path))
+    assert not list(tmp_path.glob("rosgrade-cell*"))
+
+
+def test_a_port_that_is_taken_is_named(rosgrade: Rosgrade) -> None:
+    import socket
+
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        ended = rosgrade("watch", "timed_publisher", REFERENCE, "--port", port, "--sandbox", "none")
+    assert ended.returncode == 2
+    assert f"--port {port}: " in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["timed_publsher", "."], "Did you mean 'timed_publisher'?"),
+        (["timed_publisher", "homework"], "homework: does not exist"),
+    ],
+)
+def test_what_does_not_exist_is_named(rosgrade: Rosgrade, arguments: list[str], said: str) -> None:
+    ended = rosgrade("watch", *arguments)
+    assert ended.returncode == 2
+    assert said in ended.stderr
