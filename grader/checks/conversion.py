@@ -189,7 +189,8 @@ def _unit(vectors: Rows) -> Rows:
     largest = np.abs(vectors).max(axis=1, keepdims=True)
     scaled = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0.0)
     length = np.linalg.norm(scaled, axis=1, keepdims=True)
-    return np.divide(scaled, length, out=np.zeros_like(scaled), where=length > 0.0)
+    unit: Rows = np.divide(scaled, length, out=np.zeros_like(scaled), where=length > 0.0)
+    return unit
 
 
 def rotations_of_answers(answers: Rows) -> Rows:

@@ -6,8 +6,9 @@ Formulas: https://en.wikipedia.org/wiki/Conversion_between_quaternions_and_Euler
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -306,9 +307,14 @@ def _tangent(rows: Rows) -> Rows:
     return angles
 
 
+def _reordered_rpy(order: Sequence[int], rows: Rows) -> Rows:
+    """Roll, pitch and yaw in another order."""
+    return _right_rpy(rows)[:, order]
+
+
 _TO_RPY = (
     *(
-        Slip(words, _SWAP_HINT, lambda rows, order=order: _right_rpy(rows)[:, order])
+        Slip(words, _SWAP_HINT, partial(_reordered_rpy, order))
         for words, order in _SWAPPED
     ),
     Slip("the angles are those about axes that turn with the body (intrinsic), not about fixed "

@@ -113,7 +113,5 @@ def verdicts(done: Done) -> list[tuple[str, str, float]]:
 
 def test_no_scheduler_is_said() -> None:
     order = Order(ASSIGNMENT, "0" * 64, None, Choice.NONE)
-    with pytest.raises(UsageError, match="no Dask scheduler answers at tcp://127.0.0.1:1"):
+    with pytest.raises(UsageError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1"):
         DaskCrew("tcp://127.0.0.1:1", order)
-
-
