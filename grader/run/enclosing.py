@@ -96,7 +96,8 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
         *("--disable-userns", "--hostname", "student"),
         *bubblewrap.system(),
         *("--ro-bind", str(CELL / _PASSWD_FILE), "/etc/passwd"),
-        *bubblewrap.bound((*python, *writable, *binds)),
+        # What can be written to comes first: Python may be installed below /tmp.
+        *bubblewrap.bound((*writable, *python, *binds)),
         *hide(python),
         *("--remount-ro", "/", "--remount-ro", "/dev"),
     ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import fcntl
 import os
+import re
 import signal
 import socket
 import struct
@@ -38,6 +39,8 @@ _LAST_CAPABILITY = 63
 _SIOCGIFFLAGS, _SIOCSIFFLAGS, _IFF_UP = 0x8913, 0x8914, 1
 _SIZES = struct.Struct("=QQQ")
 _SHARED_FILES = 1000
+_TMP = Path("/tmp")
+_ESCAPE = re.compile(r"\\([0-7]{3})")
 _INTERFACE = struct.Struct("16sh14x")
 
 _libc = ctypes.CDLL(None, use_errno=True)
@@ -152,9 +155,31 @@ def _mount_own(folder: Path) -> None:
     _mount(None, Path("/"), None, _MS_REC | _MS_PRIVATE)
     _mount(str(folder), CELL, None, _MS_BIND)
     _mount("none", folder.parent, "tmpfs", _MS_RDONLY, "size=0")
-    for place in (Path("/tmp"), Path("/dev/shm")):
+    # Python, ROS or rosgrade itself may be installed below /tmp: they are shown there again.
+    shown = {
+        path: os.open(path, os.O_PATH | os.O_CLOEXEC)
+        for path in _mounted_below(_TMP)
+        if path != folder.parent
+    }
+    for place in (_TMP, Path("/dev/shm")):
         _mount("none", place, "tmpfs", _MS_NOSUID | _MS_NODEV, "size=64m,mode=1777")
+    for path, descriptor in shown.items():
+        path.mkdir(parents=True)
+        _mount(f"/proc/self/fd/{descriptor}", path, None, _MS_BIND | _MS_REC)
+        os.close(descriptor)
     _mount("proc", Path("/proc"), "proc", _MS_NOSUID | _MS_NODEV | _MS_NOEXEC)
+
+
+def _mounted_below(folder: Path) -> list[Path]:
+    """Folders on which something is mounted below a folder, but not below one another."""
+    lines = Path("/proc/self/mountinfo").read_text(encoding="utf-8").splitlines()
+    # The fifth field, with octal escapes for blanks and the like; source: proc(5).
+    points = {Path(_ESCAPE.sub(lambda m: chr(int(m[1], 8)), line.split(" ")[4])) for line in lines}
+    found: list[Path] = []
+    for path in sorted(points):
+        if folder in path.parents and path.is_dir() and not set(found) & set(path.parents):
+            found.append(path)
+    return found
 
 
 def _bring_up_loopback() -> None:

@@ -158,28 +158,15 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
     )
     assert check.stderr is not None
     for line in check.stderr:
-        if "starting bot_publisher/bot_pub" in line:
+        if "run: recording" in line:
             break
-    while not _works_in(tmp_path):
-        assert check.poll() is None
     check.send_signal(signal.SIGINT)
     _, told = check.communicate(timeout=60)
     assert check.returncode == 130, told
     assert "Traceback" not in told
     assert not (tmp_path / "rosgrade-report" / "result.json").exists()
-    assert not list(tmp_path.glob("rosgrade-cell-*"))
+    assert not list(tmp_path.glob("rosgrade-cell*"))
     assert not _running(str(tmp_path))
-
-
-def _works_in(folder: Path) -> bool:
-    """Whether a process has its working directory in a cell below a folder."""
-    for link in Path("/proc").glob("[0-9]*/cwd"):
-        try:
-            if link.readlink().is_relative_to(folder) and "rosgrade-cell" in str(link.readlink()):
-                return True
-        except OSError:
-            continue
-    return False
 
 
 def _running(fragment: str) -> list[bytes]:
