@@ -21,7 +21,7 @@ from grader.run.runner import Runner
 LEAST_MUTANTS = 12
 EVERY = 8
 EVERY_OF_EXAMPLE = 4
-MOST_RUNS = 95
+MOST_RUNS = 20
 EXAMPLES = resources.root() / "docs" / "examples"
 
 
