@@ -75,7 +75,8 @@ def selftest(
         console.print(
             f"{loaded.assignment.id}: {score.accepted} of {score.right} right solutions with "
             f"full points, {score.killed} of {score.mutants} mutants judged as they must: "
-            f"mutation score {score.percent:.0f} %"
+            f"mutation score {score.percent:.0f} %",
+            soft_wrap=True,
         )
     raise typer.Exit(0 if perfect else 1)
 

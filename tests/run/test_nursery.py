@@ -19,25 +19,26 @@ from tests.run.conftest import SUBMISSION, RunNode, assignment, install
 pytestmark = pytest.mark.ros
 
 
-def nursery_pid() -> int:
-    """The nursery: the one child of this process; its forks are its own children."""
-    (pid,) = (
+def nurseries() -> set[int]:
+    """The nurseries among this process's children; their forks are their own children."""
+    return {
         pid
         for pid, command in descendants(os.getpid()).items()
         if "grader.run.nursery" in command
         and f"PPid:\t{os.getpid()}\n" in Path(f"/proc/{pid}/status").read_text()
-    )
-    return pid
+    }
 
 
 def test_a_run_whose_nursery_is_killed_is_a_fault_and_the_next_one_is_not(tmp_path: Path) -> None:
     course = assignment(until={"messages": 3})
     scenario = course.scenarios[0]
     space = install(tmp_path, nodes.timed())
+    before = nurseries()
 
     def kill(_scenario: str, event: object) -> None:
         if isinstance(event, dict) and event["event"] == "launching":
-            os.kill(nursery_pid(), signal.SIGKILL)
+            (own,) = nurseries() - before
+            os.kill(own, signal.SIGKILL)
 
     with Runner(ros.find(), progress=kill) as runner:
         file = tmp_path / "run.mcap"
