@@ -79,7 +79,7 @@ class OfGoals(Parameters):
 
 def undisturbed(goal: Goal) -> bool:
     """Whether the probe let a goal come to its own end."""
-    return goal.canceled_ns is None and not goal.preempted
+    return goal.cancel_after_s is None and not goal.preempted
 
 
 def cannot(goal_type: str, error: NoSuchField, expected: str) -> Finding:

@@ -8,6 +8,7 @@ from grader.assignment.quantity import Duration, format_duration
 from grader.checks.action import OfGoals, cannot, type_of
 from grader.checks.cause import Cause
 from grader.checks.check import Subject, check
+from grader.checks.death import cause_of_death, dead
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Finding
 from grader.checks.goals import evidence, judged_goals, why_no_result, why_raised_in, why_rejected
@@ -15,6 +16,9 @@ from grader.checks.unanswered import why_taken
 from grader.checks.value import NoSuchField
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
+
+# Share of the time from the request to cancel until the end of the goal.
+_AT_THE_END = 0.8
 
 
 class Cancels(OfGoals):
@@ -41,7 +45,7 @@ def cancels(recording: Recording, parameters: Cancels) -> Finding:
     expected = f"{parameters.words} is canceled within {format_duration(parameters.within)}"
     try:
         goals = judged_goals(
-            recording, parameters.action, parameters.goal, lambda g: g.canceled_ns is not None
+            recording, parameters.action, parameters.goal, lambda g: g.cancel_after_s is not None
         )
     except NoSuchField as error:
         return cannot(type_of(recording, parameters.action), error, expected)
@@ -65,10 +69,10 @@ def _end_s(goal: Goal) -> float:
 
 
 def _why_not_canceled(recording: Recording, goal: Goal, within_s: float) -> Cause | None:
-    asked_ns = goal.canceled_ns or 0
     shown = evidence(recording, goal)
-    if goal.result_ns is not None and goal.result_ns < asked_ns:
-        return Cause("the goal had ended before it was asked to cancel", ours=True)
+    if goal.canceled_ns is None:
+        return _never_asked(recording, goal)
+    asked_ns = goal.canceled_ns
     if goal.status == "canceled" and _end_s(goal) <= within_s:
         return None
     if goal.cancel_accepted is False and not _answered_too_late(goal):
@@ -87,11 +91,40 @@ def _why_not_canceled(recording: Recording, goal: Goal, within_s: float) -> Caus
     )
 
 
+def _never_asked(recording: Recording, goal: Goal) -> Cause:
+    """The goal was not asked to cancel: it ended too early, or the run did."""
+    if goal.result_ns is None:
+        ended = dead(recording)
+        if ended:
+            return cause_of_death(recording, ended[0])
+        return Cause("the run ended before the goal was asked to cancel", ours=True, disturbed=True)
+    lasted_s = (goal.result_ns - (goal.answered_ns or goal.sent_ns)) / NS
+    if lasted_s > (goal.cancel_after_s or 0.0):
+        return Cause("the probe was too late to ask for it", ours=True, disturbed=True)
+    return _ended_alone(recording, goal, f"the goal {goal.status} {format_duration(lasted_s)}")
+
+
+def _ended_alone(recording: Recording, goal: Goal, seen: str) -> Cause:
+    """The goal came to an end before anybody could end it."""
+    what = f"{seen} after it was accepted, before it was to be ended"
+    return why_raised_in(recording, goal, what) or Cause(
+        what,
+        "The execute callback returns too early: it must work on the goal step by step, with a "
+        "pause between.",
+        evidence(recording, goal),
+    )
+
+
 def _answered_too_late(goal: Goal) -> bool:
-    """Whether the server took in that it should cancel only when the goal had ended."""
+    """Whether the server took in that it should cancel only when the goal ended."""
     if goal.result_ns is None:
         return False
-    return goal.cancel_answered_ns is None or goal.cancel_answered_ns >= goal.result_ns
+    if goal.cancel_answered_ns is None:
+        return True
+    asked_ns = goal.canceled_ns or 0
+    # An executor that was busy until then answers right before it tells the result.
+    waited = (goal.cancel_answered_ns - asked_ns) / max(goal.result_ns - asked_ns, 1)
+    return waited >= _AT_THE_END
 
 
 def _why_other_end(recording: Recording, goal: Goal, within_s: float) -> Cause:
@@ -164,7 +197,9 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding:
         cause = (
             Cause("there is no goal before it that it could end", ours=True)
             if before is None
-            else why_rejected(recording, goal) or _why_goes_on(recording, before, goal, parameters)
+            else why_rejected(recording, before)
+            or why_rejected(recording, goal)
+            or _why_goes_on(recording, before, goal, parameters)
         )
         if cause is not None:
             return cause.finding(expected)
@@ -180,7 +215,15 @@ def _why_goes_on(
         "(handle_accepted_callback); look at is_active in every round of the loop."
     )
     if before.result_ns is not None and before.result_ns < goal.sent_ns:
-        return Cause("the old goal had ended before the new one was sent", ours=True)
+        late_s = (goal.sent_ns - before.result_ns) / NS
+        if recording.taken_s(before.sent_ns, goal.sent_ns) >= late_s:
+            return Cause(
+                "the old goal had ended before the new one was sent", ours=True, disturbed=True
+            )
+        lasted_s = (before.result_ns - (before.answered_ns or before.sent_ns)) / NS
+        return _ended_alone(
+            recording, before, f"the old goal {before.status} {format_duration(lasted_s)}"
+        )
     which = f"the old goal ({fields_words(before.goal)})"
     if before.result_ns is None:
         seen = f"{which} was still worked on at the end"

@@ -56,6 +56,7 @@ class Goal:
         feedback: In the order of its reception.
         statuses: When the probe received a status of the goal, and which: ``accepted``,
             ``executing``, ``canceling``, ``succeeded``, ``canceled`` or ``aborted``.
+        cancel_after_s: It is to be canceled so long after it was accepted; None for not at all.
         canceled_ns: When the probe asked to cancel it, or None.
         cancel_answered_ns: When that was answered, or None.
         cancel_accepted: Whether the server agreed to cancel it; None without an answer.
@@ -75,6 +76,7 @@ class Goal:
     answered_ns: int | None = None
     feedback: tuple[Feedback, ...] = ()
     statuses: tuple[tuple[int, str], ...] = ()
+    cancel_after_s: float | None = None
     canceled_ns: int | None = None
     cancel_answered_ns: int | None = None
     cancel_accepted: bool | None = None

@@ -1,5 +1,7 @@
 """action.*: accepted or rejected, with feedback, a result, and an end before that."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.checks.finding import Status
@@ -27,6 +29,7 @@ def canceled(**changes):
     values = {
         "status": "canceled",
         "end_s": 0.31,
+        "cancel_after_s": 0.2,
         "canceled_ns": at(1.21),
         "cancel_answered_ns": at(1.22),
         "cancel_accepted": True,
@@ -170,9 +173,30 @@ class TestCancels:
         busy = acting(canceled(end_s=2.21), disturbance=taken(1.2, 3.2, waited_s=1.5))
         assert judge("action.cancels", busy, **FIB).disturbed
 
-    def test_a_goal_that_had_ended_before_says_nothing(self):
-        run = acting(canceled(end_s=0.1, status="succeeded"))
-        assert judge("action.cancels", run, **FIB).status is Status.ERROR
+    def test_a_goal_that_was_rejected(self):
+        run = acting(goal(accepted=False, cancel_after_s=0.2))
+        assert "was rejected" in failing("action.cancels", run, **FIB)
+
+    def test_a_goal_that_ended_by_itself_before(self):
+        early = canceled(end_s=0.1, status="succeeded", canceled_ns=None, cancel_answered_ns=None)
+        found = failing("action.cancels", acting(early), **FIB)
+        assert "the goal succeeded 90 ms after it was accepted, before it was to be ended" in found
+        log = output(traceback("KeyError: 1"), time_s=1.05)
+        aborted = replace(early, status="aborted")
+        found = failing("action.cancels", acting(aborted, log=log), **FIB)
+        assert "KeyError: 1" in found
+
+    def test_a_probe_that_was_too_late_says_nothing(self):
+        late = canceled(end_s=0.9, status="succeeded", canceled_ns=None, cancel_answered_ns=None)
+        assert judge("action.cancels", acting(late), **FIB).disturbed
+
+    def test_an_answer_at_the_very_end_tells_of_a_busy_executor(self):
+        run = acting(
+            canceled(
+                status="succeeded", end_s=1.31, cancel_answered_ns=at(2.30), cancel_accepted=False
+            )
+        )
+        assert "its executor cannot while" in failing("action.cancels", run, **FIB)
 
 
 class TestPreempts:
@@ -195,8 +219,17 @@ class TestPreempts:
         run = acting(goal(20, 1.0, preempted=True), goal(5, 1.5, preempts=True, accepted=False))
         assert "the goal (order = 5) was rejected" in failing("action.preempts", run, **FIB)
 
-    def test_an_old_goal_that_had_ended_says_nothing(self):
-        assert judge("action.preempts", self.runs(end_s=0.2), **FIB).status is Status.ERROR
+    def test_an_old_goal_that_ended_by_itself_before(self):
+        found = failing("action.preempts", self.runs(end_s=0.2, status="succeeded"), **FIB)
+        assert "the old goal succeeded 190 ms after it was accepted" in found
+
+    def test_an_old_goal_that_had_ended_because_the_machine_was_late(self):
+        run = replace(self.runs(end_s=0.4), disturbance=taken(1.0, 1.5, waited_s=0.3))
+        assert judge("action.preempts", run, **FIB).disturbed
+
+    def test_an_old_goal_that_was_rejected(self):
+        run = acting(goal(20, accepted=False), goal(5, 1.5, preempts=True, accepted=False))
+        assert "the goal (order = 20) was rejected" in failing("action.preempts", run, **FIB)
 
 
 def test_declarations_of_the_process_are_not_needed():

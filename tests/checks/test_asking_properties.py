@@ -106,6 +106,7 @@ GOALS = st.builds(
     MAYBE,
     st.lists(st.builds(Feedback, TIMES, FIELDS), max_size=4).map(tuple),
     st.just(()),
+    st.sampled_from([None, 0.2]),
     MAYBE,
     MAYBE,
     st.sampled_from([None, True, False]),

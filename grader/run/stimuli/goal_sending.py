@@ -65,6 +65,7 @@ class SentGoal:
             answered_ns=self.answered_ns,
             feedback=tuple(self.feedback),
             statuses=tuple(self.statuses),
+            cancel_after_s=self.order.cancel_after_s,
             canceled_ns=self.canceled_ns,
             cancel_answered_ns=self.cancel_answered_ns,
             cancel_accepted=self.cancel_accepted,
