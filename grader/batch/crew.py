@@ -79,7 +79,8 @@ class DaskCrew:
             import distributed
         except ImportError as error:
             raise UsageError(
-                "--scheduler needs Dask; install it with: pip install 'rosgrade[cluster]'"
+                "--scheduler needs Dask: install rosgrade's extra `cluster`, or run `make setup` "
+                "in its checkout"
             ) from error
         try:
             connect: Any = distributed.Client

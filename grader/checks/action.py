@@ -12,7 +12,7 @@ from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.fields import TOLERANCE, difference_table, difference_words, unlike
 from grader.checks.fields import words as fields_words
-from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.finding import Evidence, Finding, Plot
 from grader.checks.goals import (
     evidence,
     judged_goals,
@@ -20,7 +20,7 @@ from grader.checks.goals import (
     why_raised_in,
     why_rejected,
 )
-from grader.checks.offered import ACTION, actions, why_not_offered
+from grader.checks.offered import ACTION, is_offered
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, counted, percent
 from grader.recording.interaction import Goal
@@ -45,19 +45,7 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
     Explains a misspelt name, a private or namespaced one, upper and lower case, another type,
     a service or nothing in its place, and a program that died before.
     """
-    expected = f"an action {code(parameters.action)}"
-    expected += f" of {code(parameters.type)}" if parameters.type else ""
-    cause = why_not_offered(recording, ACTION, parameters.action, parameters.type)
-    if cause is not None:
-        return cause.finding(expected)
-    found = next(item for item in actions(recording) if item.name == parameters.action)
-    when_s = recording.since_launch_s(found.appeared_ns)
-    return Finding.passed(
-        expected,
-        f"{code(found.node)} offers it, with the type {code(found.type)}, seen {when_s:.2f} s "
-        "after launch",
-        Evidence(moments=(Moment(f"action {found.name} appeared", when_s),)),
-    )
+    return is_offered(recording, ACTION, parameters.action, parameters.type)
 
 
 class OfGoals(Parameters):

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
-from grader.checks.finding import Evidence, Moment, Table
+from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.near_name import Named, why_misnamed
 from grader.checks.node_absence import why_no_node
 from grader.checks.wording import code, codes
-from grader.nearest import nearest
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
 
@@ -37,18 +37,22 @@ class Word:
     """How a thing that is offered is called, and made.
 
     Attributes:
+        article: Of the noun.
         noun: ``service`` or ``action``.
         create: The code that makes one; ``{type}`` and ``{name}`` stand for its own.
         folder: Module of its interfaces.
     """
 
+    article: str
     noun: str
     create: str
     folder: str
 
 
-SERVICE = Word("service", "self.create_service({type}, '{name}', self.callback)", "srv")
-ACTION = Word("action", "ActionServer(self, {type}, '{name}', self.execute_callback)", "action")
+SERVICE = Word("a", "service", "self.create_service({type}, '{name}', self.callback)", "srv")
+ACTION = Word(
+    "an", "action", "ActionServer(self, {type}, '{name}', self.execute_callback)", "action"
+)
 
 
 def services(recording: Recording) -> tuple[Service, ...]:
@@ -80,6 +84,34 @@ def _is_own(name: str, node: str) -> bool:
     return prefix == node and base in _OWN
 
 
+def is_offered(recording: Recording, word: Word, name: str, interface: str | None) -> Finding:
+    """The finding of a check that a node of the student offers a service or action.
+
+    Args:
+        recording: The run.
+        word: What it is.
+        name: Fully qualified.
+        interface: Its type, or None where any will do.
+    """
+    expected = f"{word.article} {word.noun} {code(name)}"
+    expected += f" of {code(interface)}" if interface else ""
+    cause = why_not_offered(recording, word, name, interface)
+    if cause is not None:
+        return cause.finding(expected)
+    found = next(item for item in _of_students(recording, word) if item.name == name)
+    when_s = recording.since_launch_s(found.appeared_ns)
+    return Finding.passed(
+        expected,
+        f"{code(found.node)} offers it, with the type {code(found.type)}, seen {when_s:.2f} s "
+        "after launch",
+        Evidence(moments=(Moment(f"{word.noun} {found.name} appeared", when_s),)),
+    )
+
+
+def _of_students(recording: Recording, word: Word) -> tuple[Service, ...]:
+    return services(recording) if word is SERVICE else actions(recording)
+
+
 def why_not_offered(
     recording: Recording, word: Word, name: str, interface: str | None = None
 ) -> Cause | None:
@@ -91,7 +123,7 @@ def why_not_offered(
         name: Fully qualified.
         interface: Its type, or None where any will do.
     """
-    there = services(recording) if word is SERVICE else actions(recording)
+    there = _of_students(recording, word)
     own = [item for item in there if item.name == name]
     if any(interface in (None, item.type) for item in own):
         return None
@@ -101,19 +133,22 @@ def why_not_offered(
     evidence = _evidence(recording, there, word)
     if own and interface is not None:
         return _other_type(own[0], word, interface, evidence)
-    near = _near_miss(there, word, name, evidence)
+    near = why_misnamed(
+        name,
+        [Named(item.name, item.node) for item in there],
+        f"found the {word.noun}",
+        f"Write its name as '{name.rpartition('/')[2]}'.",
+        evidence,
+    )
     if near is not None:
         return near
     ended = [process for process in dead(recording) if process.exit_code != 0]
     if ended:
         return cause_of_death(recording, ended[0])
-    other = actions(recording) if word is SERVICE else services(recording)
-    if any(item.name == name for item in other):
-        wrong = ACTION if word is SERVICE else SERVICE
+    wrong = ACTION if word is SERVICE else SERVICE
+    if any(item.name == name for item in _of_students(recording, wrong)):
         return Cause(
-            f"{code(name)} is there, but as an {wrong.noun}"
-            if wrong is ACTION
-            else f"{code(name)} is there, but as a {wrong.noun}",
+            f"{code(name)} is there, but as {wrong.article} {wrong.noun}",
             f"Make it with {_create(word, name, interface)}.",
             evidence,
         )
@@ -132,47 +167,6 @@ def _other_type(item: Service, word: Word, interface: str, evidence: Evidence) -
         f"the {word.noun} {code(item.name)} has the type {code(item.type)}",
         f"A client and a server meet only if their types are the same: "
         f"`from {package}.{word.folder} import {short}`.",
-        evidence,
-    )
-
-
-def _near_miss(
-    there: tuple[Service, ...], word: Word, name: str, evidence: Evidence
-) -> Cause | None:
-    base = name.rpartition("/")[2]
-    for item in there:
-        found = f"found the {word.noun} {code(item.name)}"
-        if item.name.lower() == name.lower():
-            return Cause(
-                f"{found}: upper and lower case differ",
-                f"Names in ROS are case-sensitive: write '{base}'.",
-                evidence,
-            )
-        if item.name == item.node + name:
-            return Cause(
-                f"{found}: a private name, below the node's own name",
-                f"`~/{base}` puts the node's name in front: write '{base}', without `~/`.",
-                evidence,
-            )
-        if item.name.endswith(name):
-            prefix = item.name[: -len(name)]
-            return Cause(
-                f"{found}: {code(prefix)} stands in front of the name",
-                f"Create the node without namespace, or write the absolute name '{name}'.",
-                evidence,
-            )
-        if name.endswith(item.name):
-            return Cause(
-                f"{found}: an absolute name, which stays outside of the node's namespace",
-                f"Begin the name without `/`: '{item.name.lstrip('/')}' is relative.",
-                evidence,
-            )
-    match = nearest(name, [item.name for item in there])
-    if match is None:
-        return None
-    return Cause(
-        f"found the {word.noun} {code(match)} instead of {code(name)}",
-        f"Write its name as '{base}'.",
         evidence,
     )
 

@@ -16,7 +16,7 @@ from grader.checks.death import cause_of_death, dead
 from grader.checks.fields import TOLERANCE, difference_table, difference_words, has_fields, unlike
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Moment, Table
-from grader.checks.offered import SERVICE, services, why_not_offered
+from grader.checks.offered import SERVICE, is_offered, services, why_not_offered
 from grader.checks.unanswered import why_taken, why_unanswered
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted
@@ -46,19 +46,7 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
     Explains a misspelt name, a private or namespaced one, upper and lower case, another type,
     an action or nothing in its place, and a program that died before.
     """
-    expected = f"a service {code(parameters.service)}"
-    expected += f" of {code(parameters.type)}" if parameters.type else ""
-    cause = why_not_offered(recording, SERVICE, parameters.service, parameters.type)
-    if cause is not None:
-        return cause.finding(expected)
-    found = next(item for item in services(recording) if item.name == parameters.service)
-    when_s = recording.since_launch_s(found.appeared_ns)
-    return Finding.passed(
-        expected,
-        f"{code(found.node)} offers it, with the type {code(found.type)}, seen {when_s:.2f} s "
-        "after launch",
-        Evidence(moments=(Moment(f"service {found.name} appeared", when_s),)),
-    )
+    return is_offered(recording, SERVICE, parameters.service, parameters.type)
 
 
 class Responds(Parameters):

@@ -8,9 +8,9 @@ from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Moment, Table
+from grader.checks.near_name import Named, why_misnamed
 from grader.checks.node_absence import why_no_node
 from grader.checks.wording import code, codes
-from grader.nearest import nearest
 from grader.recording.model import Endpoint, Kind, Owner, Recording
 
 # Every rclpy node has these by itself; they say nothing of what the student wrote.
@@ -39,7 +39,13 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
         return cause
     own = [item for item in recording.student_endpoints(kind) if item.topic not in OWN_TOPICS]
     evidence = Evidence(moments=_moments(recording, own), tables=_endpoints_table(recording))
-    near = _near_miss(kind, topic, own, evidence)
+    near = why_misnamed(
+        topic,
+        [Named(item.topic, item.node) for item in own],
+        f"the node {_DOES[kind]}",
+        f"Write the topic's name as '{topic.rpartition('/')[2]}' in self.{_CREATE[kind]}(...).",
+        evidence,
+    )
     if near is not None:
         return near
     ended = [process for process in dead(recording) if process.exit_code != 0]
@@ -70,64 +76,6 @@ def _only_students_publish(recording: Recording, topic: str) -> bool:
         for item in recording.endpoints
     )
     return bool(recording.on(topic)) and not any(others)
-
-
-def _near_miss(kind: Kind, topic: str, own: list[Endpoint], evidence: Evidence) -> Cause | None:
-    base = topic.rpartition("/")[2]
-    for item in own:
-        found = f"the node {_DOES[kind]} {code(item.topic)} instead"
-        if item.topic.lower() == topic.lower():
-            return Cause(
-                f"{found}: upper and lower case differ",
-                f"Names in ROS are case-sensitive: write '{base}'.",
-                evidence,
-            )
-        if item.topic == item.node + topic:
-            return Cause(
-                f"{found}: a private name, below the node's own name",
-                f"`~/{base}` puts the node's name in front: write '{base}', without `~/`.",
-                evidence,
-            )
-        if item.topic.endswith(topic):
-            return _prefixed(item, topic, found, evidence)
-        if topic.endswith(item.topic):
-            return Cause(
-                f"{found}: an absolute name, which stays outside of the node's namespace",
-                f"Begin the name without `/`: '{item.topic.lstrip('/')}' is relative, and ROS "
-                "puts the node's namespace in front of it.",
-                evidence,
-            )
-    match = nearest(topic, [item.topic for item in own])
-    if match is None:
-        return None
-    return Cause(
-        f"the node {_DOES[kind]} {code(match)} instead of {code(topic)}",
-        f"Write the topic's name as '{base}' in self.{_CREATE[kind]}(...).",
-        evidence,
-    )
-
-
-def _prefixed(item: Endpoint, topic: str, found: str, evidence: Evidence) -> Cause:
-    prefix = item.topic[: -len(topic)]
-    namespace = item.node.rpartition("/")[0]
-    if namespace == prefix:
-        return Cause(
-            f"{found}: the node is in the namespace {code(namespace)}, and a relative topic name "
-            "goes there with it",
-            f"Create the node without namespace, or write the absolute name '{topic}'.",
-            evidence,
-        )
-    if prefix == item.node or prefix.lstrip("/") == item.node.rpartition("/")[2]:
-        return Cause(
-            f"{found}: the node's name stands in front of the topic's",
-            f"Write '{topic.lstrip('/')}', without `~/` and without the node's name.",
-            evidence,
-        )
-    return Cause(
-        f"{found}: {code(prefix)} stands in front of the name",
-        f"Write '{topic.lstrip('/')}' in the code.",
-        evidence,
-    )
 
 
 def _elsewhere(

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from grader.cli.console import output_console
+from grader.cli.options import AssignmentName
 
 
 def list_command() -> None:
@@ -27,7 +28,7 @@ def list_command() -> None:
 
 
 def show(
-    assignment: Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")],
+    assignment: AssignmentName,
     html: Annotated[
         bool, typer.Option("--html", help="Write it as a page, for students to open or print.")
     ] = False,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from grader.cli.console import output_console
+from grader.cli.options import AssignmentName, Quiet, Seed
 from grader.cli.progress import ClassProgress
 from grader.cli.sandbox import Choice, SandboxChoice
 from grader.errors import UsageError
@@ -27,7 +28,7 @@ _AUTO = "auto"
 
 
 def batch(
-    assignment: Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")],
+    assignment: AssignmentName,
     submissions: Annotated[
         Path,
         typer.Argument(
@@ -49,11 +50,9 @@ def batch(
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler, such as tcp://host:8786.")
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Seed of all random values; by default the submission's.")
-    ] = None,
+    seed: Seed = None,
     sandbox: SandboxChoice = Choice.AUTO,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Grade a class. The same command goes on where an earlier one stopped.
 

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from grader.checks.wording import counted
 from grader.cli.console import output_console, print_error, print_warning
 from grader.errors import RosgradeError
 
@@ -42,10 +43,10 @@ def validate(
             continue
         for doubt in doubts(loaded, mutants.mutants if mutants else None):
             print_warning(f"{loaded.file}: {doubt}")
-        tested = f", {len(mutants.mutants)} mutants" if mutants else ""
+        tested = f", {counted(len(mutants.mutants), 'mutant')}" if mutants else ""
         typer.echo(
-            f"{loaded.file}: {len(loaded.assignment.scenarios)} scenarios, "
-            f"{len(loaded.checks)} checks{tested}: valid"
+            f"{loaded.file}: {counted(len(loaded.assignment.scenarios), 'scenario')}, "
+            f"{counted(len(loaded.checks), 'check')}{tested}: valid"
         )
     if broken:
         raise typer.Exit(2)

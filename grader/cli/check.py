@@ -21,6 +21,16 @@ from grader.cli.formats import (
     MarkdownFile,
 )
 from grader.cli.live import GradingProgress
+from grader.cli.options import (
+    AssignmentName,
+    Checks,
+    Hidden,
+    Quiet,
+    ReportFolder,
+    Scenarios,
+    Seed,
+    Verbose,
+)
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.resources import cache_folder
 
@@ -28,30 +38,18 @@ FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
 
 
 def check(
-    assignment: Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")],
+    assignment: AssignmentName,
     submission: Annotated[
         Path, typer.Argument(help="What was handed in: a folder, a .zip or a .tar.gz.")
     ],
-    report: Annotated[
-        Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
-    ] = Path("rosgrade-report"),
+    report: ReportFolder = Path("rosgrade-report"),
     json_file: Annotated[
         Path | None, typer.Option("--json", help="Write the result here as well.")
     ] = None,
-    scenario: Annotated[
-        list[str] | None, typer.Option(help="Run only this scenario; may be repeated.")
-    ] = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(help="Judge only this check and what it requires; may be repeated."),
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Seed of all random values; by default the submission's.")
-    ] = None,
-    hidden: Annotated[
-        bool,
-        typer.Option("--hidden", help="Run and show the hidden checks too: for instructors."),
-    ] = False,
+    scenario: Scenarios = None,
+    only: Checks = None,
+    seed: Seed = None,
+    hidden: Hidden = False,
     junit: JunitFile = None,
     junit_family: JunitFamilyName = JunitFamily.XUNIT2,
     markdown: MarkdownFile = None,
@@ -63,13 +61,8 @@ def check(
     keep: Annotated[
         bool, typer.Option("--keep", help="Keep what colcon installed, in the report's folder.")
     ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
-    verbose: Annotated[
-        bool,
-        typer.Option(
-            "--verbose", "-v", help="Show the build's log and what your nodes print, as it comes."
-        ),
-    ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
     open_report: Annotated[
         bool, typer.Option("--open", help="Open the report in a browser.")
     ] = False,
@@ -111,7 +104,6 @@ def check(
             check_path(submission)
             grading = Grading(loaded, runner, cache_folder(), seed=seed)
             with progress.shown():
-                progress.say(f"reading {submission}")
                 graded = grading.grade(
                     submission,
                     report / RECORDINGS_FOLDER,

@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from grader.cli.console import output_console, print_error
+from grader.cli.options import AssignmentName
 
-Assignment = Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")]
+Assignment = AssignmentName
 Folder = Annotated[Path, typer.Option("--out", help="Where to.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
 File = Annotated[Path, typer.Option("--output", "-o", help="File to write.")]

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from grader.cli.console import output_console
+from grader.cli.options import Quiet
 from grader.cli.progress import ClassProgress
 
 NOT_GRADED = 3
@@ -25,7 +26,7 @@ def regrade(
         str | None,
         typer.Argument(help="Id or folder; by default the one that the result names."),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Judge again from the recordings, with the YAML as it is now. Nothing is run.
 

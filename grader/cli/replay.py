@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from grader.cli.console import Progress
+from grader.cli.options import Quiet
 from grader.resources import cache_folder
 
 
@@ -19,7 +20,7 @@ def replay(
         str | None,
         typer.Argument(help="Id or folder; by default the one that it was recorded for."),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Give a node the very inputs of a recording again, and print what it does.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from grader.cli.console import Progress, output_console
+from grader.cli.options import Quiet
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.resources import cache_folder
 
@@ -28,7 +29,7 @@ def selftest(
         typer.Option("--record", help="Grade only the reference, and keep its runs for reports."),
     ] = False,
     sandbox: SandboxChoice = Choice.AUTO,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Grade the reference, the variants and the mutants of an assignment.
 

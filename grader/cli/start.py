@@ -8,10 +8,11 @@ from typing import Annotated
 import typer
 
 from grader.cli.console import output_console
+from grader.cli.options import AssignmentName
 
 
 def start(
-    assignment: Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")],
+    assignment: AssignmentName,
     folder: Annotated[
         Path,
         typer.Argument(

@@ -13,6 +13,16 @@ import typer
 
 from grader.cli.console import output_console, print_error
 from grader.cli.live import GradingProgress
+from grader.cli.options import (
+    AssignmentName,
+    Checks,
+    Hidden,
+    Quiet,
+    ReportFolder,
+    Scenarios,
+    Seed,
+    Verbose,
+)
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.resources import cache_folder
 
@@ -27,38 +37,21 @@ if TYPE_CHECKING:
 
 
 def watch(
-    assignment: Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")],
+    assignment: AssignmentName,
     submission: Annotated[
         Path, typer.Argument(help="What you work on: a package, a workspace or its src.")
     ] = Path(),
-    report: Annotated[
-        Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
-    ] = Path("rosgrade-report"),
-    scenario: Annotated[
-        list[str] | None, typer.Option(help="Run only this scenario; may be repeated.")
-    ] = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(help="Judge only this check and what it requires; may be repeated."),
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Seed of all random values; by default the submission's.")
-    ] = None,
-    hidden: Annotated[
-        bool,
-        typer.Option("--hidden", help="Run and show the hidden checks too: for instructors."),
-    ] = False,
+    report: ReportFolder = Path("rosgrade-report"),
+    scenario: Scenarios = None,
+    only: Checks = None,
+    seed: Seed = None,
+    hidden: Hidden = False,
     sandbox: SandboxChoice = Choice.AUTO,
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="Port of the report page; 0 takes a free one.")
     ] = 0,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")] = False,
-    verbose: Annotated[
-        bool,
-        typer.Option(
-            "--verbose", "-v", help="Show the build's log and what your nodes print, as it comes."
-        ),
-    ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
     open_report: Annotated[
         bool, typer.Option("--open", help="Open the report page in a browser.")
     ] = False,

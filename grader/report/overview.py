@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from statistics import median
 from urllib.parse import quote
 
 from markupsafe import Markup
 
-from grader import resources
 from grader.checks.finding import Status
 from grader.report.clean import one_line
 from grader.report.distribution import draw_distribution
-from grader.report.html import environment
+from grader.report.html import asset, environment
 from grader.report.policy import content_security_policy
 from grader.report.result_model import CheckPart, Result
 from grader.report.words import STATUS, number
@@ -127,7 +125,7 @@ def render_overview(rows: Sequence[OverviewRow]) -> str:
     columns = _columns(rows)
     scores = [row.result.score or 0.0 for row in rows if row.result is not None and row.graded]
     most = max((row.result.max_score for row in rows if row.result is not None), default=0.0)
-    style, script = _asset("report.css") + _asset("overview.css"), _asset("overview.js")
+    style, script = asset("report.css") + asset("overview.css"), asset("overview.js")
     return (
         environment()
         .get_template("overview.html.j2")
@@ -226,8 +224,3 @@ def _disturbed(rows: Sequence[OverviewRow]) -> list[Disturbed]:
         if run.disturbance.taken_s >= DISTURBED_S or run.faults
     ]
     return sorted(found, key=lambda item: -item.taken_s)[:MOST_DISTURBED]
-
-
-@cache
-def _asset(name: str) -> str:
-    return (resources.templates() / name).read_text(encoding="utf-8")

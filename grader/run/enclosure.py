@@ -149,11 +149,6 @@ class EnclosedProcess(subprocess.Popen[bytes]):
                 if os.getpgid(pid) == init:
                     os.kill(pid, number)
 
-    def close_status(self) -> None:
-        """Nothing more is asked."""
-        self._read_status()
-        os.close(self._status)
-
     def _read_status(self) -> dict[str, Any]:
         try:
             while block := os.read(self._status, _STATUS_BYTES):

@@ -1,0 +1,34 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+AssignmentName = Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")]
+ReportFolder = Annotated[
+    Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
+]
+Scenarios = Annotated[
+    list[str] | None, typer.Option(help="Run only this scenario; may be repeated.")
+]
+Checks = Annotated[
+    list[str] | None,
+    typer.Option(help="Judge only this check and what it requires; may be repeated."),
+]
+Seed = Annotated[
+    int | None, typer.Option(help="Seed of all random values; by default the submission's.")
+]
+Hidden = Annotated[
+    bool,
+    typer.Option("--hidden", help="Run and show the hidden checks too: for instructors."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress.")]
+Verbose = Annotated[
+    bool,
+    typer.Option(
+        "--verbose", "-v", help="Show the build's log and what your nodes print, as it comes."
+    ),
+]
