@@ -1,45 +1,33 @@
-"""A cell: one run of one scenario, in a process of its own.
-
-``python -m grader.run.cell FOLDER [DOMAIN...]`` joins the graph on a domain of its own (not
-one of those given), and waits for a line on standard input. Then it reads a
-:class:`~grader.run.order.CellOrder` from ``order.json`` in the folder, runs it, writes
-``recording.mcap`` beside it, and tells its progress as JSON lines on standard output. When its
-standard input ends, whoever ordered the run is gone, and the cell kills what it started and
-ends.
-"""
+"""A cell: one run of one scenario, in a process of its own."""
 
 from __future__ import annotations
 
-import contextlib
-import gc
-import json
 import os
 import select
-import signal
-import sys
-import threading
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.recording.model import Call, Ending, Endpoint, Kind, LogLine, Owner, Recording, Wait
-from grader.run.descendants import become_subreaper, kill_descendants
+from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording, Wait
 from grader.run.disturbance import DisturbanceMeter
-from grader.run.domain import DomainLock, joined_domains, lock_domain
+from grader.run.domain import joined_domains
 from grader.run.ending import EndingConditions
-from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder, Command
+from grader.run.graph import GraphObserver
+from grader.run.leave import Leave
+from grader.run.order import CellOrder, Command
 from grader.run.output import OutputReader
+from grader.run.probe import Probe
+from grader.run.stimuli.player import Player
+from grader.run.stimuli.stage import Stage
 from grader.run.stopwatch import Stopwatch
 from grader.run.student import StudentProcesses
+from grader.run.telling import tell, tell_line
 from grader.run.watchdog import Watchdog
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
-    from grader.run.graph import GraphObserver
-    from grader.run.probe import Probe
     from grader.run.simulator import SimulatedRobot
-    from grader.sandbox.namespaces import Mounter
 
 _TICK_S = 0.02
 _CALM_TICK_S = 0.1
@@ -47,24 +35,10 @@ _GRAPH_PERIOD_S = 0.1
 # Who comes and goes later than the first match matters to no wait.
 _SETTLED_GRAPH_PERIOD_S = 0.25
 _PIPES_LIMIT_S = 1.0
-# Lines of the student are told by the thread that reads them.
-_TELLING = threading.Lock()
 
 
 class Abandoned(Exception):
     """Whoever ordered the run is gone."""
-
-
-def tell(event: str, **data: Any) -> None:
-    """One line of progress for whoever ordered the run."""
-    with _TELLING:
-        print(json.dumps({"event": event, **data}), flush=True)
-
-
-def _tell_line(line: LogLine) -> None:
-    # Whoever ordered the run may be gone; the pipes must be drained all the same.
-    with contextlib.suppress(OSError):
-        tell("printed", process=line.process, text=line.text)
 
 
 class Cell:
@@ -72,14 +46,10 @@ class Cell:
 
     def __init__(self, order: CellOrder, domain_id: int, probe: Probe) -> None:
         """Set the cell up; nothing of the student's runs yet."""
-        from grader.run.graph import GraphObserver
-        from grader.run.stimuli.player import Player
-        from grader.run.stimuli.stage import Stage
-
         self._order = order
         self._domain_id = domain_id
         self._probe = probe
-        on_line = _tell_line if order.tells_output else None
+        on_line = tell_line if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
         self._students = StudentProcesses(self._output, order.enclosure)
         self._other_domains: tuple[int, ...] = ()
@@ -91,12 +61,13 @@ class Cell:
                 lambda: self._output.written_bytes,
             )
         self._meter = DisturbanceMeter(lambda: self._students.pids)
-        self._graph: GraphObserver = GraphObserver(
+        self._graph = GraphObserver(
             probe.node,
             lambda: self._students.pids,
             self._students.refresh,
             private=order.enclosure is not None,
         )
+        self._leave = Leave(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
         self._robot: SimulatedRobot | None = None
         if order.simulator is not None:
@@ -116,7 +87,6 @@ class Cell:
         self._ending = EndingConditions(probe, self._output, self._robot, self._player)
         self._faults: list[str] = []
         self._next_graph = 0.0
-        self._told = 0
         self._matched_ns: int | None = None
 
     def run(self) -> Recording:
@@ -137,7 +107,7 @@ class Cell:
             if self._robot is not None:
                 self._robot.stop()
             tell("stopping")
-            self._stop()
+            self._students.stop(self._order.limits, self._meter)
         finally:
             self._students.clean_up()
             self._faults += self._students.faults()
@@ -184,9 +154,6 @@ class Cell:
 
     def _observe(self) -> Ending:
         ending = self._launch()
-        # Needed at the end; imported while the student's process starts.
-        import grader.recording.mcap_writer  # noqa: F401
-
         ending = ending or self._await_node() or self._await_match()
         if ending is None:
             tell("matched", limit_s=self._order.limits.timeout_s)
@@ -343,40 +310,15 @@ class Cell:
             tick_s = _TICK_S if self._matched_ns is None else _CALM_TICK_S
             self._probe.spin_once(self._player.pause_s(tick_s))
             now = time.monotonic()
-            leaving = self._leaving()
-            if now >= self._next_graph or len(leaving) > self._told:
+            if now >= self._next_graph or self._leave.is_asked:
                 settled = self._matched_ns is not None
                 self._next_graph = now + (_SETTLED_GRAPH_PERIOD_S if settled else _GRAPH_PERIOD_S)
                 self._graph.poll()
                 self._find_foreign()
                 _raise_if_abandoned()
-            self._let_leave(leaving)
+            self._leave.give()
             self._player.tick()
             yield watch
-
-    def _leaving(self) -> list[str]:
-        """Processes that wait to be seen before they end, by their tracers' word."""
-        return [item.process for item in self._output.declarations if item.kind == "leaving"]
-
-    def _let_leave(self, leaving: list[str]) -> None:
-        if len(leaving) == self._told:
-            return
-        nodes = {node.name for node in self._graph.nodes}
-        announced = {
-            (endpoint.kind.value, endpoint.topic)
-            for endpoint in self._graph.endpoints
-            if endpoint.owner is not Owner.PROBE
-        }
-        for declaration in self._output.declarations:
-            kind, data = declaration.kind, declaration.data
-            if kind == "node" and str(data.get("node")) not in nodes:
-                return
-            is_endpoint = kind in ("publisher", "subscription")
-            if is_endpoint and (kind, str(data.get("topic"))) not in announced:
-                return
-        for name in leaving[self._told :]:
-            self._students.let_leave(name)
-        self._told = len(leaving)
 
     def _find_foreign(self) -> None:
         names = sorted({n.name for n in self._graph.nodes if n.owner is Owner.FOREIGN})
@@ -385,25 +327,6 @@ class Cell:
                 f"not alone on ROS domain {self._domain_id}: the node "
                 f"{', '.join(names)} belongs neither to rosgrade nor to the submission"
             )
-
-    def _stop(self) -> None:
-        """SIGINT, SIGTERM, SIGKILL, each with a bounded wait."""
-        self._students.let_leave()
-        limits = self._order.limits
-        watch = Stopwatch(self._meter)
-        for number, limit_s in (
-            (signal.SIGINT, limits.shutdown_s),
-            (signal.SIGTERM, limits.terminate_s),
-            (signal.SIGKILL, limits.terminate_s),
-        ):
-            if not self._students.poll():
-                break
-            self._students.signal(number)
-            step = Stopwatch(self._meter)
-            while self._students.poll() and step.elapsed_s <= limit_s:
-                time.sleep(0.005)
-                self._students.note_stop(watch.elapsed_s)
-            self._students.note_stop(watch.elapsed_s)
 
 
 def _by_time(calls: Iterable[Call]) -> tuple[Call, ...]:
@@ -415,86 +338,3 @@ def _raise_if_abandoned() -> None:
     readable, _, _ = select.select([0], [], [], 0)
     if readable and not os.read(0, 1):
         raise Abandoned
-
-
-def _reset_signals() -> None:
-    """Let the student's processes inherit the signals that a terminal gives.
-
-    A shell starts background jobs, and `nohup` its command, with some of them ignored; a program
-    that inherits that never sees the Ctrl-C that ends it.
-    """
-    for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_SETMASK, ())
-
-
-def _keep_progress_apart() -> None:
-    """Let nothing but our progress go to standard output.
-
-    Fast DDS writes its warnings there, such as one for every message that is too long for the
-    type that the probe reads.
-    """
-    sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)
-
-
-def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
-    from grader.recording.definition import concatenated_definition, definition_finder
-
-    find = definition_finder(Path(prefix) for prefix in order.prefixes)
-    return {name: concatenated_definition(name, find) for name in types}
-
-
-def main(folder: Path, avoid_domains: tuple[int, ...], mounter: Mounter | None = None) -> int:
-    """Get ready, wait for the word, run the order in the folder.
-
-    Args:
-        folder: The cell's own.
-        avoid_domains: Domains not to use.
-        mounter: In a sandbox: mounts what the student can write to.
-    """
-    # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
-    gc.disable()
-    become_subreaper()
-    _reset_signals()
-    _keep_progress_apart()
-    with DomainLock(0) if mounter else lock_domain(avoid_domains) as domain:
-        from grader.run.probe import Probe
-
-        probe = Probe(domain.domain_id)
-        if os.read(0, len(GO)) != GO:
-            return 1
-        order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
-        if order.type_support:
-            from grader.run.type_support import add_type_support
-
-            add_type_support(map(Path, order.type_support))
-        if mounter is not None and order.enclosure is not None:
-            bounds = order.enclosure.limits
-            mounter.mount(bounds.disk_bytes, bounds.files, bounds.shared_bytes)
-        probe.listen(order.topics, order.limits)
-        try:
-            recording = Cell(order, domain.domain_id, probe).run()
-        except Abandoned:
-            return 1
-        finally:
-            kill_descendants(os.getpid())
-        # What was written by another definition would be read as something that nobody sent.
-        garbled = {one.topic for one in recording.endpoints if recording.misdefined(one.topic)}
-        messages = [one for one in probe.messages if one.is_sent or one.topic not in garbled]
-        probe.close()
-    from grader.recording.mcap_writer import write_recording
-
-    definitions = _definitions(order, {message.type for message in messages})
-    write_recording(
-        folder / RECORDING_FILE, recording, messages, definitions, order.submission.encode()
-    )
-    tell("recorded")
-    return 0
-
-
-if __name__ == "__main__":
-    status = main(Path(sys.argv[1]), tuple(map(int, sys.argv[2:])))
-    sys.stdout.flush()
-    # The recording is written and the graph left; to unload all libraries takes 0.1 s more.
-    os._exit(status)

@@ -43,10 +43,7 @@ _TOLD = struct.Struct("=id")
 """Process id and 0, then exit status and CPU time in seconds."""
 _FORK_LIMIT_S = 10.0
 _ALWAYS = (
-    "grader.run.graph",
-    "grader.run.probe",
-    "grader.run.stimuli.player",
-    "grader.recording.mcap_writer",
+    "grader.run.cell_main",
     "rcl_interfaces.srv",
 )
 SIMULATOR_MODULE = "grader.run.simulator"
@@ -281,10 +278,10 @@ def _tell_ended(running: dict[int, int]) -> None:
 
 def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool) -> None:
     """Run a cell in this process, which was just forked, and end it."""
-    from grader.run.cell import main
-
     status = 1
     try:
+        from grader.run.cell_main import main
+
         os.setsid()
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)

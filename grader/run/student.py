@@ -13,11 +13,15 @@ from pathlib import Path
 
 from grader.recording.model import NS, Process
 from grader.run.descendants import descendants, is_init, kill_descendants, reap
+from grader.run.disturbance import DisturbanceMeter
 from grader.run.enclosure import EnclosedProcess, Enclosure
+from grader.run.order import Limits
 from grader.run.output import OutputReader
 from grader.run.shared_memory import remove_orphaned_segments
+from grader.run.stopwatch import Stopwatch
 
 _AFTERMATH_S = 0.5
+_STOP_TICK_S = 0.005
 
 
 @dataclass
@@ -182,19 +186,33 @@ class StudentProcesses:
                 process.signal(number)
         return running
 
-    def signal(self, number: signal.Signals) -> None:
-        """Send a signal to the process group of every process that still runs."""
-        for process in self._running:
-            if process.exited_ns is None:
-                process.stopped_by = number.name
-                process.signal(number)
-
-    def note_stop(self, stop_s: float) -> None:
-        """Date the end of the processes that ended since the last call.
+    def stop(self, limits: Limits, meter: DisturbanceMeter) -> None:
+        """SIGINT, SIGTERM, SIGKILL, each with a bounded wait; dates the end of each process.
 
         Args:
-            stop_s: Seconds since SIGINT, less what the host took.
+            limits: How long to wait after each signal.
+            meter: What the host takes meanwhile does not count.
         """
+        self.let_leave()
+        watch = Stopwatch(meter)
+        for number, limit_s in (
+            (signal.SIGINT, limits.shutdown_s),
+            (signal.SIGTERM, limits.terminate_s),
+            (signal.SIGKILL, limits.terminate_s),
+        ):
+            if not self.poll():
+                break
+            for process in self._running:
+                if process.exited_ns is None:
+                    process.stopped_by = number.name
+                    process.signal(number)
+            step = Stopwatch(meter)
+            while self.poll() and step.elapsed_s <= limit_s:
+                time.sleep(_STOP_TICK_S)
+                self._note_stop(watch.elapsed_s)
+            self._note_stop(watch.elapsed_s)
+
+    def _note_stop(self, stop_s: float) -> None:
         self.poll()
         for process in self._running:
             ended = process.exited_ns is not None

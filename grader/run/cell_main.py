@@ -1,0 +1,87 @@
+"""What a cell does from its fork to its end.
+
+It joins the graph on a domain of its own and waits for a line on standard input. Then it reads a
+:class:`~grader.run.order.CellOrder` from ``order.json`` in its folder, runs it, writes
+``recording.mcap`` beside it, and tells its progress as JSON lines on standard output. When its
+standard input ends, whoever ordered the run is gone, and the cell kills what it started and
+ends.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from grader.recording.definition import concatenated_definition, definition_finder
+from grader.recording.mcap_writer import write_recording
+from grader.run.cell import Abandoned, Cell
+from grader.run.descendants import become_subreaper, kill_descendants
+from grader.run.domain import DomainLock, lock_domain
+from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
+from grader.run.probe import Probe
+from grader.run.telling import keep_apart, tell
+from grader.run.type_support import add_type_support
+
+if TYPE_CHECKING:
+    from grader.sandbox.namespaces import Mounter
+
+
+def _reset_signals() -> None:
+    """Let the student's processes inherit the signals that a terminal gives.
+
+    A shell starts background jobs, and `nohup` its command, with some of them ignored; a program
+    that inherits that never sees the Ctrl-C that ends it.
+    """
+    for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+
+
+def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
+    find = definition_finder(Path(prefix) for prefix in order.prefixes)
+    return {name: concatenated_definition(name, find) for name in types}
+
+
+def main(folder: Path, avoid_domains: tuple[int, ...], mounter: Mounter | None = None) -> int:
+    """Get ready, wait for the word, run the order in the folder.
+
+    Args:
+        folder: The cell's own.
+        avoid_domains: Domains not to use.
+        mounter: In a sandbox: mounts what the student can write to.
+    """
+    # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
+    gc.disable()
+    become_subreaper()
+    _reset_signals()
+    keep_apart()
+    with DomainLock(0) if mounter else lock_domain(avoid_domains) as domain:
+        probe = Probe(domain.domain_id)
+        if os.read(0, len(GO)) != GO:
+            return 1
+        order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
+        if order.type_support:
+            add_type_support(map(Path, order.type_support))
+        if mounter is not None and order.enclosure is not None:
+            bounds = order.enclosure.limits
+            mounter.mount(bounds.disk_bytes, bounds.files, bounds.shared_bytes)
+        probe.listen(order.topics, order.limits)
+        try:
+            recording = Cell(order, domain.domain_id, probe).run()
+        except Abandoned:
+            return 1
+        finally:
+            kill_descendants(os.getpid())
+        # What was written by another definition would be read as something that nobody sent.
+        garbled = {one.topic for one in recording.endpoints if recording.misdefined(one.topic)}
+        messages = [one for one in probe.messages if one.is_sent or one.topic not in garbled]
+        probe.close()
+    definitions = _definitions(order, {message.type for message in messages})
+    write_recording(
+        folder / RECORDING_FILE, recording, messages, definitions, order.submission.encode()
+    )
+    tell("recorded")
+    return 0
