@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 from grader.checks import testimony
+from grader.checks.cause import Cause
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment
-from grader.recording.model import NS, Call, Recording
+from grader.recording.model import NS, Call, Process, Recording
 
 # What was asked for later than this before the end may be unanswered for that reason.
 _ANSWER_NS = NS
@@ -53,4 +54,33 @@ def where_blocked(recording: Recording, node: str, call: Call) -> tuple[str, Evi
     return (
         f" ({place.file}:{place.line})" if place else "",
         Evidence(moments=(moment,), places=(place,) if place else ()),
+    )
+
+
+def why_never_spun(
+    recording: Recording,
+    seen: str,
+    processes: Iterable[Process] | None = None,
+    moments: tuple[Moment, ...] = (),
+) -> Cause | None:
+    """The cause if a process never called ``rclpy.spin()``, by its tracer's word.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        processes: Which may be the one; by default all.
+        moments: Evidence besides the place at which it was interrupted.
+    """
+    candidates = recording.processes if processes is None else processes
+    process = next(
+        (item for item in candidates if testimony.never_spun(recording, item.name)), None
+    )
+    if process is None:
+        return None
+    place = interrupted_place(recording, process.name)
+    where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
+    return Cause(
+        f"{seen}: rclpy.spin() was never called, so no callback runs{where}",
+        "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
+        Evidence(moments, (place,) if place else ()),
     )

@@ -7,7 +7,7 @@ from pydantic import Field
 from grader.assignment.model import PackageName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Table
-from grader.checks.unbuilt import existing_package, why_no_package
+from grader.checks.unbuilt import existing_package, why_no_manifest
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
 from grader.submission.dependencies import meant
@@ -44,17 +44,10 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     stands under `test_depend` only, and misspelt names.
     """
     expected = f"every ROS package that {code(parameters.package)} imports is in package.xml"
-    cause = why_no_package(submission, parameters.package)
+    cause = why_no_manifest(submission, parameters.package)
     if cause is not None:
         return cause.finding(expected)
     package = existing_package(submission, parameters.package)
-    if package.manifest_error is not None:
-        return Finding.failed(
-            expected,
-            f"package.xml cannot be used: {package.manifest_error}",
-            "Mend package.xml at the line that is named here.",
-            Evidence(places=(package.manifest_error,)),
-        )
     unreadable = _unreadable(package)
     if unreadable is not None:
         return Finding.failed(

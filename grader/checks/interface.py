@@ -16,7 +16,7 @@ from grader.checks.definition_differences import (
     field_differences,
 )
 from grader.checks.finding import Comparison, Evidence, Finding, Table
-from grader.checks.unbuilt import existing_package
+from grader.checks.unbuilt import existing_package, why_no_manifest
 from grader.checks.ungenerated import (
     GENERATORS,
     GROUP,
@@ -206,14 +206,10 @@ def manifest(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
     definition = find_definition(submission, parameters.parts)
     if not isinstance(definition, Definition):
         return definition.finding(expected)
+    cause = why_no_manifest(submission, parameters.parts.package)
+    if cause is not None:
+        return cause.finding(expected)
     package = existing_package(submission, parameters.parts.package)
-    if package.manifest_error is not None:
-        return Finding.failed(
-            expected,
-            f"package.xml cannot be used: {package.manifest_error}",
-            "Mend package.xml at the line that is named here.",
-            Evidence(places=(package.manifest_error,)),
-        )
     missing = list(_missing(package, used_packages(parameters.parts, definition)))
     if not missing:
         return Finding.passed(expected, "every entry is there")

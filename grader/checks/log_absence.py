@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from grader.assignment.quantity import format_duration
-from grader.checks import testimony
-from grader.checks.blockage import HINT, first_unanswered, where_blocked
+from grader.checks.blockage import HINT, first_unanswered, where_blocked, why_never_spun
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_no_history, why_not_delivered
 from grader.checks.echo import Echo, Wanted, echoes, output_lines, shown
-from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.misreading import explain
 from grader.checks.printed import numbers, quote
@@ -62,7 +60,11 @@ def why_not_logged(
         )
     cause = (
         _disturbed(recording, topic, wanted, needed, decimals, within_ns)
-        or _never_spins(recording, topic)
+        or why_never_spun(
+            recording,
+            f"the callback is never called: the subscription to {code(topic)} is there and its "
+            "QoS matches",
+        )
         or _blocked(recording, topic, found)
         or _dropped(recording, topic)
     )
@@ -102,22 +104,6 @@ def _disturbed(
         f"{format_duration(taken_s)} from the process meanwhile",
         ours=True,
         disturbed=True,
-    )
-
-
-def _never_spins(recording: Recording, topic: str) -> Cause | None:
-    process = next(
-        (item for item in recording.processes if testimony.never_spun(recording, item.name)), None
-    )
-    if process is None:
-        return None
-    place = interrupted_place(recording, process.name)
-    where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
-    return Cause(
-        f"the callback is never called: the subscription to {code(topic)} is there and its QoS "
-        f"matches, but rclpy.spin() was never called{where}",
-        "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
-        Evidence(places=(place,) if place else ()),
     )
 
 

@@ -10,7 +10,7 @@ from grader.assignment.model import PackageName
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
-from grader.checks.unbuilt import existing_package, why_no_package, why_not_built
+from grader.checks.unbuilt import existing_package, why_no_manifest, why_not_built
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
@@ -38,17 +38,10 @@ def found(submission: SubmissionRecord, parameters: Found) -> Finding:
     expected = f"the package {code(parameters.package)}"
     if parameters.build_type:
         expected += f" with the build type {parameters.build_type}"
-    cause = why_no_package(submission, parameters.package)
+    cause = why_no_manifest(submission, parameters.package)
     if cause is not None:
         return cause.finding(expected)
     package = existing_package(submission, parameters.package)
-    if package.manifest_error is not None:
-        return Finding.failed(
-            expected,
-            f"package.xml cannot be used: {package.manifest_error}",
-            "Mend package.xml at the line that is named here.",
-            Evidence(places=(package.manifest_error,)),
-        )
     if parameters.build_type not in (None, package.build_type):
         manifest = _manifest(package)
         return Finding.failed(

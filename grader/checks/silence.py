@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.assignment.quantity import format_duration
 from grader.checks import compatibility, testimony
-from grader.checks.blockage import HINT, first_unanswered, where_blocked
+from grader.checks.blockage import HINT, first_unanswered, where_blocked, why_never_spun
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_not_delivered
@@ -56,7 +56,7 @@ def why_silent(recording: Recording, topic: str) -> Cause:
         _undelivered(recording, topic, asked)
         or (_slow(recording, topic) if not asked else None)
         or _starved(recording, topic)
-        or _never_spins(recording, topic)
+        or why_never_spun(recording, f"no message on {code(topic)}")
         or _blocked(recording, topic)
         or _prints(recording, topic)
         or _unanswered(recording, topic, asked)
@@ -264,21 +264,6 @@ def _slow(recording: Recording, topic: str) -> Cause | None:
         f"no message on {code(topic)} in {format_duration(watched_s)}: the process declared a "
         f"timer of {format_duration(timer.period_s)}",
         _SECONDS_HINT,
-    )
-
-
-def _never_spins(recording: Recording, topic: str) -> Cause | None:
-    process = next(
-        (item for item in recording.processes if testimony.never_spun(recording, item.name)), None
-    )
-    if process is None:
-        return None
-    place = interrupted_place(recording, process.name)
-    where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
-    return Cause(
-        f"no message on {code(topic)}: rclpy.spin() was never called, so no callback runs{where}",
-        "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
-        Evidence(places=(place,) if place else ()),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from grader.assignment.quantity import format_duration
 from grader.checks import testimony
+from grader.checks.blockage import why_never_spun
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead, ended_early
 from grader.checks.failure import interrupted_place, parse_failures, student_place
@@ -117,15 +118,7 @@ def _in_process(
     raised = why_raised(recording, what, process, asked_ns)
     if raised is not None:
         return raised
-    if testimony.never_spun(recording, process.name):
-        place = interrupted_place(recording, process.name)
-        where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
-        return Cause(
-            f"{what}: rclpy.spin() was never called, so no callback runs{where}",
-            "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
-            Evidence((moment,), (place,) if place else ()),
-        )
-    return None
+    return why_never_spun(recording, what, (process,), (moment,))
 
 
 def _blocked(recording: Recording, node: str, asked_ns: int) -> bool:

@@ -10,7 +10,7 @@ from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
 from grader.submission.paths import is_within
-from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
+from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 
 _LOG_LINES = 15
 # Of a culprit's message, which may join several lines of the log.
@@ -39,16 +39,30 @@ def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
     match = nearest(name, names)
     errors = [item.manifest_error for item in submission.packages if item.manifest_error]
     if errors and match is None:
-        return Cause(
+        return _unusable(
             f"no package {code(name)} was found, and a package.xml cannot be used: {errors[0]}",
-            "Mend package.xml at the line that is named here.",
-            Evidence(places=tuple(errors)),
+            errors,
         )
     found = f"found package {code(match)}" if match else f"found {codes(names)} only"
     return Cause(
         found,
         f"Write <name>{name}</name> in package.xml, and the same name in setup.py, setup.cfg, "
         "resource/ and the folder of the Python module.",
+    )
+
+
+def why_no_manifest(submission: SubmissionRecord, name: str) -> Cause | None:
+    """Why the submission has no package of a name with a package.xml that can be used."""
+    cause = why_no_package(submission, name)
+    if cause is not None:
+        return cause
+    error = existing_package(submission, name).manifest_error
+    return _unusable(f"package.xml cannot be used: {error}", [error]) if error else None
+
+
+def _unusable(seen: str, errors: list[SourceError]) -> Cause:
+    return Cause(
+        seen, "Mend package.xml at the line that is named here.", Evidence(places=tuple(errors))
     )
 
 
