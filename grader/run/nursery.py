@@ -24,6 +24,7 @@ import sys
 import tempfile
 import threading
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -310,6 +311,9 @@ def _import(modules: Sequence[str]) -> None:
 
 def main(descriptor: int) -> int:
     """Import, then serve."""
+    # Python 3.12 warns of every fork beside other threads. These two are LTTng-UST's, which come
+    # with rclpy's tracetools, only wait, and belong to none of the locks that a cell takes.
+    warnings.filterwarnings("ignore", ".*use of fork", DeprecationWarning)
     _import(_ALWAYS)
     # rclpy opens the middleware with its first node; to relocate it is half of that.
     with contextlib.suppress(OSError):
