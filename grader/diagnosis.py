@@ -6,6 +6,7 @@ import os
 import platform
 import shutil
 import subprocess
+import sysconfig
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
@@ -52,6 +53,7 @@ def diagnose() -> Iterator[Part]:
     yield _colcon()
     yield _program("C++ compiler", "g++", "for packages with own interfaces", "g++")
     yield _program("cmake", "cmake", "for ament_cmake packages", "cmake")
+    yield _headers()
     yield _sandbox()
     yield _domain_id()
     yield _load()
@@ -86,6 +88,14 @@ def _program(name: str, command: str, purpose: str, package: str) -> Part:
         return Part(name, False, remedy=f"sudo apt install {package} ({purpose})")
     shown = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
     return Part(name, True, shown.stdout.partition("\n")[0] or path)
+
+
+def _headers() -> Part:
+    from grader.submission.toolchain import has_headers, headers_package
+
+    include = sysconfig.get_path("include")
+    remedy = f"sudo apt install {headers_package()} (for packages with own interfaces)"
+    return Part("Python headers", has_headers(), include, remedy)
 
 
 def _sandbox() -> Part:

@@ -21,12 +21,17 @@ EVERY = 24
 EVERY_OF_EXAMPLE = 8
 MOST_RUNS = 20
 EXAMPLES = resources.root() / "docs" / "examples"
+COMPILED = ("custom_interface", "action_server")
+NAMES = [
+    pytest.param(name, marks=[pytest.mark.compiles] if name in COMPILED else [])
+    for name in (*list_assignments(), *list_assignments(EXAMPLES))
+]
 
 
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize("name", [*list_assignments(), *list_assignments(EXAMPLES)])
+@pytest.mark.parametrize("name", NAMES)
 def test_the_mutation_score_is_perfect(name: str) -> None:
     is_example = name in list_assignments(EXAMPLES)
     loaded = load_assignment(EXAMPLES / name if is_example else name)

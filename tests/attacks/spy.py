@@ -262,7 +262,7 @@ def inherit_descriptors():
                int(os.environ.get('ROSGRADE_SEEN_FD', 0))}
     found = [name for fd, name in INHERITED.items()
              if fd not in allowed and not name.startswith('/proc')
-             and not name.endswith(('setup.py', 'spy.py'))]
+             and not name.endswith(('setup.py', 'spy.py', 'CMakeConfigureLog.yaml'))]
     if not found:
         raise OSError('none')
     return found

@@ -27,6 +27,7 @@ def test_the_copy_is_that_of_the_reference() -> None:
         assert copy.read_bytes() == reference.read_bytes(), copy
 
 
+@pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow
 def test_the_copy_of_the_assignment_is_built_and_has_the_definition_that_is_asked_for(

@@ -29,6 +29,7 @@ def test_a_starter_builds_and_runs_but_solves_nothing(rosgrade: Rosgrade, tmp_pa
     assert found["period"] == "skipped"
 
 
+@pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow
 def test_a_starter_with_an_interface_generates_it(rosgrade: Rosgrade, tmp_path: Path) -> None:
@@ -68,7 +69,7 @@ def test_a_new_assignment_is_valid_and_leaves_no_doubt(rosgrade: Rosgrade, tmp_p
     assert written.returncode == 0, written.stderr
     ended = rosgrade("validate", tmp_path / "course" / "lesson")
     assert ended.returncode == 0
-    assert ended.stdout.endswith("1 scenarios, 8 checks, 8 mutants: valid\n")
+    assert ended.stdout.endswith("1 scenario, 8 checks, 8 mutants: valid\n")
     assert ended.stderr == ""
 
 

@@ -1,0 +1,27 @@
+"""What every test directory shares."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from hypothesis import settings
+
+from grader.errors import GraderFault
+from grader.submission.toolchain import check_toolchain, has_headers, headers_package
+
+# How long an example takes says something about the machine, not about the code.
+settings.register_profile("no_deadline", deadline=None)
+settings.load_profile("no_deadline")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip what compiles where nothing can, and say what to install."""
+    try:
+        check_toolchain(os.environ["PATH"])
+        if not has_headers():
+            raise GraderFault(f"no headers of Python here: sudo apt install {headers_package()}")
+    except GraderFault as fault:
+        for item in items:
+            if item.get_closest_marker("compiles"):
+                item.add_marker(pytest.mark.skip(reason=str(fault)))
