@@ -13,7 +13,7 @@ demo: setup ## grade the reference solution, then a broken one
 	@$(run) -m grader.demo
 
 test: lint ## lint, type-check and run every test
-	@$(run) -m pytest -q -rs
+	@$(run) -m pytest -q -rs -n 2 --dist loadgroup
 
 lint: setup ## check style and types
 	@.venv/bin/ruff check --quiet

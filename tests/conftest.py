@@ -15,8 +15,16 @@ settings.register_profile("no_deadline", deadline=None)
 settings.load_profile("no_deadline")
 
 
+# What starts processes or waits runs in one worker, one after the other; the others take the rest.
+ALONE = ("ros", "slow")
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what compiles where nothing can, and say what to install."""
+    """Group the tests for the workers; skip what compiles where nothing can, and say why."""
+    for item in items:
+        if any(item.get_closest_marker(name) for name in ALONE):
+            item.add_marker(pytest.mark.xdist_group("alone"))
     try:
         check_toolchain(os.environ["PATH"])
         if not has_headers():
