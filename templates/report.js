@@ -26,6 +26,8 @@
     constructor(data) {
       this.data = data;
       for (const name of ["x", "y", "yaw", "v", "w", "cv", "cw"]) this[name] = summed(data[name]);
+      this.goals = data.goals.map(([x, y, yaw, radius, within]) => (
+        { x: x / 1000, y: y / 1000, yaw: yaw / 1000, radius: radius / 1000, within }));
       this.begin = data.began;
       this.end = data.began + (this.x.length - 1) * data.step;
     }
@@ -60,6 +62,10 @@
       const reach = this.data.radius / 1000 + 0.2;
       let [left, right] = [Math.min(...this.x) - reach, Math.max(...this.x) + reach];
       let [bottom, top] = [Math.min(...this.y) - reach, Math.max(...this.y) + reach];
+      for (const { x, y, radius } of this.goals) {
+        [left, right] = [Math.min(left, x - radius - 0.1), Math.max(right, x + radius + 0.1)];
+        [bottom, top] = [Math.min(bottom, y - radius - 0.1), Math.max(top, y + radius + 0.1)];
+      }
       const far = { left: left - 0.35, right: right + 0.35, bottom: bottom - 0.35, top: top + 0.35 };
       for (const [x1, y1, x2, y2] of this.data.walls.map((wall) => wall.map((value) => value / 1000))) {
         if (Math.max(x1, x2) < far.left || Math.min(x1, x2) > far.right) continue;
@@ -100,6 +106,7 @@
             width: thing.size[0] / 1000, height: thing.size[1] / 1000, class: "mover",
           })
         : make(world, "circle", { r: thing.radius / 1000, class: "mover" }));
+      for (const goal of run.goals) this.goal(world, goal, Math.max(width, height));
       make(world, "path", { d: this.way(run.x.length), class: "way to-come" });
       this.beams = make(world, "path", { class: "beams" });
       this.gone = make(world, "path", { class: "way" });
@@ -113,6 +120,16 @@
       this.chart(figure);
       this.told = make(figure, "p", { class: "told" });
       this.log = make(figure, "ol", { class: "log said-so-far" });
+    }
+    goal(world, { x, y, yaw, radius }, size) {
+      make(world, "circle", { cx: x, cy: y, r: radius, class: "target" });
+      const [dx, dy] = [1.5 * radius * Math.cos(yaw), 1.5 * radius * Math.sin(yaw)];
+      make(world, "line", { x1: x, y1: y, x2: x + dx, y2: y + dy, class: "target-heading" });
+      const text = make(this.svg, "text", { x, y: -(y + 1.2 * radius), "text-anchor": "middle", class: "lane" }, "goal");
+      // In metres, as all of the picture is.
+      text.style.fontSize = `${0.04 * size}px`;
+      text.style.strokeWidth = `${0.012 * size}px`;
+      text.style.vectorEffect = "none";
     }
     way(count) {
       let path = "";
@@ -156,9 +173,11 @@
       this.cursor.setAttribute("x1", x);
       this.cursor.setAttribute("x2", x);
       const over = time > run.end + 0.05 ? " The run has ended." : "";
+      const away = run.goals.map((goal) =>
+        ` ${Math.hypot(now.x - goal.x, now.y - goal.y).toFixed(2)} m from the goal (dashed: within ${goal.within}).`).join("");
       this.told.textContent =
         `Commanded ${now.cv.toFixed(2)} m/s, ${now.cw.toFixed(2)} rad/s; true ${now.v.toFixed(2)} m/s, ${now.w.toFixed(2)} rad/s.` +
-        (run.touches(time) ? " It touches something." : "") + over;
+        (run.touches(time) ? " It touches something." : "") + away + over;
       this.svg.setAttribute("aria-label", `${this.name}: robot at x ${now.x.toFixed(2)} m, y ${now.y.toFixed(2)} m, heading ${Math.round(now.yaw * 180 / Math.PI)}°`);
       const lines = run.data.log.filter(([stamp]) => stamp <= time).slice(-4);
       this.log.replaceChildren();

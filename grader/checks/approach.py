@@ -14,11 +14,14 @@ from grader.checks.immobility import why_cut_short, why_not_moved
 from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
 from grader.checks.reference import Goal, UnknownValue
+from grader.checks.sighting import until_the_end
 from grader.checks.track import is_at_rest, over_time, turned_rad
 from grader.recording.model import NS, Ending, Recording, Truth
 from sim.motion import Pose, wrap_angle
 
 _WEAVES = 4
+# Share of the way: who ends so near the goal knows where it is.
+_A_LITTLE = 0.25
 NO_SPEED_M_S = 1e-3
 
 
@@ -130,6 +133,12 @@ def why_not_there(run: Approach, position_m: float) -> Cause | None:
             )
             if nearest_m <= position_m
             else (
+                "it ended a little before it",
+                "Compare the distance with the tolerance as it is now asked for, in metres, and "
+                "drive on until it is smaller.",
+            )
+            if left_m <= _A_LITTLE * run.distance_m(truth[0])
+            else (
                 "",
                 "Is goal_x, goal_y what your node reads? The distance is "
                 "math.hypot(goal_x - x, goal_y - y).",
@@ -234,7 +243,10 @@ def why_not_aligned(run: Approach, heading_rad: float) -> Cause | None:
     deeper = why_cut_short(run.recording) or why_touched(run.recording)
     if deeper is not None:
         return deeper
-    evidence = Evidence(plots=(run.heading_plot,))
+    evidence = Evidence(
+        moments=(until_the_end(run.recording),),
+        plots=(run.heading_plot,),
+    )
     seen = (
         f"is at the goal's position, but looks to {degrees(last.yaw_rad)} instead of "
         f"{degrees(run.goal.yaw_rad)}"

@@ -8,6 +8,7 @@ from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment
+from grader.checks.sighting import until_the_end
 from grader.recording.model import NS, Call, Process, Recording
 
 # What was asked for later than this before the end may be unanswered for that reason.
@@ -82,5 +83,8 @@ def why_never_spun(
     return Cause(
         f"{seen}: rclpy.spin() was never called, so no callback runs{where}",
         "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
-        Evidence(moments, (place,) if place else ()),
+        Evidence(
+            moments or (until_the_end(recording, "rclpy.spin() was still not called"),),
+            (place,) if place else (),
+        ),
     )

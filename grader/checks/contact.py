@@ -10,6 +10,7 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.immobility import why_cut_short, why_not_judged, why_not_moved
 from grader.checks.measure import metres, speed, turn
 from grader.checks.node_absence import why_no_node
+from grader.checks.scan import newest
 from grader.checks.track import has_moved, is_at_rest, speed_plot, way_m
 from grader.checks.wording import code
 from grader.recording.model import NS, Recording, Truth
@@ -18,6 +19,12 @@ _HINT = (
     "Stop early enough: the robot needs time to see (a scan comes every 0.2 s) and to brake, and "
     "its edge is ahead of its middle."
 )
+_BLIND_HINT = (
+    "Without scans the robot drives blindly: keep the time of the last scan, and let a timer stop "
+    "the robot when it is more than a second ago."
+)
+# Several scans of any LiDAR.
+_BLIND_NS = NS
 # Rest before something moving ran into the robot.
 _RESTED_NS = NS // 5
 
@@ -38,8 +45,9 @@ def no_contact(recording: Recording, parameters: NoContact) -> Finding:
 
     Judged by the simulator. Something that runs into a robot at rest does not count.
 
-    Explains what was touched, when and how fast, and a process that ended while the robot was
-    driving; a robot that never moved does not pass, unless `moving` is false.
+    Explains what was touched, when and how fast, scans that had ended long before, and a process
+    that ended while the robot was driving; a robot that never moved does not pass, unless
+    `moving` is false.
     """
     expected = "touches nothing"
     cause = why_not_moved(recording) if parameters.moving else why_not_judged(recording)
@@ -72,11 +80,20 @@ def why_touched(recording: Recording) -> Cause | None:
     else:
         way = "backwards " if before.linear_m_s < 0.0 else ""
         motion = f"{way}at {speed(abs(before.linear_m_s))}"
+    blind_ns = _blind_ns(recording, step)
+    blind = f"; the last scan had come {blind_ns / NS:.2f} s before" if blind_ns else ""
     return Cause(
-        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {_told(before)}",
-        _HINT,
+        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {_told(before)}{blind}",
+        _BLIND_HINT if blind else _HINT,
         Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
     )
+
+
+def _blind_ns(recording: Recording, step: Truth) -> int:
+    """Since when no scan had come, if that is long enough to be the reason; else 0."""
+    scan = newest(recording, step.time_ns)
+    since_ns = step.time_ns - scan.stamp_ns if scan is not None else 0
+    return since_ns if since_ns > _BLIND_NS else 0
 
 
 def _told(step: Truth) -> str:

@@ -8,9 +8,9 @@ from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.failure import Failure, fatal_failure, student_place
 from grader.checks.finding import Evidence, Moment
+from grader.checks.library import library_hint
 from grader.checks.wording import code
 from grader.recording.model import Ending, Process, Recording
-from grader.submission.record import SubmissionRecord
 
 _LOG_LINES = 15
 
@@ -137,7 +137,7 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
     where = f" ({place.file}:{place.line})" if place else ""
     return Cause(
         observed=f"{ended} with {failure}{where}",
-        hint=_exception_hint(failure, recording.submission),
+        hint=_exception_hint(failure, recording),
         evidence=Evidence(
             moments=evidence.moments, places=(place,) if place else (), log=evidence.log
         ),
@@ -177,7 +177,11 @@ def _returned(recording: Recording, process: Process, ended: str, evidence: Evid
     )
 
 
-def _exception_hint(failure: Failure, submission: SubmissionRecord) -> str:
+def _exception_hint(failure: Failure, recording: Recording) -> str:
+    if failure.type == "ModuleNotFoundError":
+        hint = library_hint(failure.message, recording)
+        if hint is not None:
+            return hint
     if failure.type in _HINTS:
         return _HINTS[failure.type]
     if failure.type == "AttributeError" and "'str' has no attribute '_TYPE_SUPPORT'" in (
@@ -190,7 +194,7 @@ def _exception_hint(failure: Failure, submission: SubmissionRecord) -> str:
         return "setup.py's console_scripts names a function that the module does not have."
     if failure.type == "TypeError" and "'qos_profile'" in failure.message:
         return "The third argument is the queue depth: self.create_publisher(Twist, 'cmd_vel', 10)."
-    if student_place(failure, submission):
+    if student_place(failure, recording.submission):
         return "Mend the line that is named here."
     return "Read the traceback from its last line upwards."
 

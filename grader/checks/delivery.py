@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from grader.checks import compatibility
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
-from grader.checks.finding import Evidence
+from grader.checks.finding import Evidence, Moment
+from grader.checks.sighting import endpoints_seen
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.type_confusion import explain
-from grader.checks.wording import code, codes
+from grader.checks.wording import code, codes, listing
 from grader.recording.model import Endpoint, Kind, Owner, Recording
+
+# Policies that promise something in time, which a publisher without them does not.
+_PROMISES = ("deadline", "liveliness")
 
 
 def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
@@ -28,8 +34,9 @@ def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
         for item in recording.endpoints
         if item.owner is Owner.PROBE and item.kind is Kind.PUBLISHER and item.topic == topic
     ]
-    cause = _other_type(topic, subscriptions, publishers) or _refused(
-        topic, subscriptions, publishers
+    seen = Evidence(moments=endpoints_seen(recording, subscriptions))
+    cause = _other_type(topic, subscriptions, publishers, seen) or _refused(
+        topic, subscriptions, publishers, seen
     )
     if cause is not None:
         return cause
@@ -75,16 +82,20 @@ def why_no_history(recording: Recording, topic: str, seen: str) -> Cause | None:
                 "durability=DurabilityPolicy.TRANSIENT_LOCAL and "
                 "reliability=ReliabilityPolicy.RELIABLE.",
                 Evidence(
+                    moments=endpoints_seen(recording, (item,)),
                     tables=tuple(
                         compatibility.compatibility_table(qos, item.qos) for qos in offered[:1]
-                    )
+                    ),
                 ),
             )
     return None
 
 
 def _other_type(
-    topic: str, subscriptions: tuple[Endpoint, ...], publishers: list[Endpoint]
+    topic: str,
+    subscriptions: tuple[Endpoint, ...],
+    publishers: list[Endpoint],
+    evidence: Evidence,
 ) -> Cause | None:
     sent = sorted({item.type for item in publishers})
     wanted = sorted({item.type for item in subscriptions})
@@ -97,11 +108,15 @@ def _other_type(
         f"is to {codes(wanted)}" + (f" ({explanation})" if explanation else ""),
         "A publisher and a subscription meet only if their types are the same: "
         f"`from {package}.msg import {short}`.",
+        evidence,
     )
 
 
 def _refused(
-    topic: str, subscriptions: tuple[Endpoint, ...], publishers: list[Endpoint]
+    topic: str,
+    subscriptions: tuple[Endpoint, ...],
+    publishers: list[Endpoint],
+    evidence: Evidence,
 ) -> Cause | None:
     """Every subscription refuses every publisher, each by a policy."""
     reasons = [
@@ -111,18 +126,22 @@ def _refused(
     ]
     if not reasons or not all(reasons):
         return None
+    rule = "A subscription receives nothing from a publisher that offers less than it requests."
+    promises = [word for word in _PROMISES if any(item.startswith(word) for item in reasons[0])]
     return Cause(
         f"its callback is never called: the subscription's QoS does not match the publisher on "
         f"{code(topic)} ({', '.join(reasons[0])})",
-        "A subscription receives nothing from a publisher that offers less than it requests. A "
-        "number as QoS, such as 10, matches every publisher that is reliable; "
+        f"{rule} Leave {listing(map(code, promises))} out of the subscription's QoSProfile."
+        if promises
+        else f"{rule} A number as QoS, such as 10, matches every publisher that is reliable; "
         "qos_profile_sensor_data matches every one.",
-        Evidence(
+        replace(
+            evidence,
             tables=(
                 compatibility.compatibility_table(
                     offered=publishers[0].qos, requested=subscriptions[0].qos
                 ),
-            )
+            ),
         ),
     )
 
@@ -140,4 +159,11 @@ def _gone(recording: Recording, topic: str, subscriptions: tuple[Endpoint, ...])
         f"the subscription to {code(topic)} vanished before the first message came",
         "Keep the node and its subscription alive while rclpy.spin(node) runs: no "
         "destroy_subscription() and no destroy_node() before.",
+        Evidence(
+            moments=tuple(
+                Moment(f"subscription to {topic} vanished", recording.since_launch_s(end))
+                for end in ends
+                if end is not None
+            )
+        ),
     )

@@ -23,6 +23,7 @@ from grader.checks.immobility import why_cut_short, why_not_moved
 from grader.checks.lateness import taken_s
 from grader.checks.measure import metres, speed
 from grader.checks.scan import misreading
+from grader.checks.sighting import until_the_end
 from grader.checks.track import (
     departure,
     final_rest,
@@ -85,6 +86,9 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     if deeper is not None and low <= middle <= high:
         return deeper.finding(expected)
     words, hint = _wrong_speed(steps, recording.scene, wanted, middle, (low, high))
+    off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
+    moment = Moment("first out of that range", recording.since_launch_s(off.time_ns))
+    evidence = Evidence(moments=(moment,), plots=evidence.plots)
     return Finding.failed(expected, f"{seen}: {words}", hint, evidence)
 
 
@@ -121,7 +125,7 @@ def _too_short(recording: Recording) -> Cause:
     return Cause(
         f"the robot drove too shortly to tell its speed: {way} in all",
         "Drive on as long as nothing is near ahead; one command holds until the next.",
-        Evidence(plots=(speed_plot(recording),)),
+        _since_departure(recording),
     )
 
 
@@ -208,7 +212,7 @@ def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
         return Cause(
             f"the robot drove {metres(-gone_m)} backwards",
             _BACKWARDS_HINT,
-            Evidence(plots=(speed_plot(recording),)),
+            _since_departure(recording),
         )
     rest = final_rest(recording.truth)
     seen = f"{metres(gone_m)} in all"
@@ -249,4 +253,15 @@ def _too_slow(recording: Recording, seen: str) -> Cause:
             ours=True,
             disturbed=True,
         )
-    return Cause(words, _SPEED_HINT, Evidence(plots=(speed_plot(recording),)))
+    evidence = Evidence(moments=(until_the_end(recording),), plots=(speed_plot(recording),))
+    return Cause(words, _SPEED_HINT, evidence)
+
+
+def _since_departure(recording: Recording) -> Evidence:
+    """The speed, and when the robot set off."""
+    truth = recording.truth
+    begin = truth[departure(truth) or 0]
+    return Evidence(
+        moments=(Moment("set off", recording.since_launch_s(begin.time_ns)),),
+        plots=(speed_plot(recording),),
+    )

@@ -164,8 +164,8 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
         return Cause(
             f"{seen}: rclpy.spin() was never called{where}",
             "A loop such as `while True: publish(); time.sleep(0.3)` never gives way to the "
-            "executor. Create a timer with self.create_timer(0.3, self.callback), and call "
-            "rclpy.spin(node) in main().",
+            "executor, and rate.sleep() waits for ever where none spins. Create a timer with "
+            "self.create_timer(0.3, self.callback), and call rclpy.spin(node) in main().",
             evidence,
         )
     return Cause(

@@ -13,6 +13,7 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.checks.made_of import MadeOf, Sample
+from grader.checks.sighting import endpoints_seen
 from grader.checks.silence import why_few, why_silent
 from grader.checks.source_value import SourceText, mistakes, spread
 from grader.checks.value import NoSuchField
@@ -98,6 +99,12 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
             f"of {counted(len(messages), 'message')} only {len(judged)} came after the first one "
             f"on {source}",
             f"Publish from the callback of {source}, or from a timer that goes on.",
+            Evidence(
+                moments=tuple(
+                    Moment("the last message", recording.since_launch_s(item.stamp_ns))
+                    for item in messages[-1:]
+                )
+            ),
         )
     if wrong:
         return _failure(recording, parameters, made_of, judged, wrong, expected)
@@ -136,6 +143,11 @@ def _untold(recording: Recording, parameters: Follows, expected: str) -> Finding
             f"the node publishes on {code(scene.command_topic)} itself and keeps the robot from "
             f"moving as it should, so that nothing can be followed on {code(parameters.source)}",
             f"Remove the publisher on {code(scene.command_topic)}: this node only listens.",
+            Evidence(
+                moments=endpoints_seen(
+                    recording, recording.student_endpoints(Kind.PUBLISHER, scene.command_topic)
+                )
+            ),
         )
     return Finding.error(
         expected, f"the values on {code(parameters.source)} hardly change, so nobody can tell"

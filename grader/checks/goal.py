@@ -17,6 +17,7 @@ from grader.checks.immobility import why_cut_short, why_not_moved
 from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
 from grader.checks.reference import GoalPose
+from grader.checks.sighting import until_the_end
 from grader.checks.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.checks.wording import code, percent
 from grader.recording.model import NS, Recording
@@ -79,7 +80,10 @@ def _restless(run: Approach) -> Cause:
         f"{turn(last.angular_rad_s)}",
         "Publish a Twist of zeros where both errors are below your tolerances: the last command "
         "holds until the next.",
-        Evidence(plots=(speed_plot(run.recording), run.heading_plot)),
+        Evidence(
+            moments=(until_the_end(run.recording, "not at rest when the observation ended"),),
+            plots=(speed_plot(run.recording), run.heading_plot),
+        ),
     )
 
 
@@ -129,7 +133,10 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
             f"still moves after {format_duration(took_s)}, when the observation ends: "
             f"{speed(end.linear_m_s)} and {turn(end.angular_rad_s)}",
             "Publish a Twist of zeros where the errors are below your tolerances.",
-            evidence,
+            Evidence(
+                moments=(until_the_end(recording, "not at rest when the observation ended"),),
+                plots=evidence.plots,
+            ),
         )
     return Finding.failed(
         expected,
@@ -181,7 +188,7 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
         seen,
         "It drives while it still looks elsewhere: a larger angular gain, or turn on the spot "
         "first and drive when the heading error is small.",
-        evidence,
+        Evidence(moments=(_farthest(run),), plots=evidence.plots),
     )
 
 
@@ -258,8 +265,22 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
         " and ".join(seen),
         "Speed in proportion to the error slows down before the goal: a smaller gain, and "
         f"{code('linear.x')} not at its limit until the end.",
-        evidence,
+        Evidence(
+            moments=(Moment("at the goal", recording.since_launch_s(run.truth[arrival].time_ns)),),
+            plots=evidence.plots,
+        ),
     )
+
+
+def _farthest(run: Approach) -> Moment:
+    """Where the robot was farthest from the straight line to the goal."""
+    first, goal = run.truth[0], run.goal
+    dx, dy = goal.x_m - first.x_m, goal.y_m - first.y_m
+    worst = max(
+        run.truth, key=lambda step: abs(dx * (step.y_m - first.y_m) - dy * (step.x_m - first.x_m))
+    )
+    when_s = run.recording.since_launch_s(worst.time_ns)
+    return Moment("farthest from the straight line to the goal", when_s)
 
 
 def _past_m(run: Approach, arrival: int) -> float:

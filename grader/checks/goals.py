@@ -61,6 +61,7 @@ def judged_goals(
             return Cause(
                 f"{code(action)} was there for too short a time to be sent a goal",
                 "Keep the server: `self.server = ActionServer(...)`, and the node alive.",
+                evidence(recording, goal),
             )
         if goal.accepted is None:
             what = f"the goal ({fields_words(goal.goal)}) was neither accepted nor rejected"

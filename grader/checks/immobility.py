@@ -5,7 +5,7 @@ from __future__ import annotations
 from grader.assignment.quantity import format_duration
 from grader.checks.cause import Cause
 from grader.checks.command import Command, command_topic, commands, is_zero
-from grader.checks.compatibility import refusals
+from grader.checks.compatibility import compatibility_table, refusals
 from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Moment
 from grader.checks.ground import nearest
@@ -13,6 +13,7 @@ from grader.checks.lateness import taken_s
 from grader.checks.measure import speed
 from grader.checks.node_absence import why_no_node
 from grader.checks.scan import misreading
+from grader.checks.sighting import endpoints_seen, first_seen
 from grader.checks.silence import why_silent
 from grader.checks.track import has_moved, index_at, is_at_rest
 from grader.checks.wording import code, codes, counted
@@ -98,6 +99,7 @@ def _unreadable(recording: Recording) -> Cause:
     return Cause(
         f"what was published on {code(topic)} is no velocity command but {codes(found)}",
         "Publish geometry_msgs/msg/Twist.",
+        Evidence(moments=first_seen(recording, recording.on(topic))),
     )
 
 
@@ -121,6 +123,10 @@ def _unheard(recording: Recording) -> Cause | None:
                     f"the robot ({', '.join(reasons)})",
                     "The robot's subscription is reliable: publish reliably, as "
                     "create_publisher(Twist, 'cmd_vel', 10) does.",
+                    Evidence(
+                        moments=endpoints_seen(recording, (publisher,)),
+                        tables=(compatibility_table(publisher.qos, reader.qos),),
+                    ),
                 )
     return None
 
@@ -128,17 +134,18 @@ def _unheard(recording: Recording) -> Cause | None:
 def _asks_nothing(recording: Recording, sent: tuple[Command, ...]) -> Cause | None:
     if not all(is_zero(item.twist) for item in sent):
         return None
+    evidence = Evidence(
+        moments=(Moment("first command", recording.since_launch_s(sent[0].time_ns)),)
+    )
     stray = sorted({field for item in sent for field in item.stray})
     if stray:
         return Cause(
             f"{_STILL}: the commands set {codes(stray)}, which a differential drive cannot do",
             "The speed ahead is linear.x, the turn is angular.z.",
+            evidence,
         )
     topic = code(command_topic(recording))
     seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
-    evidence = Evidence(
-        moments=(Moment("first command", recording.since_launch_s(sent[0].time_ns)),)
-    )
     last = recording.truth[-1]
     around = None if recording.scene is None else nearest(recording.scene, last)
     misread = misreading(recording, last.time_ns, around, None)

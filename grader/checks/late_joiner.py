@@ -40,7 +40,7 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     may count on either side.
 
     Explains a publisher that is volatile, a queue that is too short or too long, a history of
-    keep_all, and a publisher that had not published enough.
+    keep_all, a lifespan that is over, and a publisher that had not published enough.
     """
     expected = _expected_words(parameters)
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)
@@ -162,6 +162,17 @@ def _too_few(
                     tables=(compatibility_table(publisher.qos, join.qos), *evidence.tables),
                 ),
             )
+    lifespans = [item.qos.lifespan_s for item in publishers if item.qos.lifespan_s is not None]
+    age_s = (join.joined_ns - before[-parameters.last].stamp_ns) / NS
+    if lifespans and min(lifespans) < age_s:
+        return Finding.failed(
+            expected,
+            f"{_seen(history, before)}: the publisher's lifespan is "
+            f"{format_duration(min(lifespans))}, and what is older is thrown away",
+            "Leave `lifespan` out of the QoSProfile: then a message stays until newer ones take "
+            "its place in the queue.",
+            evidence,
+        )
     taken_s = recording.taken_s(join.joined_ns, recording.stop_ns)
     if join.matched_ns is None and publishers:
         return Finding.error(

@@ -217,9 +217,15 @@ def _gain(samples: Sequence[Sample]) -> float:
 
 
 def _r2(samples: Sequence[Sample], gain: float) -> float:
-    mean = sum(item.command_rad_s for item in samples) / len(samples)
-    total = sum((item.command_rad_s - mean) ** 2 for item in samples)
-    rest = sum((item.command_rad_s - gain * item.error_rad) ** 2 for item in samples)
+    # In shares of the largest command, so that the squares of huge ones are still numbers.
+    largest = max(abs(item.command_rad_s) for item in samples) or 1.0
+    shares = [item.command_rad_s / largest for item in samples]
+    mean = sum(shares) / len(samples)
+    total = sum((share - mean) ** 2 for share in shares)
+    rest = sum(
+        (share - gain / largest * item.error_rad) ** 2
+        for share, item in zip(shares, samples, strict=True)
+    )
     if total <= 0.0:
         return 1.0 if rest <= 0.0 else 0.0
     return 1.0 - rest / total

@@ -12,6 +12,7 @@ from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.node_absence import why_not_node
 from grader.checks.node_name import node_name
 from grader.checks.service import judged_calls, why_late
+from grader.checks.sighting import nodes_seen
 from grader.checks.wording import code, listing
 from grader.recording.model import Call, Recording
 
@@ -54,6 +55,7 @@ def state(recording: Recording, parameters: State) -> Finding:
             calls = Cause(
                 f"{code(node)} is no lifecycle node: it has no service {code(service)}",
                 "Inherit from rclpy.lifecycle.LifecycleNode instead of Node.",
+                Evidence(moments=nodes_seen(recording)),
             )
         return calls.finding(expected)
     late = why_late(recording, service, calls, _ANSWER_S)

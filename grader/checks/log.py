@@ -14,6 +14,7 @@ from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.log_absence import why_not_logged
 from grader.checks.printed import quote
+from grader.checks.sighting import endpoints_seen
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted
 from grader.recording.model import NS, Kind, Recording
@@ -77,12 +78,14 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         f"{format_duration(parameters.within)} of {counted(parameters.at_least, 'message')} or more"
         f"{_SENT[parameters.sent]}"
     )
-    if recording.student_endpoints(Kind.PUBLISHER, parameters.topic):
+    own = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
+    if own:
         return Finding.failed(
             expected,
             f"the node itself publishes on {code(parameters.topic)}, so its log shows nothing of "
             "what it was sent",
             "Only the robot publishes its sensors: remove this publisher, and subscribe.",
+            Evidence(moments=endpoints_seen(recording, own)),
         )
     messages = [
         message

@@ -13,6 +13,7 @@ from grader.checks.echo import Echo, Wanted, echoes, output_lines, shown
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.misreading import explain
 from grader.checks.printed import numbers, quote
+from grader.checks.sighting import first_seen
 from grader.checks.wording import code, codes, counted, listing, value_text
 from grader.recording.model import NS, Kind, LogLine, Recording
 
@@ -236,5 +237,8 @@ def _silent(recording: Recording, topic: str) -> Cause:
         f"type and its QoS match{spins}{other}",
         "Call self.get_logger().info(...) or print(...) in the callback. What debug() logs is not "
         "shown by default, and an `except: pass` hides an error.",
-        Evidence(log=tuple(line.text for line in output_lines(recording)[:_LOG_LINES])),
+        Evidence(
+            moments=first_seen(recording, recording.carried(topic)),
+            log=tuple(line.text for line in output_lines(recording)[:_LOG_LINES]),
+        ),
     )

@@ -16,6 +16,7 @@ from grader.checks.logged import LEVELS, Logged, logged, logger_of, printed
 from grader.checks.node_absence import why_no_node, why_not_node
 from grader.checks.node_name import node_name
 from grader.checks.printed import quote
+from grader.checks.sighting import until_the_end
 from grader.checks.wording import code, counted, percent
 from grader.nearest import nearest
 from grader.recording.model import NS, Recording
@@ -160,10 +161,14 @@ def _why_lacking(
         return Cause(
             f"{quote(lines[0].text)} is printed, not logged",
             f"Write self.get_logger().{method}('...') in place of print().",
-            Evidence(log=tuple(line.text for line in lines[:_SHOWN])),
+            Evidence(
+                moments=(Moment("printed", recording.since_launch_s(lines[0].time_ns)),),
+                log=tuple(line.text for line in lines[:_SHOWN]),
+            ),
         )
     if not records:
-        return Cause("the node logs nothing", hint)
+        nothing = until_the_end(recording, "nothing logged when the observation ended")
+        return Cause("the node logs nothing", hint, Evidence(moments=(nothing,)))
     near = nearest(parameters.text or "", [item.text for item in records])
     like = quote(near if near is not None else records[-1].text)
     return Cause(

@@ -143,9 +143,9 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
     written as an integer.
 
     Explains fields that were swapped, a value in a wrong field, a wrong sign, a factor of 10,
-    100 or 1000, degrees instead of radians, not-a-number, a message that was published before
-    its fields were set, and a value that grows from message to message. If nothing was
-    published it says why, as messages.count does.
+    100 or 1000, degrees instead of radians, an integer in a float field, not-a-number, a message
+    that was published before its fields were set, and a value that grows from message to message.
+    If nothing was published it says why, as messages.count does.
     """
     messages = recording.on(parameters.topic)
     expected = _expected_words(parameters)
@@ -215,10 +215,14 @@ def _wrong(
     rows = tuple(
         (item.field, value_text(item.expected), value_text(item.observed)) for item in found[:50]
     )
+    integer = any(slip.was_integer(item.observed) for item in found)
     return Finding.failed(
         expected,
         observed,
-        "Set the fields of the message right before publish(msg); a new message has 0 everywhere.",
+        "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
+        if integer
+        else "Set the fields of the message right before publish(msg); a new message has 0 "
+        "everywhere.",
         Evidence(
             moments=(
                 Moment(f"message {first} is wrong", recording.since_launch_s(message.stamp_ns)),

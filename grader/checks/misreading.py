@@ -59,8 +59,11 @@ def _relation(number: float, value: float) -> str:
 def _names(number: float, wanted: Wanted, decimals: int) -> Iterator[str]:
     """Fields, and statistics of arrays, that a number stands for; the likeliest first.
 
-    Zeros are in nearly every message, and so tell nothing unless they are all there is.
+    Zeros are in nearly every message, and so tell nothing unless they are all there is. Nor does
+    infinity, which every beam shows that meets nothing.
     """
+    if not math.isfinite(number):
+        return
     fields = leaves(wanted.message.value)
     numeric = {
         path: float(value)

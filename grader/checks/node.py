@@ -16,6 +16,7 @@ from grader.checks.death import cause_of_death, dead, ended_early
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.node_absence import why_no_node, why_not_node
 from grader.checks.node_name import node_name
+from grader.checks.sighting import endpoints_seen
 from grader.checks.wording import code, codes, counted, listing
 from grader.recording.model import NS, Kind, Node, Process, Recording
 
@@ -92,6 +93,7 @@ def _other_publisher(recording: Recording, parameters: Exists) -> Cause | None:
         f"{code(parameters.name)} is there, but {codes(others)} publishes on "
         f"{code(parameters.publishes)}",
         "Create the publisher with self.create_publisher(...) in the node that is asked for.",
+        Evidence(moments=endpoints_seen(recording, publishers)),
     )
 
 
@@ -217,7 +219,7 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
         return _too_late(recording, worst, parameters).finding(expected)
     leaving = [process for process in recording.processes if process.survivors]
     if leaving:
-        return _survived(leaving[0]).finding(expected)
+        return _survived(recording, leaving[0]).finding(expected)
     if not asked:
         return Finding.error(expected, "a stimulus of the scenario had ended it before")
     longest_s = max(_stop_s(recording, process) for process in asked)
@@ -289,10 +291,18 @@ def _too_late(recording: Recording, process: Process, parameters: Ends) -> Cause
     )
 
 
-def _survived(process: Process) -> Cause:
+def _survived(recording: Recording, process: Process) -> Cause:
     number = counted(len(process.survivors), "process", "processes")
     return Cause(
         f"{code(process.name)} left {number} running behind it: "
         f"{listing(code(command) for command in process.survivors)}",
         "End child processes before main() returns: process.terminate(), then process.wait().",
+        Evidence(
+            moments=(
+                Moment(
+                    f"{process.name} ended",
+                    recording.since_launch_s(process.exited_ns or recording.end_ns),
+                ),
+            )
+        ),
     )

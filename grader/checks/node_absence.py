@@ -7,6 +7,7 @@ from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence
+from grader.checks.sighting import nodes_seen, until_the_end
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
 from grader.recording.model import Ending, Process, Recording
@@ -64,11 +65,13 @@ def _not_started(recording: Recording) -> Cause:
 def _hangs(recording: Recording, process: Process) -> Cause:
     """A process that still ran, but showed no node."""
     name, who = process.name, f"the process {code(process.name)}"
+    nothing = until_the_end(recording, "still no node when the observation ended")
     others = recording.environment.get("other_domains")
     if others:
         return Cause(
             f"{who} joined ROS domain {others} and not the one that it was started in",
             "Do not set ROS_DOMAIN_ID or domain_id in the code: the environment chooses it.",
+            Evidence(moments=(nothing,)),
         )
     if testimony.said(recording, "node", name):
         return Cause(
@@ -80,6 +83,7 @@ def _hangs(recording: Recording, process: Process) -> Cause:
         )
     place = interrupted_place(recording, name)
     evidence = Evidence(
+        moments=(nothing,),
         places=(place,) if place else (),
         log=tuple(line.text for line in recording.log if line.process == name)[-_LOG_LINES:],
     )
@@ -113,11 +117,13 @@ def _hangs(recording: Recording, process: Process) -> Cause:
 def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
     there = f"found the node {codes(names)}"
     base = wanted.rpartition("/")[2]
+    evidence = Evidence(moments=nodes_seen(recording))
     for name in names:
         if name.lower() == wanted.lower():
             return Cause(
                 f"{there}: upper and lower case differ",
                 f"Names in ROS are case-sensitive: super().__init__('{base}').",
+                evidence,
             )
     for name in names:
         if name.rpartition("/")[2] == base:
@@ -126,6 +132,7 @@ def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
                 f"{there}: the name is right, but the node is in the namespace {code(namespace)}",
                 "Leave out the namespace argument of Node.__init__ (and any `__ns` remapping) "
                 "unless the assignment asks for it.",
+                evidence,
             )
     if nearest(wanted, names) is None:
         ended = [process for process in dead(recording) if process.exit_code != 0]
@@ -139,5 +146,7 @@ def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
             disturbed=True,
         )
     return Cause(
-        there, f"The node's name is the argument of super().__init__('{base}') in its constructor."
+        there,
+        f"The node's name is the argument of super().__init__('{base}') in its constructor.",
+        evidence,
     )

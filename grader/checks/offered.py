@@ -9,6 +9,7 @@ from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.near_name import Named, why_misnamed
 from grader.checks.node_absence import why_no_node
+from grader.checks.sighting import nodes_seen
 from grader.checks.wording import code, codes
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
@@ -185,6 +186,7 @@ def _evidence(recording: Recording, there: tuple[Service, ...], word: Word) -> E
         moments=tuple(
             Moment(f"{word.noun} {item.name} appeared", recording.since_launch_s(item.appeared_ns))
             for item in there[:5]
-        ),
+        )
+        or nodes_seen(recording),
         tables=(table,) if rows else (),
     )

@@ -127,7 +127,8 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     """
     expected = (
         f"{codes(parameters.callbacks)} running at the same time as "
-        f"{codes(parameters.others, 'or')}, {parameters.at_least} times or more by "
+        f"{codes(parameters.others, 'or')}, "
+        f"{counted(parameters.at_least, 'time')} or more by "
         f"{format_duration(parameters.by)}"
     )
     reports = read_reports(recording.on(parameters.topic))

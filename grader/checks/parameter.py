@@ -89,7 +89,7 @@ def declared(recording: Recording, parameters: Declared) -> Finding:
     found = descriptor(recording, parameters.node, parameters.name)
     assert found is not None
     values = readings(recording, parameters.node, parameters.name)
-    shown = _evidence(recording, found, values)
+    shown = _evidence(recording, parameters.node, found, values)
     cause = _why_other_descriptor(found, parameters, shown) or _why_other_default(
         recording, found, values, parameters, shown
     )
@@ -140,16 +140,19 @@ def why_not_declared(recording: Recording, parameters: OfParameter) -> Cause | N
     if found is not None and found.type != "not set":
         return None
     there = names(recording, parameters.node) or []
+    evidence = Evidence(moments=_answered(recording, asked[:1]))
     if parameters.name in there:
         return Cause(
             f"{code(parameters.name)} is declared, but without a value",
             f"Give it one: self.declare_parameter('{parameters.name}', default).",
+            evidence,
         )
     match = nearest(parameters.name, there)
     seen = f"declared is {code(match)}" if match else f"declared are {codes(there)}"
     return Cause(
         seen if there else "the node declares no parameters",
         f"Call self.declare_parameter('{parameters.name}', default) in the node's constructor.",
+        evidence,
     )
 
 
@@ -166,6 +169,7 @@ def why_services_silent(recording: Recording, node: str, calls: tuple[Call, ...]
             else f"{code(lost.service)} could not be called: {lost.error}",
             "Leave start_parameter_services as it is: the parameters of a node are read and set "
             "through its services.",
+            Evidence(moments=(Moment("asked", recording.since_launch_s(lost.requested_ns)),)),
             ours=lost.error != "no server",
         )
     what = f"the node's parameter service {code(service)} did not answer"
@@ -240,7 +244,9 @@ def same_value(wanted: Any, observed: Any) -> bool:
     return same(wanted, observed, _TOLERANCE)
 
 
-def _evidence(recording: Recording, found: Descriptor, values: tuple[Reading, ...]) -> Evidence:
+def _evidence(
+    recording: Recording, node: str, found: Descriptor, values: tuple[Reading, ...]
+) -> Evidence:
     rows = [
         ("type", found.type),
         ("range", _range_words(found.range) if found.range else "none"),
@@ -255,7 +261,20 @@ def _evidence(recording: Recording, found: Descriptor, values: tuple[Reading, ..
         for item in values[:20]
     ]
     table = Table(f"The parameter {found.name}", ("", ""), tuple(rows))
-    return Evidence(tables=(table,))
+    asked = calls_to(recording, node, "describe_parameters")
+    return Evidence(moments=_answered(recording, asked[:1]), tables=(table,))
+
+
+def _answered(recording: Recording, calls: tuple[Call, ...]) -> tuple[Moment, ...]:
+    """When the node answered."""
+    return tuple(
+        Moment(
+            f"{call.service.rpartition('/')[2]} was answered",
+            recording.since_launch_s(call.answered_ns),
+        )
+        for call in calls
+        if call.answered_ns is not None
+    )
 
 
 class Set(OfParameter):

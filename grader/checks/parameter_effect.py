@@ -95,6 +95,7 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
             expected,
             f"the value was refused: {why}" if item.accepted is False else "it was not answered",
             "Look at the callback of add_on_set_parameters_callback() and at the range.",
+            _evidence(recording, item),
         )
     try:
         cause = _why_no_effect(recording, parameters, item, _end_ns(recording, every, item))

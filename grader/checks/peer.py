@@ -11,6 +11,7 @@ from grader.assignment.quantity import Duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import compatibility_table, refusals
 from grader.checks.finding import Evidence, Finding
+from grader.checks.sighting import endpoints_seen
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.wording import code
 from grader.recording.model import Endpoint, Kind, Qos, Recording
@@ -98,7 +99,10 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     for endpoint in endpoints:
         offered, requested = _sides(kind, endpoint, peer)
         refused = refusals(offered, requested)
-        evidence = Evidence(tables=(compatibility_table(offered, requested),))
+        evidence = Evidence(
+            moments=endpoints_seen(recording, (endpoint,)),
+            tables=(compatibility_table(offered, requested),),
+        )
         if bool(refused) is (parameters.expect == "refuse"):
             continue
         if refused:

@@ -5,7 +5,8 @@ Two figures say whether messages come regularly:
 * the **median** of the intervals is the period; a few late messages do not move it;
 * an interval is **irregular** if it differs from the median by more than an allowed amount.
   A message that comes late makes one interval too long and, if the next message is in time,
-  the following one as much too short: such a pair counts once.
+  the following one as much too short: such a pair counts once. A pause counts for every message
+  that is missing in it.
 """
 
 from __future__ import annotations
@@ -117,8 +118,14 @@ def judge(seconds: Sequence[float], limits: Limits) -> Verdict:
         median_s=middle,
         irregular=irregular,
         period_good=abs(middle - limits.period_s) <= limits.median_s + _EPSILON_S,
-        regular=len(irregular) <= limits.allowed(len(seconds)),
+        regular=sum(_weight(seconds[index], middle) for index in irregular)
+        <= limits.allowed(len(seconds)),
     )
+
+
+def _weight(seconds: float, middle_s: float) -> int:
+    """For how many irregular intervals one counts: for each message that is missing in it."""
+    return max(1, round(seconds / middle_s) - 1) if middle_s > 0.0 else 1
 
 
 def _irregular(deviations: Sequence[float], allowed_s: float) -> tuple[int, ...]:

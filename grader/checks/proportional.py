@@ -14,7 +14,7 @@ from grader.checks.approach import NO_SPEED_M_S, Approach, approach, why_not_the
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.command import command_topic, commands, number, odometry
-from grader.checks.finding import Evidence, Finding, Plot
+from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.immobility import why_cut_short
 from grader.checks.law import Law, Sample, Verdict, examine
 from grader.checks.measure import metres
@@ -90,7 +90,9 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     good = [index for index, item in enumerate(verdicts) if _is_good(item, parameters)]
     index = max(good, key=lambda i: verdicts[i].r2, default=0)
     verdict, samples = verdicts[index], tried[index]
-    evidence = Evidence(plots=(_plot(samples, phase),))
+    begins = run.truth[arrival if phase == "align" and arrival is not None else 0]
+    moment = Moment("this phase begins", recording.since_launch_s(begins.time_ns))
+    evidence = Evidence(moments=(moment,), plots=(_plot(samples, phase),))
     if good:
         return _judge_gain(verdict, parameters, expected, evidence)
     deeper = why_cut_short(recording)

@@ -15,6 +15,7 @@ from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import Comparison, comparisons, duration_words
 from grader.checks.finding import Evidence, Finding, Table
+from grader.checks.sighting import endpoints_seen
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.wording import code, counted
 from grader.recording.model import Endpoint, Kind, Qos, Recording
@@ -142,7 +143,7 @@ def _judge(recording: Recording, parameters: Profile, side: _Side) -> Finding:
     for endpoint in endpoints:
         wrong = _wrong(endpoint.qos, parameters)
         if wrong:
-            return _mismatch(endpoint, wrong, parameters, expected, side)
+            return _mismatch(recording, endpoint, wrong, parameters, expected, side)
     hidden = [
         name
         for name in parameters.policies
@@ -171,6 +172,7 @@ def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
 
 
 def _mismatch(
+    recording: Recording,
     endpoint: Endpoint,
     wrong: dict[str, tuple[Any, Any]],
     parameters: Profile,
@@ -201,7 +203,10 @@ def _mismatch(
         expected,
         observed,
         _hint(parameters, side),
-        Evidence(tables=(Table("Requested against offered", header, rows),)),
+        Evidence(
+            moments=endpoints_seen(recording, (endpoint,)),
+            tables=(Table("Requested against offered", header, rows),),
+        ),
     )
 
 
@@ -254,18 +259,22 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
     if cause is not None:
         return cause.finding(expected)
     declared = testimony.queues(recording, kind, parameters.topic)
+    own = recording.student_endpoints(kind, parameters.topic)
+    evidence = Evidence(moments=endpoints_seen(recording, own))
     for queue in declared:
         if queue.history == "keep_all":
             return Finding.failed(
                 expected,
                 "history keep_all, declared by the process: the depth has no meaning then",
                 _depth_hint(parameters),
+                evidence,
             )
         if queue.depth is not None and queue.depth != parameters.depth:
             return Finding.failed(
                 expected,
                 f"depth {queue.depth}, declared by the process",
                 _depth_hint(parameters),
+                evidence,
             )
     if not declared or any(queue.depth is None for queue in declared):
         return Finding.error(

@@ -10,6 +10,7 @@ from grader.assignment.name import TopicName
 from grader.assignment.quantity import Frequency, format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.sighting import first_seen
 from grader.checks.silence import why_few
 from grader.checks.stamps import why_not_believed
 from grader.checks.wording import code, counted
@@ -70,6 +71,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
             expected,
             f"{counted(len(messages), 'message')} with the same time stamp",
             "Publish from the callback of a timer.",
+            Evidence(moments=first_seen(recording, messages)),
         )
     number = _steps(messages)
     found_hz = number / span_s

@@ -153,7 +153,9 @@ def _irregular(measured: tuple[Interval, ...], verdict: Verdict) -> Explanation:
     ]
     if all(ratio > 1.5 and abs(ratio - round(ratio)) < 0.1 for ratio in ratios):
         return Explanation(
-            "messages are left out", "Publish in every call of the callback, without a condition."
+            "messages are left out",
+            "Publish in every call of the callback, without a condition, and let no callback work "
+            "or sleep for longer than the period: the timer cannot call meanwhile.",
         )
     return Explanation(
         "",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -25,7 +26,9 @@ from grader.checks.messages import published
 from grader.checks.rotation_case import Case, Limits, cases
 from grader.checks.rotation_evidence import evidence_of, right_words, shown
 from grader.checks.rotation_slip import explain
+from grader.checks.sighting import first_seen
 from grader.checks.silence import why_silent
+from grader.checks.slip import was_integer
 from grader.checks.unanswered import why_raised
 from grader.checks.wording import code, counted, listing
 from grader.recording.model import NS, Recording
@@ -132,6 +135,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
         return _missing(recording, parameters, judged, missing, evidence)
     unasked = sum(message.stamp_ns < sent[0].stamp_ns for message in received)
     if unasked > _GREETINGS:
+        evidence = replace(evidence, moments=first_seen(recording, received))
         return _unasked(parameters, unasked, evidence)
     if len(judged) < parameters.at_least:
         return _too_few(recording, parameters, judged).finding(expected)
@@ -202,6 +206,11 @@ def _wrong(
 
 def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> tuple[str, str]:
     """What went wrong, in words, and what to try."""
+    if any(was_integer(value) for case in wrong for value in case.answers[0].row):
+        return (
+            "an integer was put into a float field, which ROS misreads",
+            "A number in a message must be a float: write 1.0 instead of 1, and 0.0 instead of 0.",
+        )
     infinite = [case for case in wrong if not case.answers[0].finite]
     if 2 * len(infinite) >= len(wrong):
         return (

@@ -151,6 +151,7 @@ def judged_calls(
         return Cause(
             f"{code(service)} was there for too short a time to be called",
             "Keep the service: `self.service = self.create_service(...)`, and the node alive.",
+            Evidence(moments=(Moment("called", recording.since_launch_s(lost.requested_ns)),)),
         )
     return found
 

@@ -10,6 +10,7 @@ from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_not_delivered
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment
+from grader.checks.sighting import endpoints_seen, until_the_end
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.unanswered import why_raised
 from grader.checks.wording import code, codes, counted, listing
@@ -41,9 +42,9 @@ def why_silent(recording: Recording, topic: str) -> Cause:
         if item.owner is Owner.PROBE and item.kind is Kind.SUBSCRIPTION and item.topic == topic
     ]
     cause = (
-        _other_type(topic, publishers, readers)
+        _other_type(recording, topic, publishers, readers)
         or _other_definition(recording, topic, publishers)
-        or _unmatched(topic, publishers, readers)
+        or _unmatched(recording, topic, publishers, readers)
         or _held_in_vain(recording, topic)
     )
     if cause is not None:
@@ -94,6 +95,9 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
             disturbed=True,
         )
     periods = [format_duration(timer.period_s) for timer in testimony.timers(recording)]
+    unspun = why_never_spun(recording, seen, moments=moments) if periods else None
+    if unspun is not None:
+        return unspun
     timers = f"; the process declared a timer of {listing(periods)}" if periods else ""
     return Cause(
         seen + timers,
@@ -117,7 +121,7 @@ def _fires(recording: Recording, timer: testimony.DeclaredTimer) -> bool:
 
 
 def _other_type(
-    topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
+    recording: Recording, topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
 ) -> Cause | None:
     wanted = {item.type for item in readers}
     found = {item.type for item in publishers}
@@ -127,6 +131,7 @@ def _other_type(
         f"no message could be read: {code(topic)} has the type {codes(sorted(found))}, "
         f"not {codes(sorted(wanted), last='or')}",
         "A publisher and a subscription meet only if their types are the same.",
+        Evidence(moments=endpoints_seen(recording, publishers)),
     )
 
 
@@ -140,11 +145,12 @@ def _other_definition(
         "right name, but another definition",
         "Compare the definition with the one that was asked for: the types, names, array bounds "
         "and order of its fields must be the same.",
+        Evidence(moments=endpoints_seen(recording, publishers)),
     )
 
 
 def _unmatched(
-    topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
+    recording: Recording, topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
 ) -> Cause | None:
     """No reader of ours could match: each refuses a policy."""
     if not publishers or not readers:
@@ -161,11 +167,12 @@ def _unmatched(
         f"({', '.join(reasons[0])})",
         "A subscription receives nothing from a publisher that offers less than it requests.",
         Evidence(
+            moments=endpoints_seen(recording, publishers),
             tables=(
                 compatibility.compatibility_table(
                     offered=publishers[0].qos, requested=readers[0].qos
                 ),
-            )
+            ),
         ),
     )
 
@@ -264,6 +271,12 @@ def _slow(recording: Recording, topic: str) -> Cause | None:
         f"no message on {code(topic)} in {format_duration(watched_s)}: the process declared a "
         f"timer of {format_duration(timer.period_s)}",
         _SECONDS_HINT,
+        Evidence(
+            moments=(
+                Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
+                until_the_end(recording),
+            )
+        ),
     )
 
 
@@ -278,7 +291,10 @@ def _prints(recording: Recording, topic: str) -> Cause | None:
         f"no message on {code(topic)}, although the process prints {code(_short(about[0].text))}: "
         "printing and logging send nothing",
         "Call self.publisher.publish(msg) with the message in the callback.",
-        Evidence(log=tuple(line.text for line in about[:_LOG_LINES])),
+        Evidence(
+            moments=(Moment("printed instead", recording.since_launch_s(about[0].time_ns)),),
+            log=tuple(line.text for line in about[:_LOG_LINES]),
+        ),
     )
 
 
@@ -301,7 +317,24 @@ def _tells_of_publishing(recording: Recording, line: LogLine, words: list[str]) 
 
 def _idle(recording: Recording, topic: str) -> Cause:
     complaints = [line.text for line in recording.log if line.stream == "stderr"]
-    evidence = Evidence(places=_interrupted(recording), log=tuple(complaints[-_LOG_LINES:]))
+    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
+    evidence = Evidence(
+        moments=(
+            *endpoints_seen(recording, publishers),
+            until_the_end(recording, "still no message when the observation ended"),
+        ),
+        places=_interrupted(recording),
+        log=tuple(complaints[-_LOG_LINES:]),
+    )
+    heard = _heard(recording, topic)
+    if heard and not testimony.said(recording, "timer"):
+        return Cause(
+            f"the publisher on {code(topic)} is there but silent, although {heard} reached the "
+            "node",
+            "Is publish(msg) reached in the subscription's callback? Look for a condition or a "
+            "`return` before it, and for an `except: pass` that hides an error.",
+            evidence,
+        )
     traced = testimony.traced(recording)
     if traced and not testimony.said(recording, "timer"):
         return Cause(
@@ -321,6 +354,19 @@ def _idle(recording: Recording, topic: str) -> Cause:
         "tell why not.",
         evidence,
     )
+
+
+def _heard(recording: Recording, topic: str) -> str:
+    """What the node was sent, in words, but for what it answers elsewhere; empty without any."""
+    topics = {item.topic for item in recording.student_endpoints(Kind.SUBSCRIPTION)}
+    told = [
+        f"{counted(len(recording.carried(name)), 'message')} on {code(name)}"
+        for name in sorted(topics)
+        if recording.answers.get(name, topic) == topic
+        and recording.carried(name)
+        and why_not_delivered(recording, name) is None
+    ]
+    return listing(told)
 
 
 def _interrupted(recording: Recording) -> tuple[SourceError, ...]:

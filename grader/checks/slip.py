@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
@@ -30,12 +31,22 @@ def explain(wrong: tuple[Difference, ...], observed: Mapping[str, Any], toleranc
         return ""
     wanted = [item for item in numbers if item.expected != 0]
     return (
-        _not_a_number(numbers)
+        _integer(numbers)
+        or _not_a_number(numbers)
         or _swapped(numbers, tolerance)
         or _all_zero(wanted, observed)
         or _moved(wanted, numbers, tolerance)
         or _scaled(wanted, tolerance)
     )
+
+
+def was_integer(number: Any) -> bool:
+    """Whether a float is what rclpy makes of an integer that was put into a float field.
+
+    rclpy does not check the types of fields (unless ROS_PYTHON_CHECK_FIELDS=1), and takes the
+    bits of Python's integer for a float: a number next to nothing, such as 5e-324.
+    """
+    return isinstance(number, float) and 0.0 < abs(number) < sys.float_info.min
 
 
 def accumulates(expected: Any, series: list[Any]) -> bool:
@@ -47,6 +58,13 @@ def accumulates(expected: Any, series: list[Any]) -> bool:
     if not math.isfinite(step) or step == 0:
         return False
     return all(math.isclose(other, step, rel_tol=1e-6) for other in steps)
+
+
+def _integer(numbers: list[Difference]) -> str:
+    bad = next((item for item in numbers if was_integer(item.observed)), None)
+    if bad is None:
+        return ""
+    return f"{bad.field} is a float field, but an integer was put into it, which ROS misreads"
 
 
 def _not_a_number(numbers: list[Difference]) -> str:

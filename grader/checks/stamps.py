@@ -8,6 +8,7 @@ from statistics import median
 
 from grader.assignment.quantity import format_duration
 from grader.checks.cause import Cause
+from grader.checks.finding import Evidence, Moment
 from grader.recording.model import NS, Message, Recording
 
 _RELATIVE = 0.20
@@ -37,6 +38,7 @@ def why_not_believed(recording: Recording, messages: Sequence[Message]) -> Cause
                 "the source timestamps are not the times of publishing: one lies "
                 + ("before the launch" if message.stamp_ns < begin_ns else "after its arrival"),
                 _HINT,
+                _arrival(recording, message),
             )
     return _arrivals_differ(recording, messages)
 
@@ -61,7 +63,17 @@ def _arrivals_differ(recording: Recording, messages: Sequence[Message]) -> Cause
         return Cause(f"{words}, while the machine was busy", ours=True, disturbed=True)
     if not _drifts(live):
         return Cause(f"{words}: something held them up on their way", ours=True, disturbed=True)
-    return Cause(f"{words}: the timestamps are not the times of publishing", _HINT)
+    return Cause(
+        f"{words}: the timestamps are not the times of publishing",
+        _HINT,
+        _arrival(recording, live[0]),
+    )
+
+
+def _arrival(recording: Recording, message: Message) -> Evidence:
+    """When a message came, by our own clock."""
+    when_s = recording.since_launch_s(message.received_ns)
+    return Evidence(moments=(Moment(f"a message on {message.topic} arrived", when_s),))
 
 
 def _drifts(messages: Sequence[Message]) -> bool:

@@ -19,6 +19,7 @@ from grader.checks.lateness import taken_s
 from grader.checks.measure import metres, speed
 from grader.checks.node_absence import why_no_node
 from grader.checks.scan import misreading
+from grader.checks.sighting import until_the_end
 from grader.checks.track import first_rest, over_time, speed_plot, way_m
 from grader.checks.wording import code, counted
 from grader.recording.model import NS, Recording, Scene, Truth
@@ -86,7 +87,10 @@ def _never_stopped(recording: Recording, scene: Scene) -> Cause:
     truth = recording.truth
     last = truth[-1]
     sight = ahead(scene, last)
-    evidence = Evidence(plots=(speed_plot(recording),))
+    evidence = Evidence(
+        moments=(until_the_end(recording, "not at rest when the observation ended"),),
+        plots=(speed_plot(recording),),
+    )
     if abs(last.linear_m_s) < 1e-3:
         return Cause(
             "the robot has not come to rest: it turns on the spot",
@@ -234,8 +238,8 @@ def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding:
     fastest = max(abs(item.linear_m_s) for item in truth[again:])
     return Finding.failed(
         expected,
-        f"set off again {when_s:.2f} s after launch{where}: {metres(way_m(truth[rest:]))} at up to "
-        f"{speed(fastest)}",
+        f"set off again{_backwards(step)} {when_s:.2f} s after launch{where}: "
+        f"{metres(way_m(truth[rest:]))} at up to {speed(fastest)}",
         "Remember that the robot has stopped, or compare the same range in every callback: two "
         "places that publish contradict each other.",
         Evidence(moments=(Moment("set off again", when_s),), plots=evidence.plots),
@@ -265,14 +269,21 @@ def _from_start(recording: Recording, parameters: StaysAtRest) -> Finding:
     hint = (
         "Publish no speed before the first scan: until then nobody knows what is ahead."
         if blind
+        else "Stand still near an obstacle: linear.x = 0.0, not less."
+        if _backwards(step)
         else "Compare the range before you drive, in the first callback already."
     )
     return Finding.failed(
         expected,
-        f"set off {when_s:.2f} s after launch{words}{where}: {metres(way_m(truth))} in all",
+        f"set off{_backwards(step)} {when_s:.2f} s after launch{words}{where}: "
+        f"{metres(way_m(truth))} in all",
         hint,
         Evidence(moments=(Moment("set off", when_s),), plots=(speed_plot(recording),)),
     )
+
+
+def _backwards(step: Truth) -> str:
+    return " backwards" if step.linear_m_s < 0.0 else ""
 
 
 def _moves_from(recording: Recording, begin: int, tolerance_m_s: float) -> int | None:

@@ -74,6 +74,15 @@ def straight(recording: Recording, parameters: Straight) -> Finding:
             f"the heading changed by {degrees(off_rad)}, through commands of less than "
             f"{turn(parameters.tolerance)} that add up",
             "Leave angular.z at exactly 0.0.",
-            evidence,
+            Evidence(moments=(_too_far(recording, parameters.heading),), plots=evidence.plots),
         )
     return Finding.passed(expected, f"heading within {degrees(off_rad)} of the start", evidence)
+
+
+def _too_far(recording: Recording, limit_rad: float) -> Moment:
+    """When the heading was first farther from the start than allowed."""
+    truth = recording.truth
+    turned = zip(headings(truth), truth, strict=True)
+    start_rad = truth[0].yaw_rad
+    off = next(step for heading, step in turned if abs(heading - start_rad) > limit_rad)
+    return Moment("the heading is too far off", recording.since_launch_s(off.time_ns))

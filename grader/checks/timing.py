@@ -72,7 +72,8 @@ def period(recording: Recording, parameters: Period) -> Finding:
     slow grader or network does not count. The median of the intervals must be the period
     within `tolerance`; an interval that differs from the median by more than `spread` is
     irregular, and only few may be (`outliers`). One late message makes an interval too long
-    and the next one too short: that counts once. Messages must go on until the end of the
+    and the next one too short: that counts once; a pause counts for every message that is
+    missing in it. Messages must go on until the end of the
     observation. What the machine took from the process is
     measured, and never costs a point.
 

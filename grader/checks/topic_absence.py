@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
-from grader.checks.finding import Evidence, Moment, Table
+from grader.checks.finding import Evidence, Table
 from grader.checks.near_name import Named, why_misnamed
 from grader.checks.node_absence import why_no_node
+from grader.checks.sighting import endpoints_seen, nodes_seen
 from grader.checks.wording import code, codes
 from grader.recording.model import Endpoint, Kind, Owner, Recording
 
@@ -38,7 +39,10 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
     if cause is not None:
         return cause
     own = [item for item in recording.student_endpoints(kind) if item.topic not in OWN_TOPICS]
-    evidence = Evidence(moments=_moments(recording, own), tables=_endpoints_table(recording))
+    evidence = Evidence(
+        moments=endpoints_seen(recording, own) or nodes_seen(recording),
+        tables=_endpoints_table(recording),
+    )
     near = why_misnamed(
         topic,
         [Named(item.topic, item.node) for item in own],
@@ -109,16 +113,6 @@ def _elsewhere(
 def _probe_endpoints(recording: Recording, topic: str) -> Iterable[Endpoint]:
     return (
         item for item in recording.endpoints if item.owner is Owner.PROBE and item.topic == topic
-    )
-
-
-def _moments(recording: Recording, endpoints: list[Endpoint]) -> tuple[Moment, ...]:
-    return tuple(
-        Moment(
-            f"{item.kind.value} on {item.topic} appeared",
-            recording.since_launch_s(item.appeared_ns),
-        )
-        for item in endpoints[:5]
     )
 
 

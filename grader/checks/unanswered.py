@@ -93,13 +93,13 @@ def why_raised(recording: Recording, what: str, process: Process, begin_ns: int)
         begin_ns: From when on.
     """
     lines = [
-        line.text
+        line
         for line in recording.log
         if line.process == process.name
         and line.stream == "stderr"
         and begin_ns <= line.time_ns <= recording.stop_ns
     ]
-    found = [item for item in parse_failures(lines) if not item.ignored]
+    found = [item for item in parse_failures([line.text for line in lines]) if not item.ignored]
     if not found:
         return None
     place = student_place(found[-1], recording.submission)
@@ -107,7 +107,11 @@ def why_raised(recording: Recording, what: str, process: Process, begin_ns: int)
     return Cause(
         f"{what}: an exception was raised meanwhile, {found[-1]}{where}",
         "Mend the line that is named here." if place else "Read the traceback from its last line.",
-        Evidence(places=(place,) if place else (), log=tuple(lines[-_LOG_LINES:])),
+        Evidence(
+            moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
+            places=(place,) if place else (),
+            log=tuple(line.text for line in lines[-_LOG_LINES:]),
+        ),
     )
 
 

@@ -44,10 +44,16 @@ def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
             errors,
         )
     found = f"found package {code(match)}" if match else f"found {codes(names)} only"
+    places = tuple(
+        SourceError(item.file("package.xml"), None, f"the package {code(item.name)}")
+        for item in submission.packages
+        if match in (None, item.name)
+    )
     return Cause(
         found,
         f"Write <name>{name}</name> in package.xml, and the same name in setup.py, setup.cfg, "
         "resource/ and the folder of the Python module.",
+        Evidence(places=places[:10]),
     )
 
 

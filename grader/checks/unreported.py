@@ -70,11 +70,14 @@ def why_unreported(
             _FORMAT_HINT,
             evidence,
         )
-    other = nearest(name, [item for item in reports.callbacks if item not in callbacks])
+    strangers = [item for item in reports.callbacks if item not in callbacks]
+    # Something may have been put before or after the name, such as that of the node.
+    other = nearest(name, strangers) or next((item for item in strangers if name in item), None)
     if other is not None and not reports.of(name):
         return Cause(
             f"no report of {code(name)}, but reports of {code(other)}",
-            f"The name in the reports is {code(name)}, exactly so.",
+            f"A report is {code(f'{name} start')} or {code(f'{name} end')}, exactly so, with "
+            "nothing before it or after it.",
             evidence,
         )
     ended = dead(recording)

@@ -8,6 +8,7 @@ from grader.assignment.model import TopicName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.node_absence import why_no_node
+from grader.checks.sighting import nodes_seen
 from grader.checks.wording import code, codes
 from grader.recording.model import Kind, Recording
 
@@ -56,5 +57,6 @@ def untouched(recording: Recording, parameters: Untouched) -> Finding:
                 f"a node of the submission is called {code(node.name)}, which is the name of the "
                 "node that watches the run",
                 "Give your node the name that the assignment asks for.",
+                Evidence(moments=nodes_seen(recording)),
             )
     return Finding.passed(expected, "none")

@@ -26,7 +26,10 @@ def validate(
         list[str], typer.Argument(help="assignment.yaml files, folders, or ids of assignments.")
     ],
 ) -> None:
-    """Check assignments without running anything: file, line, and what is allowed."""
+    """Check assignments without running anything.
+
+    Tells of every mistake its file, its line, and what is allowed.
+    """
     from grader.assignment.doubts import doubts
     from grader.assignment.load import load_assignment
     from grader.assignment.mutation import MUTANTS_FILE, load_mutants

@@ -67,7 +67,7 @@ def check(
         bool, typer.Option("--open", help="Open the report in a browser.")
     ] = False,
 ) -> None:
-    """Grade one submission: build it, run its nodes, judge what was recorded.
+    """Grade one submission: build, run, judge what was recorded.
 
     Ends with 0 for full points, 1 if points were lost, 3 if it could not be graded.
     """
@@ -114,13 +114,15 @@ def check(
             runner.close()
         written = write_graded(graded, report, clock, json_file)
         console = output_console()
-        print_grade(console, graded.grade)
+        print_grade(console, graded.grade, graded.recordings)
         console.print(f"Report: {written.report}", soft_wrap=True)
         if keep:
             console.print(f"Installed: {keep_install(graded, report)}", soft_wrap=True)
     formats.write(written.result, submission)
     if open_report:
-        typer.launch(written.report.resolve().as_uri())
+        from grader.cli.browser import open_page
+
+        open_page(written.report.resolve().as_uri())
     grade = graded.grade
     status = FULL_POINTS if grade.full_points or classroom50 else POINTS_LOST
     raise typer.Exit(status if grade.graded else NOT_GRADED)

@@ -8,7 +8,7 @@ from grader.cli.console import output_console
 
 
 def doctor() -> None:
-    """Look at this machine: ROS, rmw, colcon, compilers, sandbox, discovery.
+    """Look at this machine: ROS, colcon, compilers, sandbox.
 
     Starts two real nodes and measures how long they take to meet. Ends with 0 if submissions
     can be graded here, else with 3.

@@ -16,7 +16,7 @@ Results = Annotated[Path, typer.Argument(help="Folder with the reports of a clas
 File = Annotated[Path, typer.Option("--output", "-o", help="File to write.")]
 
 app = typer.Typer(
-    help="Write what other systems take: autograders, workflows, gradebooks.",
+    help="Write what other systems take, such as autograders.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from rich.live import Live
 
 _REFRESHES_PER_S = 8
+_LONG_S = 5.0
+"""What lasts longer says for how long."""
+_REMIND_S = 15.0
+"""Where lines stay, what still goes on is told again so often: it does not hang."""
 
 
 @dataclass
@@ -70,10 +74,19 @@ class Activity:
     Attributes:
         doing: What is done besides the scenarios.
         scenarios: By id, in the order in which they began.
+        since_s: Since when it is done, by the monotonic clock.
     """
 
     doing: str = ""
     scenarios: dict[str, ScenarioActivity] = field(default_factory=dict)
+    since_s: float | None = None
+
+    def say(self, text: str, now_s: float) -> bool:
+        """Begin something else; whether it is something else."""
+        if text == self.doing:
+            return False
+        self.doing, self.since_s = text, now_s
+        return True
 
     def take(self, scenario: str, event: Mapping[str, Any], now_s: float) -> None:
         """Follow what a cell tells."""
@@ -82,8 +95,13 @@ class Activity:
     def lines(self, now_s: float) -> list[tuple[bool, str]]:
         """What to show: whether it is over, and the line."""
         if not self.scenarios:
-            return [(False, self.doing)] if self.doing else []
+            return [(False, self.doing + self._for(now_s))] if self.doing else []
         return [(one.done, f"{id_}: {one.told(now_s)}") for id_, one in self.scenarios.items()]
+
+    def _for(self, now_s: float) -> str:
+        """How long it is being done, where that is long."""
+        lasted_s = now_s - self.since_s if self.since_s is not None else 0.0
+        return f", {lasted_s:.0f} s so far" if lasted_s >= _LONG_S else ""
 
 
 _PLAIN = frozenset({"launching", "matched", "recorded"})
@@ -111,8 +129,12 @@ class GradingProgress(Progress):
         """Show what happens while the block runs; it begins with nothing."""
         self._activity = Activity()
         console = _console()
-        if self._quiet or not console.is_terminal or console.is_dumb_terminal:
+        if self._quiet:
             yield self
+            return
+        if not console.is_terminal or console.is_dumb_terminal:
+            with self._reminding():
+                yield self
             return
         from rich.live import Live
 
@@ -128,6 +150,24 @@ class GradingProgress(Progress):
         finally:
             self._live = None
 
+    @contextmanager
+    def _reminding(self) -> Iterator[None]:
+        ended = threading.Event()
+
+        def remind() -> None:
+            while not ended.wait(_REMIND_S):
+                if not self._activity.scenarios:
+                    for _, line in self._shown_lines():
+                        self._print(f"still {line}")
+
+        reminder = threading.Thread(target=remind, name="reminder", daemon=True)
+        reminder.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            reminder.join()
+
     def say(self, text: str, *, passing: bool = False) -> None:
         """Say what happens now, besides the scenarios.
 
@@ -136,8 +176,8 @@ class GradingProgress(Progress):
             passing: Not worth a line of its own where lines stay.
         """
         with self._lock:
-            repeated, self._activity.doing = self._activity.doing == text, text
-        if self._live is None and not (passing or repeated):
+            is_new = self._activity.say(text, time.monotonic())
+        if self._live is None and is_new and not passing:
             self._print(text)
 
     def narrate(self, scenario: str, event: Mapping[str, Any]) -> None:

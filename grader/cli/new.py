@@ -21,10 +21,11 @@ def new(
         Path, typer.Argument(metavar="DIR", help="Where its folder goes; by default here.")
     ] = Path(),
 ) -> None:
-    """Write a new assignment that works as it is, for you to change bit by bit.
+    """Write a new assignment, which works as it is.
 
-    A folder ID with assignment.yaml, a handout, a reference solution, and mutants: mistakes that
-    the checks must notice. Nothing that is there already is overwritten.
+    You change it bit by bit. A folder ID with assignment.yaml, a handout, a reference solution,
+    and mutants: mistakes that the checks must notice. Nothing that is there already is
+    overwritten.
     """
     from grader.scaffold import write_assignment
 

@@ -12,14 +12,15 @@ ReportFolder = Annotated[
     Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
 ]
 Scenarios = Annotated[
-    list[str] | None, typer.Option(help="Run only this scenario; may be repeated.")
+    list[str] | None, typer.Option(metavar="ID", help="Run only this scenario; may be repeated.")
 ]
 Checks = Annotated[
     list[str] | None,
-    typer.Option(help="Judge only this check and what it requires; may be repeated."),
+    typer.Option(metavar="ID", help="Judge only this check and what it requires; may be repeated."),
 ]
 Seed = Annotated[
-    int | None, typer.Option(help="Seed of all random values; by default the submission's.")
+    int | None,
+    typer.Option(metavar="N", help="Seed of all random values; by default the submission's."),
 ]
 Hidden = Annotated[
     bool,

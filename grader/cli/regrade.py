@@ -54,7 +54,7 @@ def _one(path: Path, assignment: str | None) -> None:
     clock = Clock()
     graded = judge_again(loaded, found)
     console = output_console()
-    print_grade(console, graded.grade)
+    print_grade(console, graded.grade, graded.recordings)
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
             console.print(line, markup=False)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.console import Progress
+from grader.cli.live import GradingProgress
 from grader.cli.options import Quiet
 from grader.resources import cache_folder
 
@@ -22,11 +22,11 @@ def replay(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Give a node the very inputs of a recording again, and print what it does.
+    """Give a node the very inputs of a recording again.
 
-    Messages are given at their recorded times, whatever the node does with them: a simulated
-    robot does not follow it. Services and actions are not replayed. The node runs without a
-    sandbox, as with `ros2 run`, on a ROS domain of its own.
+    What it prints is shown. Messages are given at their recorded times, whatever the node does
+    with them: a simulated robot does not follow it. Services and actions are not replayed. The
+    node runs without a sandbox, as with `ros2 run`, on a ROS domain of its own.
 
     Ends with 0 when all was given, 1 when the node ended before or never listened.
     """
@@ -48,7 +48,7 @@ def replay(
         raise UsageError(f"{recording}: it does not say for which assignment; name it")
     loaded = load_assignment(name)
     check_path(submission)
-    progress = Progress(quiet)
+    progress = GradingProgress(quiet)
     installation = ros.find()
     with progress.shown():
         prepared = prepare(submission, installation, cache=cache_folder(), on_progress=progress.say)

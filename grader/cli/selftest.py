@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,6 +15,8 @@ from grader.resources import cache_folder
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from grader.assignment.load import LoadedAssignment
+    from grader.batch.grading import Graded
     from grader.batch.selftest import TrialResult
 
 
@@ -31,7 +34,7 @@ def selftest(
     sandbox: SandboxChoice = Choice.AUTO,
     quiet: Quiet = False,
 ) -> None:
-    """Grade the reference, the variants and the mutants of an assignment.
+    """Grade the reference, variants and mutants of an assignment.
 
     The reference and every variant must get full points, every mutant must lose exactly the
     checks that it names. Ends with 0 only if all of that is so.
@@ -39,7 +42,6 @@ def selftest(
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
     from grader.batch.grading import Grading
-    from grader.batch.reference_run import keep_reference
     from grader.batch.selftest import Role, mutation_score
     from grader.batch.selftest import selftest as run_selftest
     from grader.run.load import cpu_count
@@ -51,6 +53,7 @@ def selftest(
     for name in assignments or list_assignments():
         loaded = load_assignment(name)
         results: list[TrialResult] = []
+        kept: list[str] = []
         with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
             grading = Grading(loaded, runner, cache_folder())
             for result in run_selftest(
@@ -58,6 +61,7 @@ def selftest(
                 grading,
                 jobs=jobs or 2 * cpu_count(),
                 chosen=lambda trial: not record or trial.role is Role.REFERENCE,
+                on_graded=partial(_keep, loaded, kept) if record else lambda _: None,
             ):
                 results.append(result)
                 progress.say(
@@ -65,10 +69,7 @@ def selftest(
                     passing=True,
                 )
         if record:
-            console.print(
-                keep_reference(loaded, results[0].graded.grade, results[0].graded.recordings),
-                soft_wrap=True,
-            )
+            console.print(kept[0], soft_wrap=True)
             continue
         score = mutation_score(results)
         perfect = perfect and score.perfect
@@ -82,6 +83,12 @@ def selftest(
     raise typer.Exit(0 if perfect else 1)
 
 
+def _keep(loaded: LoadedAssignment, kept: list[str], graded: Graded) -> None:
+    from grader.batch.reference_run import keep_reference
+
+    kept.append(keep_reference(loaded, graded.grade, graded.recordings))
+
+
 def _print(console: Console, assignment: str, results: list[TrialResult]) -> None:
     from rich.markup import escape
     from rich.table import Table
@@ -89,12 +96,11 @@ def _print(console: Console, assignment: str, results: list[TrialResult]) -> Non
     table = Table("", assignment, "WHAT", "LOST", box=None, pad_edge=False)
     order = ("reference", "variant", "mutant")
     for result in sorted(results, key=lambda r: (order.index(r.trial.role.value), r.trial.id)):
-        lost = [r.id for r in result.graded.grade.results if r.status.value == "failed"]
         wrong = "; ".join(str(difference) for difference in result.verdict.differences)
         table.add_row(
             "ok" if result.verdict.right else "WRONG",
             result.trial.id,
             escape(result.trial.title),
-            escape(wrong or ", ".join(lost) or "nothing"),
+            escape(wrong or ", ".join(result.lost) or "nothing"),
         )
     console.print(table)

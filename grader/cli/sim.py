@@ -26,9 +26,9 @@ def sim(
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A value of the world.")
     ] = None,
 ) -> None:
-    """Simulate a robot in a world in real time, with a live view, until Ctrl-C.
+    """Simulate a robot in a world, with a live view, until Ctrl-C.
 
-    It listens to /cmd_vel and speaks on /odom and /scan, like a TurtleBot3 in Gazebo.
+    In real time. It listens to /cmd_vel and speaks on /odom and /scan, like a TurtleBot3 in Gazebo.
     """
     from sim.__main__ import read_values
     from sim.live import run

@@ -20,9 +20,9 @@ def start(
         ),
     ] = Path(),
 ) -> None:
-    """Write a package to begin with: it builds and runs, and you fill in what it does.
+    """Write a package to begin with: it builds and runs.
 
-    Nothing that is there already is overwritten.
+    You fill in what it does. Nothing that is there already is overwritten.
     """
     from grader.assignment.load import load_assignment
     from grader.starter import write_starter

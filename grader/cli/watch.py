@@ -27,11 +27,14 @@ from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.resources import cache_folder
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from rich.console import Console
 
     from grader.assignment.load import LoadedAssignment
     from grader.batch.grading import Graded, Grading
     from grader.cli.page import ReportPage
+    from grader.errors import RosgradeError
     from grader.grade import Grade
     from grader.run.runner import Runner
 
@@ -48,7 +51,10 @@ def watch(
     hidden: Hidden = False,
     sandbox: SandboxChoice = Choice.AUTO,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Port of the report page; 0 takes a free one.")
+        int,
+        typer.Option(
+            min=0, max=65535, metavar="N", help="Port of the report page; 0 takes a free one."
+        ),
     ] = 0,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -59,19 +65,23 @@ def watch(
     """Grade now, and again whenever you save a file, until Ctrl-C.
 
     Tells what changed since the grade before. The report page follows by itself. A save during
-    a run ends the run and begins anew.
+    a run ends the run and begins anew. The files of the assignment are watched too.
     """
     from grader import ros
     from grader.assignment.load import load_assignment
     from grader.assignment.selection import select, visible_part
+    from grader.cli.browser import open_page
     from grader.cli.page import ReportPage
     from grader.errors import UsageError
     from grader.run.runner import Runner
     from grader.submission.locate import check_path
 
-    whole = load_assignment(assignment)
-    shown = whole if hidden else visible_part(whole)
-    loaded = select(shown, tuple(only or ()), tuple(scenario or ()))
+    def load() -> LoadedAssignment:
+        whole = load_assignment(assignment)
+        shown = whole if hidden else visible_part(whole)
+        return select(shown, tuple(only or ()), tuple(scenario or ()))
+
+    loaded = load()
     check_path(submission)
     progress = GradingProgress(quiet, verbose)
     runner = Runner(
@@ -80,7 +90,7 @@ def watch(
         sandbox=chosen_sandbox(sandbox, progress),
         verbose=verbose,
     )
-    work = _Work(loaded, submission, report, seed, progress, runner)
+    work = _Work(loaded, load, submission, report, seed, progress, runner)
     with ExitStack() as stack:
         stack.callback(work.close)
         try:
@@ -91,7 +101,7 @@ def watch(
         console = output_console()
         console.print(f"Report page: {page.url}", soft_wrap=True)
         if open_report:
-            typer.launch(page.url)
+            open_page(page.url)
         try:
             _follow(work, page, console)
         except KeyboardInterrupt:
@@ -103,23 +113,33 @@ class _Work:
     """Grades the submission, each time with what is warm from the time before."""
 
     loaded: LoadedAssignment
+    load: Callable[[], LoadedAssignment]
     submission: Path
     report: Path
     seed: int | None
     progress: GradingProgress
     runner: Runner
     grading: Grading | None = None
+    problem: RosgradeError | None = None
 
     def begin(self) -> None:
         from grader.batch.grading import Grading
+        from grader.errors import RosgradeError
 
         self.runner.get_ready()
+        try:
+            self.loaded, self.problem = self.load(), None
+        except RosgradeError as error:
+            # Told as the end of the grading; who watches mends it and saves again.
+            self.problem = error
         self.grading = Grading(self.loaded, self.runner, cache_folder(), seed=self.seed)
 
     def grade(self) -> Graded:
         from grader.batch.grading import RECORDINGS_FOLDER
 
         assert self.grading is not None
+        if self.problem is not None:
+            raise self.problem
         self.progress.say(f"reading {self.submission}")
         return self.grading.grade(
             self.submission,
@@ -143,11 +163,12 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
     from grader.report.terminal import print_changes, print_grade
     from grader.report.words import number
 
-    title = work.loaded.assignment.title
     before: Grade | None = None
     clock = Clock()
     with ExitStack() as shown:
-        for event in Watching(work.submission, work.report, work).events():
+        watching = Watching(work.submission, work.report, work, work.loaded.folder)
+        for event in watching.events():
+            title = work.loaded.assignment.title
             if isinstance(event, Began):
                 clock = Clock()
                 page.tell("grading what was saved", f"… {title}")
@@ -165,9 +186,9 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 write_graded(event.graded, work.report, clock)
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
                 if before is None:
-                    print_grade(console, grade)
+                    print_grade(console, grade, event.graded.recordings)
                 else:
-                    print_changes(console, before, grade)
+                    print_changes(console, before, grade, event.graded.recordings)
                 before = grade
                 score = f"{number(grade.score)} of {number(grade.max_score)} points"
                 told = score if grade.graded else "not graded"

@@ -33,6 +33,9 @@ def clean(text: str) -> str:
     Escape sequences are dropped; other control characters become visible: ``\x00`` is shown as
     ``␀``, invisible and reordering characters as ``<U+202E>``.
     """
+    # Most text is plain, and a report holds thousands of pieces of it.
+    if text.isascii() and text.isprintable():
+        return text
     text = _ESCAPES.sub("", text)
     text = _LINE_ENDS.sub("\n", text)
     return _UNSAFE.sub(_shown, text)
@@ -40,6 +43,8 @@ def clean(text: str) -> str:
 
 def one_line(text: str) -> str:
     """Make text safe to show in one line; line ends become ``⏎``."""
+    if text.isascii() and text.isprintable():
+        return text if text.strip() else ""
     return " ⏎ ".join(line for line in clean(text).expandtabs(4).split("\n") if line.strip())
 
 

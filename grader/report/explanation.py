@@ -17,7 +17,8 @@ class Row:
     """One thing that is said.
 
     Attributes:
-        name: What it is: ``expected``, ``observed``, ``try next``, ``where``, ``printed``.
+        name: What it is: ``expected``, ``observed``, ``try next``, ``also``, ``where`` or
+            ``printed``.
         text: Cleaned; ``printed`` has several lines.
     """
 
@@ -38,8 +39,9 @@ def _rows(check: CheckPart, finding: FindingPart, *, many: bool) -> Iterator[Row
     yield Row("expected", one_line(finding.expected))
     yield Row("observed", one_line(finding.observed))
     own = check.author_hint if finding.status is Status.FAILED else ""
-    for text in dict.fromkeys(text for text in (finding.hint, own) if text):
-        yield Row("try next", one_line(text))
+    advice = dict.fromkeys(text for text in (finding.hint, own) if text)
+    for number, text in enumerate(advice):
+        yield Row(words.ADVICE[min(number, 1)], one_line(text))
     for place in finding.evidence.places:
         yield Row("where", where(place))
     if finding.evidence.log:

@@ -117,7 +117,7 @@ def _annotation(check: CheckPart, prefix: str | None) -> str:
 
 def _message(check: CheckPart) -> Iterator[str]:
     for row in explanation.explain(check):
-        if row.name in ("scenario", "expected", "observed", "try next"):
+        if row.name in ("scenario", "expected", "observed", *words.ADVICE):
             yield f"{row.name}: {row.text}"
 
 

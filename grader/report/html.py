@@ -27,7 +27,8 @@ from grader.report.comparison import align
 from grader.report.facts import RunFacts
 from grader.report.pictures import Gallery, draw_run, draw_shares
 from grader.report.policy import content_security_policy
-from grader.report.replay import Replay, embedded, make_replay
+from grader.report.remarks import remarks
+from grader.report.replay import Replay, embedded, make_replay, with_goals
 from grader.report.sections import ENDINGS, make_sections, shorten
 
 if TYPE_CHECKING:
@@ -77,7 +78,14 @@ def render_report(
             gallery=Gallery(),
             shares=draw_shares(grade.results),
             replays={
-                name: embedded({"student": own, "reference": references.get(name)})
+                name: embedded(
+                    {
+                        "student": with_goals(own, grade.assignment, name),
+                        "reference": with_goals(references[name], grade.assignment, name)
+                        if name in references
+                        else None,
+                    }
+                )
                 for name, own in replays.items()
             },
             told={run.scenario for run in runs},
@@ -132,6 +140,8 @@ def environment() -> Environment:
         ENVIRONMENT=words.ENVIRONMENT,
         advice=words.advice,
         headline=words.headline,
+        limit_reached=words.limit_reached,
+        remarks=remarks,
         counted=counted,
         tally=words.tally,
         waiting=words.waiting,

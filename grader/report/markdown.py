@@ -33,7 +33,7 @@ def render_markdown(result: Result, most_bytes: int | None = None) -> str:
     Returns:
         Markdown; the same input gives the same text.
     """
-    blocks = [_head(result), _table(result), *_explanations(result)]
+    blocks = [_head(result), _table(result), *_limits(result), *_explanations(result)]
     whole = "\n".join(blocks)
     if most_bytes is None or len(whole.encode()) <= most_bytes:
         return whole
@@ -110,6 +110,17 @@ def _table(result: Result) -> str:
         title = prose(check.title, cell=True)
         lines.append(f"| {said.symbol} {said.word} | {title} | {explanation.points(check)} |")
     return "\n".join([*lines, ""])
+
+
+def _limits(result: Result) -> Iterator[str]:
+    """Limits of the sandbox that were reached, by scenario."""
+    reached = [
+        f"- scenario {literal(run.id)}: {literal(breach)}"
+        for run in result.scenarios
+        for breach in run.breaches
+    ]
+    if reached:
+        yield "\n".join(["**Limits of the sandbox that were reached**", "", *reached, ""])
 
 
 def _explanations(result: Result) -> Iterator[str]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from markupsafe import Markup
 
@@ -58,15 +59,15 @@ class _Panel:
     Attributes:
         title: What it is.
         unit: Its unit.
-        command: What was commanded and in force.
-        true: What it was.
+        commands: What was commanded and in force, over time.
+        true: What it was, as many.
         limit: Of the robot.
     """
 
     title: str
     unit: str
-    command: Callable[[Truth], float]
-    true: Callable[[Truth], float]
+    commands: Sequence[float]
+    true: Sequence[float]
     limit: float
 
 
@@ -92,23 +93,26 @@ def draw_motion(recording: Recording, name: str) -> Figure | None:
         f"{phase.what} from {phase.begin_s:.1f} to {phase.end_s:.1f} s" for phase in found[:20]
     )
     description = f"{caption} The robot {described}."
-    return Figure(
-        caption,
-        _draw(recording, scene, found, description, f"{name}-wide", WIDE),
-        _draw(recording, scene, found, description, f"{name}-narrow", NARROW),
+    stride = max(STRIDE, len(recording.truth) // MOST_POINTS)
+    truth = (*recording.truth[::stride], recording.truth[-1])
+    times_s = [recording.since_launch_s(step.time_ns) for step in truth]
+    panels = _panels(truth, scene)
+    title = f"Commands and true speeds in the scenario {recording.scenario}"
+    wide, narrow = (
+        drawing(f"{name}-{kind}", title, description, *_draw(panels, times_s, found, width))
+        for kind, width in (("wide", WIDE), ("narrow", NARROW))
     )
+    return Figure(caption, wide, narrow)
 
 
 def phases(recording: Recording) -> tuple[Phase, ...]:
     """Divide a run into what the robot did."""
     found: list[Phase] = []
-    for step in recording.truth:
-        time_s = recording.since_launch_s(step.time_ns)
-        what = _what(step)
-        if found and found[-1].what == what:
-            found[-1] = Phase(what, found[-1].begin_s, time_s)
-        else:
-            found.append(Phase(what, found[-1].end_s if found else time_s, time_s))
+    for what, group in groupby(recording.truth, key=_what):
+        steps = list(group)
+        end_s = recording.since_launch_s(steps[-1].time_ns)
+        begin_s = found[-1].end_s if found else recording.since_launch_s(steps[0].time_ns)
+        found.append(Phase(what, begin_s, end_s))
     merged: list[Phase] = []
     for phase in found:
         short = phase.end_s - phase.begin_s < SHORTEST_S
@@ -126,43 +130,39 @@ def _what(step: Truth) -> str:
     return "drives" if drives else "turns" if turns else "rests"
 
 
-def _draw(
-    recording: Recording,
-    scene: Scene,
-    found: Sequence[Phase],
-    description: str,
-    name: str,
-    width: float,
-) -> Markup:
-    stride = max(STRIDE, len(recording.truth) // MOST_POINTS)
-    truth = (*recording.truth[::stride], recording.truth[-1])
-    since = recording.since_launch_s
-    x = Scale(0.0, max(since(truth[-1].time_ns), 0.1), LEFT, width - RIGHT)
-    panels = (
+def _panels(truth: Sequence[Truth], scene: Scene) -> tuple[_Panel, ...]:
+    return (
         _Panel(
             "speed ahead",
             "m/s",
-            lambda step: step.command_m_s,
-            lambda step: step.linear_m_s,
+            [0.0 if math.isnan(step.command_m_s) else step.command_m_s for step in truth],
+            [step.linear_m_s for step in truth],
             scene.max_linear_m_s,
         ),
         _Panel(
             "turn",
             "rad/s",
-            lambda step: step.command_rad_s,
-            lambda step: step.angular_rad_s,
+            [0.0 if math.isnan(step.command_rad_s) else step.command_rad_s for step in truth],
+            [step.angular_rad_s for step in truth],
             scene.max_angular_rad_s,
         ),
     )
+
+
+def _draw(
+    panels: Sequence[_Panel], times_s: Sequence[float], found: Sequence[Phase], width: float
+) -> tuple[tuple[float, float], list[Markup]]:
+    """Size and content of the drawing."""
+    x = Scale(0.0, max(times_s[-1], 0.1), LEFT, width - RIGHT)
+    places = [x(time_s) for time_s in times_s]
     content = _strip(found, x)
     top: float = STRIP + BETWEEN
     for panel in panels:
-        content += _panel(panel, truth, since, x, top)
+        content += _panel(panel, places, x, top)
         top += PANEL + BETWEEN
     bottom = top - BETWEEN
     content += time_axis(x, bottom, width)
-    title = f"Commands and true speeds in the scenario {recording.scenario}"
-    return drawing(name, title, description, (width, bottom + axis.HEIGHT), content)
+    return (width, bottom + axis.HEIGHT), content
 
 
 def _strip(found: Sequence[Phase], x: Scale) -> list[Markup]:
@@ -178,12 +178,8 @@ def _strip(found: Sequence[Phase], x: Scale) -> list[Markup]:
     return drawn
 
 
-def _panel(
-    panel: _Panel, truth: Sequence[Truth], since: Callable[[int], float], x: Scale, top: float
-) -> list[Markup]:
-    commands = [0.0 if math.isnan(panel.command(step)) else panel.command(step) for step in truth]
-    true = [panel.true(step) for step in truth]
-    finite = [value for value in (*commands, *true) if abs(value) < 1e6]
+def _panel(panel: _Panel, places: Sequence[float], x: Scale, top: float) -> list[Markup]:
+    finite = [value for value in (*panel.commands, *panel.true) if abs(value) < 1e6]
     low, high = min(0.0, *finite), max(0.0, *finite)
     near = 0.5 * panel.limit
     limits = [sign * panel.limit for sign, reach in ((1.0, high), (-1.0, -low)) if reach > near]
@@ -197,9 +193,8 @@ def _panel(
     for limit in limits:
         drawn.append(line(LEFT, y(limit), x.end, y(limit), "limit"))
         drawn.append(label(f"limit {limit:.3g} {panel.unit}", x.end, y(limit) - 4, anchor="end"))
-    times = [x(since(step.time_ns)) for step in truth]
-    drawn.append(curve(_steps(times, [y.clipped(value) for value in commands]), "command"))
-    drawn.append(curve(list(zip(times, map(y.clipped, true), strict=True)), "true"))
+    drawn.append(curve(_steps(places, y.all_clipped(panel.commands)), "command"))
+    drawn.append(curve(list(zip(places, y.all_clipped(panel.true), strict=True)), "true"))
     return drawn
 
 

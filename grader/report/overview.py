@@ -20,6 +20,7 @@ from grader.report.distribution import draw_distribution
 from grader.report.html import asset, environment
 from grader.report.policy import content_security_policy
 from grader.report.result_model import CheckPart, Result
+from grader.report.svg import element
 from grader.report.words import STATUS, number
 
 DISTURBED_S = 0.1
@@ -188,9 +189,9 @@ def _cell(check: CheckPart | None, page: str) -> Markup:
     said = f"{word}, {number(check.points)}" if partial else word
     kind = f"{status} partial" if partial else status
     if not page:
-        return Markup('<td><span class="{}">{}</span></td>').format(kind, said)
+        return element("td", element("span", said, class_=kind))
     anchor = f"{page}#check-{quote(check.id)}"
-    return Markup('<td><a class="{}" href="{}">{}</a></td>').format(kind, anchor, said)
+    return element("td", element("a", said, class_=kind, href=anchor))
 
 
 def _link(row: OverviewRow) -> str:

@@ -17,7 +17,17 @@ from grader.recording.model import NS, Recording, Scene, Truth
 from grader.report import ground_plan
 from grader.report.clean import one_line
 from grader.report.ground_plan import View, disc, in_metres, scale_bar, track
-from grader.report.svg import NARROW, WIDE, Figure, crosses, drawing, element, label, simplified
+from grader.report.svg import (
+    NARROW,
+    WIDE,
+    Figure,
+    Point,
+    crosses,
+    drawing,
+    element,
+    label,
+    simplified,
+)
 from sim.motion import Pose, compose
 
 STRIDE = 5
@@ -53,30 +63,60 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Fig
     Returns:
         The drawing, or None in a scenario without a simulated robot.
     """
-    scene = recording.scene
-    if scene is None or not recording.truth:
+    scene, truth = recording.scene, recording.truth
+    if scene is None or not truth:
         return None
-    caption = _caption(recording, scene, targets)
+    stride = max(STRIDE, len(truth) // MOST_POINTS)
+    course = _Course(
+        scene=scene,
+        truth=truth,
+        targets=targets,
+        outline=simplified(
+            [(step.x_m, step.y_m) for step in (*truth[::stride], truth[-1])], TOLERANCE_M
+        ),
+        way_m=way_m(truth),
+        moved=has_moved(truth),
+        stopped=_stopped(truth, scene),
+        touched=_contacts(truth),
+    )
+    caption = _caption(course)
+    title = f"Path of the robot in the scenario {recording.scenario}"
     return Figure(
         caption,
-        _draw(recording, scene, targets, caption, f"{name}-wide", WIDE),
-        _draw(recording, scene, targets, caption, f"{name}-narrow", NARROW),
+        _draw(course, title, caption, f"{name}-wide", WIDE),
+        _draw(course, title, caption, f"{name}-narrow", NARROW),
     )
 
 
-def _draw(
-    recording: Recording,
-    scene: Scene,
-    targets: Sequence[Target],
-    caption: str,
-    name: str,
-    width: float,
-) -> Markup:
-    truth = recording.truth
-    stride = max(STRIDE, len(truth) // MOST_POINTS)
-    points = [(step.x_m, step.y_m) for step in (*truth[::stride], truth[-1])]
+@dataclass(frozen=True)
+class _Course:
+    """What is to be drawn, whatever the width.
+
+    Attributes:
+        scene: The world.
+        truth: Of the robot.
+        targets: Where it should end.
+        outline: Positions along the path, in metres; those on straight lines are left out.
+        way_m: Length of the path.
+        moved: Whether the robot has left its place or its heading.
+        stopped: Where it first came to rest with something near ahead, and how far that was.
+        touched: The first step of every contact.
+    """
+
+    scene: Scene
+    truth: Sequence[Truth]
+    targets: Sequence[Target]
+    outline: Sequence[Point]
+    way_m: float
+    moved: bool
+    stopped: tuple[Truth, float] | None
+    touched: Sequence[Truth]
+
+
+def _draw(course: _Course, title: str, caption: str, name: str, width: float) -> Markup:
+    scene, truth, targets = course.scene, course.truth, course.targets
     view = ground_plan.fit(
-        [*points, *((target.pose.x_m, target.pose.y_m) for target in targets)],
+        [*course.outline, *((target.pose.x_m, target.pose.y_m) for target in targets)],
         scene,
         width,
         lowest=150.0,
@@ -88,22 +128,22 @@ def _draw(
         *ground_plan.moving(scene, until_s),
         *(disc(one.pose.x_m, one.pose.y_m, one.radius_m, "target") for one in targets),
         *(_needle(one.pose, 2.0 * scene.radius_m, "target-heading") for one in targets),
-        track(simplified(points, TOLERANCE_M), "way"),
+        track(course.outline, "way"),
         *robot(_pose(truth[0]), scene.radius_m, "robot at-start"),
         *robot(_pose(truth[-1]), scene.radius_m, "robot"),
     ]
     content = [in_metres(in_world, view)]
-    content.append(element("path", d=_arrows(truth, view), class_="arrow"))
-    content += _stop(recording, scene, view)
-    touched = _contacts(truth)
-    if touched:
-        at = [view.pixel(step.x_m, step.y_m) for step in touched]
+    content.append(element("path", d=_arrows(course, view), class_="arrow"))
+    content += _stop(course, view)
+    if course.touched:
+        at = [view.pixel(step.x_m, step.y_m) for step in course.touched]
         content.append(crosses(at, "out", 6.0))
     content += scale_bar(view)
-    if has_moved(truth):
+    for target in targets:
+        content += _goal(view, target)
+    if course.moved:
         content += _named(view, truth[0], "start", scene.radius_m)
     content += _named(view, truth[-1], "end", scene.radius_m)
-    title = f"Path of the robot in the scenario {recording.scenario}"
     return drawing(name, title, caption, (view.width, view.height), content)
 
 
@@ -134,12 +174,18 @@ def _named(view: View, step: Truth, text: str, radius_m: float) -> list[Markup]:
     return [label(text, x, y, "lane", "middle")]
 
 
-def _arrows(truth: Sequence[Truth], view: View) -> str:
+def _goal(view: View, target: Target) -> list[Markup]:
+    x, y = view.pixel(target.pose.x_m, target.pose.y_m)
+    # Above its circle: below it stands the name of the robot that has come there.
+    above = y - target.radius_m * view.scale - 6.0
+    return [label("goal", x, max(12.0, above), "lane", "middle")]
+
+
+def _arrows(course: _Course, view: View) -> str:
     """Small arrow heads along the path, evenly in length: which way the robot looked."""
-    length_m = way_m(truth)
-    every_m = max(length_m / MOST_ARROWS, 30.0 / view.scale)
+    every_m = max(course.way_m / MOST_ARROWS, 30.0 / view.scale)
     path, gone_m = [], 0.0
-    for before, step in pairwise(truth):
+    for before, step in pairwise(course.truth):
         gone_m += math.hypot(step.x_m - before.x_m, step.y_m - before.y_m)
         if gone_m >= every_m:
             gone_m = 0.0
@@ -162,23 +208,22 @@ def _contacts(truth: Sequence[Truth]) -> list[Truth]:
     ]
 
 
-def _stopped(recording: Recording, scene: Scene) -> tuple[Truth, float] | None:
+def _stopped(truth: Sequence[Truth], scene: Scene) -> tuple[Truth, float] | None:
     """Where the robot first came to rest with something near ahead, and how far that was."""
-    rest = first_rest(recording.truth)
+    rest = first_rest(truth)
     if rest is None:
         return None
-    step = recording.truth[rest]
+    step = truth[rest]
     sight = ahead(scene, step)
     if sight is None or sight.distance_m > LONGEST_SIGHT_M:
         return None
     return step, sight.distance_m
 
 
-def _stop(recording: Recording, scene: Scene, view: View) -> list[Markup]:
-    found = _stopped(recording, scene)
-    if found is None:
+def _stop(course: _Course, view: View) -> list[Markup]:
+    if course.stopped is None:
         return []
-    step, distance_m = found
+    scene, (step, distance_m) = course.scene, course.stopped
     eye = compose(_pose(step), scene.lidar)
     x1, y1 = view.pixel(eye.x_m, eye.y_m)
     x2, y2 = view.pixel(
@@ -192,19 +237,25 @@ def _stop(recording: Recording, scene: Scene, view: View) -> list[Markup]:
     ]
 
 
-def _caption(recording: Recording, scene: Scene, targets: Sequence[Target]) -> str:
-    truth = recording.truth
-    if not has_moved(truth):
-        return "The robot did not move."
-    parts = [f"The robot went {metres(way_m(truth))}"]
-    found = _stopped(recording, scene)
-    if found is not None:
-        parts.append(f"stopped with an obstacle {metres(found[1])} ahead of its LiDAR")
+def _caption(course: _Course) -> str:
+    goal = "".join(_from_goal(course.truth[-1], target) for target in course.targets)
+    if not course.moved:
+        return f"The robot did not move.{goal}"
+    parts = [f"The robot went {metres(course.way_m)}"]
+    if course.stopped is not None:
+        parts.append(f"stopped with an obstacle {metres(course.stopped[1])} ahead of its LiDAR")
     text = " and ".join(parts)
-    touched = _contacts(truth)
-    if touched:
-        names = listing(one_line(step.contact or "") for step in touched)
-        text += f"; {counted(len(touched), 'contact')} with {names} (marked ×)"
-    if targets:
-        text += "; the dashed circle is where it should end"
-    return f"{text}. Arrow heads show where it looked, the dashed outline where it started."
+    if course.touched:
+        names = listing(one_line(step.contact or "") for step in course.touched)
+        text += f"; {counted(len(course.touched), 'contact')} with {names} (marked ×)"
+    arrows = "Arrow heads show where it looked, the dashed outline where it started."
+    return f"{text}.{goal} {arrows}"
+
+
+def _from_goal(end: Truth, target: Target) -> str:
+    """How far from a goal the robot ended."""
+    away_m = math.hypot(end.x_m - target.pose.x_m, end.y_m - target.pose.y_m)
+    return (
+        f" It ended {metres(away_m)} from the goal; the dashed circle is what is near enough, "
+        f"{metres(target.radius_m)}."
+    )

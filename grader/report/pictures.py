@@ -28,7 +28,7 @@ class Pictures:
     """What is shown of a run; None or nothing where there is nothing to show.
 
     Attributes:
-        open: Whether they are shown at once: something was lost in this run.
+        open: Whether they are shown at once: something was lost in this run, or a limit reached.
         path: The robot in its world.
         motion: Commands and speeds.
         timeline: What happened when.
@@ -89,7 +89,7 @@ def draw_run(grade: Grade, section: Section, *, alone: bool) -> Pictures | None:
         return None
     name, recording = section.scenario.id, section.recording
     return Pictures(
-        alone or _is_lost(grade.results, name),
+        alone or bool(recording.breaches) or _is_lost(grade.results, name),
         draw_path(recording, targets(grade.assignment, name, recording.values), f"path-{name}"),
         draw_motion(recording, f"motion-{name}"),
         draw_timeline(recording, _moments(grade, name), f"line-{name}"),

@@ -13,11 +13,13 @@ from typing import Any
 
 from markupsafe import Markup
 
-from grader.assignment.model import Scenario
+from grader.assignment.model import Assignment, Scenario
+from grader.checks.measure import metres
 from grader.recording.model import NS, Message, Recording, Scene, Truth
 from grader.report.clean import one_line
 from grader.report.ground_plan import places
 from grader.report.sections import printed
+from grader.report.target import targets
 
 Replay = Mapping[str, Any]
 """One run, ready for JSON; templates/report.js reads it."""
@@ -31,6 +33,8 @@ MOST_CHARACTERS = 160
 DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 NOTHING = 64 * 64 - 1
 """A beam that did not return, in centimetres."""
+_NUMBERS = tuple(high + low for high in DIGITS for low in DIGITS)
+"""Every number of two digits."""
 
 
 def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
@@ -71,6 +75,31 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
             f"{name} = {value:.3g} {scenario.random[name].unit}".strip()
             for name, value in sorted(recording.values.items())
             if name in scenario.random
+        ],
+        "given": {
+            name: round(value, 6)
+            for name, value in sorted(recording.values.items())
+            if name in scenario.random
+        },
+    }
+
+
+def with_goals(replay: Replay, assignment: Assignment, scenario: str) -> Replay:
+    """Add where the robot should end, as the checks say it now.
+
+    Args:
+        replay: A run.
+        assignment: With its checks.
+        scenario: Id of what was run.
+    """
+    return {
+        **replay,
+        "goals": [
+            [
+                *map(_milli, (one.pose.x_m, one.pose.y_m, one.pose.yaw_rad, one.radius_m)),
+                metres(one.radius_m),
+            ]
+            for one in targets(assignment, scenario, replay.get("given", {}))
         ],
     }
 
@@ -126,10 +155,12 @@ def _touches(recording: Recording) -> list[list[float]]:
     """From when to when the robot touched something."""
     found: list[list[float]] = []
     for step in recording.truth:
+        if not step.contact:
+            continue
         time_s = round(recording.since_launch_s(step.time_ns), 2)
-        if step.contact and found and time_s - found[-1][1] < 0.02:
+        if found and time_s - found[-1][1] < 0.02:
             found[-1][1] = time_s
-        elif step.contact:
+        else:
             found.append([time_s, time_s])
     return found
 
@@ -152,10 +183,12 @@ def _scans(recording: Recording, scene: Scene) -> dict[str, Any] | None:
 
 
 def _ranges(scan: Message, every: int) -> str:
-    return "".join(_two_digits(value) for value in scan.value["ranges"][::every])
-
-
-def _two_digits(range_m: float) -> str:
-    usable = 0.0 < range_m < NOTHING / 100.0
-    number = min(round(range_m * 100.0), NOTHING - 1) if usable else NOTHING
-    return DIGITS[number // 64] + DIGITS[number % 64]
+    farthest_m = NOTHING / 100.0
+    return "".join(
+        [
+            _NUMBERS[min(round(range_m * 100.0), NOTHING - 1)]
+            if 0.0 < range_m < farthest_m
+            else _NUMBERS[NOTHING]
+            for range_m in scan.value["ranges"][::every]
+        ]
+    )

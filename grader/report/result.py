@@ -16,6 +16,7 @@ from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.recording.model import NS, Recording
 from grader.report.facts import RunFacts
 from grader.report.files import write_whole
+from grader.report.remarks import remarks
 from grader.report.result_model import (
     SCHEMA,
     BuildPart,
@@ -151,7 +152,7 @@ def _finding(item: ScenarioFinding) -> FindingPart:
         hint=finding.hint,
         disturbed=finding.disturbed,
         traceback=item.traceback,
-        evidence=EvidencePart.model_validate(asdict(finding.evidence)),
+        evidence=EvidencePart.model_validate(finding.evidence, from_attributes=True),
     )
 
 
@@ -169,4 +170,5 @@ def _scenario(recording: Recording, file: str | None) -> ScenarioPart:
         ),
         faults=recording.faults,
         breaches=tuple(str(breach) for breach in recording.breaches),
+        remarks=remarks(recording),
     )

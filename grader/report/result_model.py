@@ -190,7 +190,11 @@ class DisturbancePart(_Part):
 
 
 class ScenarioPart(_Part):
-    """One run; ``recording`` is relative to the folder of the result."""
+    """One run; ``recording`` is relative to the folder of the result.
+
+    ``breaches`` are limits of the sandbox that were reached, ``remarks`` what else an instructor
+    should know although it costs nothing by itself.
+    """
 
     id: Text
     seed: int
@@ -200,6 +204,7 @@ class ScenarioPart(_Part):
     disturbance: DisturbancePart
     faults: tuple[Text, ...]
     breaches: tuple[Text, ...] = ()
+    remarks: tuple[Text, ...] = ()
 
 
 class BuildPart(_Part):

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from grader.assignment.model import Visibility
+from grader.assignment.withheld import Withheld
 from grader.checks.finding import Status
+from grader.grade.model import CheckResult, Grade
 from grader.grade.points import total
 from grader.report.result_model import CheckPart, Result, WithheldPart
 
@@ -44,6 +48,37 @@ def for_student(result: Result) -> Result:
     )
 
 
+def grade_for_student(grade: Grade) -> Grade:
+    """:func:`for_student` of a grade, from which the HTML report is made.
+
+    Args:
+        grade: The whole grade; no visible check waits for one that is not.
+
+    Returns:
+        A copy, or the grade itself where everything is visible.
+    """
+    visible = [one for one in grade.results if one.visibility is Visibility.VISIBLE]
+    hidden = [one for one in grade.results if one.visibility is not Visibility.VISIBLE]
+    if not hidden:
+        return grade
+    shown = {one.id for one in visible}
+    judged = {scenario for one in visible for scenario in one.scenarios}
+    whole = grade.assignment
+    assignment = whole.model_copy(
+        update={
+            "checks": tuple(spec for spec in whole.checks if spec.id in shown),
+            "scenarios": tuple(one for one in whole.scenarios if one.id in judged),
+        }
+    )
+    return replace(
+        grade,
+        assignment=assignment,
+        results=tuple(_without_tracebacks(one) for one in visible),
+        withheld=grade.withheld
+        + Withheld(len(hidden), total(check.max_points for check in hidden)),
+    )
+
+
 def first_to_fix(checks: tuple[CheckPart, ...]) -> str | None:
     """Id of the failed check that most others wait for; of equals, the first. None: none failed."""
     waiting = [name for check in checks for name in check.waits_for]
@@ -55,6 +90,10 @@ def _without_traceback(check: CheckPart) -> CheckPart:
     """A traceback is for instructors, and quotes their own checks."""
     others = tuple(item.model_copy(update={"traceback": ""}) for item in check.other_scenarios)
     return check.model_copy(update={"traceback": "", "other_scenarios": others})
+
+
+def _without_tracebacks(result: CheckResult) -> CheckResult:
+    return replace(result, findings=tuple(replace(item, traceback="") for item in result.findings))
 
 
 def _is_visible(check: CheckPart) -> bool:

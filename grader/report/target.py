@@ -28,8 +28,10 @@ def targets(
         values: Random values of the run by name, in SI units.
     """
     found: dict[tuple[float, float, float], Target] = {}
-    for check in assignment.checks:
-        if scenario in check.scenarios and check.visibility is Visibility.VISIBLE:
+    # The first that says how near goes before one that leaves it to the default.
+    for check in sorted(assignment.checks, key=lambda check: "position" not in check.with_):
+        judged = not check.scenarios or scenario in check.scenarios
+        if judged and check.visibility is Visibility.VISIBLE:
             target = _target(check, values)
             if target is not None:
                 pose = target.pose

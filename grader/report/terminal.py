@@ -6,7 +6,7 @@ cleaned and wrapped in a :class:`rich.text.Text`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from rich.cells import cell_len
 from rich.console import Console, RenderableType
@@ -15,6 +15,7 @@ from rich.text import Text
 
 from grader.checks.finding import Status
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
+from grader.recording.model import Recording
 from grader.report import words
 from grader.report.changes import Change, changes
 from grader.report.clean import clean, one_line
@@ -35,12 +36,18 @@ _INDENT = 12
 _LOG_LINES = 8
 
 
-def print_grade(console: Console, grade: Grade) -> None:
+NO_RECORDINGS: Mapping[str, Recording] = {}
+
+
+def print_grade(
+    console: Console, grade: Grade, recordings: Mapping[str, Recording] = NO_RECORDINGS
+) -> None:
     """Print a grade.
 
     Args:
         console: Where to; its width, colours and encoding are respected.
         grade: What to print.
+        recordings: Of its runs by scenario id, for the limits that were reached in them.
     """
     console.print(_heading(console, grade))
     console.print()
@@ -48,17 +55,24 @@ def print_grade(console: Console, grade: Grade) -> None:
     for result in (*grade.of(Status.FAILED), *grade.of(Status.ERROR)):
         console.print()
         _explain(console, result)
+    _tell_limits(console, recordings)
     console.print()
     _conclude(console, grade)
 
 
-def print_changes(console: Console, before: Grade, after: Grade) -> None:
+def print_changes(
+    console: Console,
+    before: Grade,
+    after: Grade,
+    recordings: Mapping[str, Recording] = NO_RECORDINGS,
+) -> None:
     """Print what changed since an earlier grade, and what to fix now.
 
     Args:
         console: Where to; its width, colours and encoding are respected.
         before: The earlier grade.
         after: The later one.
+        recordings: Of its runs by scenario id.
     """
     changed = changes(before, after)
     if changed:
@@ -70,6 +84,7 @@ def print_changes(console: Console, before: Grade, after: Grade) -> None:
     for result in explained:
         console.print()
         _explain(console, result)
+    _tell_limits(console, recordings)
     console.print()
     _conclude(console, after, before)
 
@@ -169,12 +184,27 @@ def _rows(result: CheckResult, item: ScenarioFinding) -> Iterator[tuple[str, str
         yield "scenario", item.scenario
     yield "expected", finding.expected
     yield "observed", finding.observed
-    for text in words.advice(result, finding):
-        yield "try next", text
+    for number, text in enumerate(words.advice(result, finding)):
+        yield words.ADVICE[min(number, 1)], text
     for place in finding.evidence.places:
         yield "where", one_line(str(place))
     if finding.evidence.log:
-        yield "printed", "\n".join(finding.evidence.log[-_LOG_LINES:])
+        # Marks under a part of the line above mean nothing where that line is wrapped.
+        lines = [line for line in finding.evidence.log if line.strip(" ^~")]
+        yield "printed", "\n".join(lines[-_LOG_LINES:])
+
+
+def _tell_limits(console: Console, recordings: Mapping[str, Recording]) -> None:
+    """Say which limits of the sandbox were reached, in which run and when."""
+    reached = [(run, breach) for run in recordings.values() for breach in run.breaches]
+    if not reached:
+        return
+    console.print()
+    console.print(Text("Limits of the sandbox that were reached", "bold"))
+    for run, breach in reached:
+        when = f"{run.since_launch_s(breach.time_ns):.1f} s after launch"
+        text = f"{words.limit_reached(breach)} (scenario {run.scenario}, {when})"
+        console.print(_hanging(console, "reached", text))
 
 
 def _conclude(console: Console, grade: Grade, before: Grade | None = None) -> None:

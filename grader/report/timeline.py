@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from grader.checks.finding import Moment
 from grader.checks.topic_absence import OWN_TOPICS
-from grader.checks.wording import counted
+from grader.checks.wording import counted, listing
 from grader.recording.model import Call, LogLine, Owner, Process, Recording
 from grader.report import axis
 from grader.report.axis import time_axis
@@ -154,6 +154,10 @@ def _lanes(recording: Recording, moments: Sequence[Moment]) -> list[Lane]:
     lanes.append(
         Lane("output", note, ticks=tuple(since(entry.time_ns) for entry in lines), crosses=bad)
     )
+    if recording.breaches:
+        reached = listing(breach.what for breach in recording.breaches)
+        times = tuple(since(breach.time_ns) for breach in recording.breaches)
+        lanes.append(Lane("limits of the sandbox", f"reached: {reached}", crosses=times))
     if moments:
         lanes.append(
             Lane(
@@ -243,10 +247,10 @@ def _lane(lane: Lane, scale: Scale, top: float, width: float) -> list[Markup]:
             )
         )
     if lane.ticks:
-        places = columns([scale.clipped(time_s) for time_s in lane.ticks])
+        places = columns(scale.all_clipped(lane.ticks))
         path = "".join(f"M{x:g} {y + 1:g}v{TRACK - 2}" for x in places)
         drawn.append(element("path", d=path, class_="tick"))
     if lane.crosses:
-        places = columns([scale.clipped(time_s) for time_s in lane.crosses])
+        places = columns(scale.all_clipped(lane.crosses))
         drawn.append(crosses([(x, y + TRACK / 2) for x in places], "out", 4.0))
     return drawn

@@ -10,6 +10,7 @@ from grader.assignment.withheld import Withheld
 from grader.checks.finding import Finding, Status
 from grader.checks.wording import counted
 from grader.grade.model import CheckResult, Grade
+from grader.recording.model import Breach
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,12 @@ ENVIRONMENT = {
     "python": "Python",
     "sandbox": "Sandbox",
     "domain_id": "ROS domain",
+    "cpus": "CPUs",
 }
+
+
+ADVICE = ("try next", "also")
+"""What stands before the first piece of advice, and before every other."""
 
 
 def number(value: float) -> str:
@@ -108,6 +114,14 @@ def waiting(grade: Grade, result: CheckResult) -> str:
         return ""
     verb = "waits" if count == 1 else "wait"
     return f"{counted(count, 'other check')} {verb} for it."
+
+
+def limit_reached(breach: Breach) -> str:
+    """What reached which limit of the sandbox, and what came of it."""
+    then = "they were ended for it" if breach.ended else "anything more is refused"
+    return (
+        f"the processes of the submission took {breach.taken}, {breach.allowed} are allowed; {then}"
+    )
 
 
 def advice(result: CheckResult, finding: Finding) -> tuple[str, ...]:

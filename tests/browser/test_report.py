@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -90,6 +91,37 @@ class TestReplay:
         assert robot.get_attribute("aria-label") != before
         assert "heading 0°" in robot.get_attribute("aria-label")
         assert sides.nth(0).locator(".beams").get_attribute("d").count("L") > 5
+
+    def test_the_goal_is_drawn_and_named_on_both_sides(self, look):
+        sample = gallery()
+        goal = {"goal": ["0.4", "-0.2", "90 deg"], "position": "8 cm"}
+        assignment = sample.grade.assignment
+        checks = tuple(
+            spec.model_copy(update={"with_": goal}) if spec.id == "stops" else spec
+            for spec in assignment.checks
+        )
+        grade = replace(sample.grade, assignment=assignment.model_copy(update={"checks": checks}))
+        html = render_report(grade, sample.recordings, sample.facts, reference())
+        found = look(html)
+        sides = found.page.locator(".replay .side")
+        for number in range(2):
+            side = sides.nth(number)
+            circle = side.locator("svg.plan circle.target")
+            assert [circle.get_attribute(name) for name in ("cx", "cy", "r")] == [
+                "0.4",
+                "-0.2",
+                "0.08",
+            ]
+            name, plan = side.locator("svg.plan text"), side.locator("svg.plan")
+            assert name.text_content() == "goal"
+            inner, outer = name.bounding_box(), plan.bounding_box()
+            assert 6 < inner["height"] < 40
+            assert outer["x"] <= inner["x"] and outer["y"] <= inner["y"]
+            assert inner["y"] < circle.bounding_box()["y"] + 2
+            assert "m from the goal (dashed: within 8 cm)" in side.locator(".told").text_content()
+        found.page.locator(".replay").evaluate("(root) => root.scrollIntoView()")
+        found.keep("replay-goal")
+        assert found.complaints == []
 
     def test_at_the_end_one_has_touched_the_wall_and_the_other_has_stopped(self, look, pages):
         found = look(pages["gallery"])
@@ -206,8 +238,6 @@ def test_the_policy_stops_a_script_that_got_in_all_the_same(look, pages):
 
 
 def test_a_hostile_log_line_in_a_replay_is_text(look):
-    from dataclasses import replace
-
     sample = gallery()
     run = sample.recordings["drive"]
     attack = "</script><img src=x onerror=window.hacked=1>"

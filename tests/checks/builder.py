@@ -64,12 +64,24 @@ RELIABLE = Qos(reliability="reliable", durability="volatile", liveliness="automa
 def judge(check: str, subject: Recording | SubmissionRecord, **parameters: Any) -> Finding:
     """Run a check of the catalogue with parameters as YAML has them."""
     entry = get(check)
-    return entry.judge(subject, entry.parameters.model_validate(parameters))
+    finding = entry.judge(subject, entry.parameters.model_validate(parameters))
+    assert finding.status is not Status.FAILED or leads_somewhere(finding, subject), finding
+    return finding
 
 
 def text(finding: Finding) -> str:
     """Everything a student reads of a finding."""
     return f"{finding.observed} | {finding.hint}"
+
+
+def leads_somewhere(finding: Finding, subject: Recording | SubmissionRecord) -> bool:
+    """Whether a finding about a run says where in its recording, or in which file, to look."""
+    if not isinstance(subject, Recording) or not subject.processes:
+        return True
+    if subject.ending is Ending.NOT_STARTED:
+        return True
+    evidence = finding.evidence
+    return bool(evidence.moments or evidence.spans or evidence.places)
 
 
 def failing(check: str, subject: Recording | SubmissionRecord, **parameters: Any) -> str:

@@ -213,6 +213,12 @@ class TestNearMisses:
         words = failed("run", subject, ["timer_1"], period="1 s")
         assert "reported its end, but never its start" in words
 
+    def test_the_name_of_the_node_before_the_report(self):
+        runs = [(f"[executor_demo] {name}", begin, end) for name, begin, end in serial()]
+        words = failed("run", run(*runs), ["timer_1"], period="1 s")
+        assert "no report of `timer_1`, but reports of `[executor_demo] timer_1`" in words
+        assert "`timer_1 start` or `timer_1 end`, exactly so, with nothing before it" in words
+
     def test_one_callback_never_ran(self):
         words = failed("run", run(*only(parallel(), "timer_1")), TIMERS, period="1 s")
         assert "`timer_2` never ran; reports came of `timer_1`" in words
@@ -404,8 +410,80 @@ class TestOverlap:
         assert "declared" not in self.words(run(*serial(), declarations=declarations))
 
 
+class TestTogether:
+    ALL = (*TIMERS, "chatter")
+
+    def two_threads(self):
+        """Each callback is at the same time as another, but never all three."""
+        found = []
+        for second in (1, 2, 3):
+            found.append(("timer_1", second, second + 0.4))
+            found.append(("chatter", second - 0.1, second + 0.1))
+            found.append(("timer_2", second + 0.101, second + 0.501))
+            found.append(("chatter", second + 0.402, second + 0.602))
+        return found
+
+    def test_three_callbacks_at_once(self):
+        finding = judged("together", run(*parallel()), self.ALL)
+        assert finding.status is Status.PASSED
+        # From 3.001 s to 3.4 s messages are worked on one right after the other.
+        assert finding.observed == "they did so 3 times"
+
+    def test_two_at_a_time_are_not_three(self):
+        subject = run(
+            *self.two_threads(),
+            declarations=(declared("spin", executor="MultiThreadedExecutor", threads=2),),
+        )
+        assert judged("overlap", subject, ["timer_1"], others=["timer_2"]).status is Status.PASSED
+        words = failed("together", subject, self.ALL)
+        assert "`timer_1`, `timer_2` and `chatter` never ran all at the same time" in words
+        assert "the process declared a `MultiThreadedExecutor` with 2 threads" in words
+        assert "`MultiThreadedExecutor(num_threads=4)`" in words
+
+    def test_a_moment_does_not_count(self):
+        runs = [("timer_1", 1.0, 1.4), ("timer_2", 1.0, 1.4), ("chatter", 1.35, 1.55)]
+        assert "never ran all" in failed("together", run(*runs), self.ALL)
+        assert judged("together", run(*runs), self.ALL, by="40 ms").status is Status.PASSED
+        assert "only 1 time ran all" in failed(
+            "together", run(*runs), self.ALL, by="40 ms", at_least=2
+        )
+
+    def test_what_the_machine_took_is_our_fault(self):
+        # Of three that began together, the last one was held back for 0.35 s.
+        runs = [("timer_1", 1.0, 1.4), ("chatter", 1.05, 1.45), ("timer_2", 1.35, 1.75)]
+        assert judged("together", run(*runs), self.ALL).status is Status.FAILED
+        disturbed = taken(1.1, 1.3, waited_s=0.3)
+        finding = judged("together", run(*runs, disturbance=disturbed), self.ALL)
+        assert finding.status is Status.ERROR
+        assert finding.disturbed
+
+    def test_what_the_machine_took_at_another_time_explains_nothing(self):
+        disturbed = taken(1.55, 1.8, waited_s=0.3)
+        subject = run(*self.two_threads(), disturbance=disturbed)
+        assert judged("together", subject, self.ALL).status is Status.FAILED
+
+    def test_a_machine_with_one_cpu_is_our_fault(self):
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
+        subject = run(*serial(), declarations=(spin,), environment={"cpus": "1"})
+        assert judged("together", subject, self.ALL).status is Status.ERROR
+
+    def test_without_reports_it_says_why(self):
+        assert "chatter" in failed("together", run(*only(parallel(), *TIMERS)), self.ALL)
+
+    @given(st.lists(st.tuples(st.sampled_from(ALL), st.integers(0, 60), st.integers(1, 20))))
+    def test_as_if_every_moment_was_looked_at(self, drawn):
+        runs = [(name, begin / 10, (begin + length) / 10) for name, begin, length in drawn]
+        busy = [{name for name, begin, length in drawn if begin <= tick < begin + length}
+                for tick in range(81)]  # fmt: skip
+        expected = any(len(names) == len(self.ALL) for names in busy)
+        subject = run(*runs, stop_s=9.0, end_s=9.1)
+        finding = judged("together", subject, self.ALL, by="90 ms")
+        assert (finding.status is Status.PASSED) == expected
+
+
 def test_the_assignment_uses_these_checks():
     used = {check.spec.uses for check in load_assignment("executors").checks}
     assert used >= {
-        "callbacks.run", "callbacks.work", "callbacks.never_overlap", "callbacks.overlap"
+        "callbacks.run", "callbacks.work", "callbacks.never_overlap", "callbacks.overlap",
+        "callbacks.together",
     }  # fmt: skip

@@ -86,6 +86,7 @@ PARAMETERS = {
     "callbacks.work": {"topic": "/cmd_vel", "callbacks": ["timer_1"], "duration": "400 ms"},
     "callbacks.never_overlap": {"topic": "/cmd_vel", "callbacks": ["timer_1"]},
     "callbacks.overlap": {"topic": "/cmd_vel", "callbacks": ["timer_1"], "others": ["timer_2"]},
+    "callbacks.together": {"topic": "/cmd_vel", "callbacks": ["timer_1", "timer_2"]},
     "rotation.answers": {
         "stimulus": "/rpy",
         "topic": "/cmd_vel",
@@ -106,6 +107,7 @@ PARAMETERS = {
     "motion.short_way": {"goal": GOAL},
     "motion.proportional": {"goal": GOAL, "phase": "align"},
     "motion.within_limits": {},
+    "motion.slows_down": {"share": "100 %"},
     "topic.untouched": {},
     "log.follows": {"topic": "/cmd_vel", "fields": ["linear.x", "angular.z"]},
     "log.contains": {"text": "ready", "level": "INFO"},

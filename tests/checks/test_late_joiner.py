@@ -79,6 +79,18 @@ def test_a_history_that_was_lost_is_not_the_student_s_fault():
     assert finding.status is Status.ERROR and finding.disturbed
 
 
+def test_a_lifespan_that_is_over():
+    short = replace(LATCHED, lifespan_s=1.0)
+    found = failing("qos.late_joiner", joined(2, qos=short), **LAST_10)
+    assert "it got 2 of the 12 messages before it: the publisher's lifespan is 1 s" in found
+    assert "Leave `lifespan` out" in found
+
+
+def test_a_lifespan_that_is_long_enough_explains_nothing():
+    long = replace(LATCHED, lifespan_s=60.0)
+    assert judge("qos.late_joiner", joined(7, qos=long), **LAST_10).status is Status.ERROR
+
+
 def test_a_volatile_publisher_is_refused_and_the_rule_is_shown():
     late = join(JOINED_S, matched_ns=None)
     run = joined(0, qos=RELIABLE, joins=(late,), joined={})

@@ -240,6 +240,12 @@ class TestOtherValues:
         found = front(lines("front 0.77", SCAN_TIMES_S))
         assert "which shows" not in found
 
+    def test_infinity_is_no_beam_in_particular(self):
+        value = {**scan(), "ranges": [AHEAD, float("inf"), BEHIND, float("inf")]}
+        changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
+        found = front(lines("mean inf", SCAN_TIMES_S), messages=changed)
+        assert "`mean inf`" in found and "which shows" not in found
+
     def test_text_without_numbers(self):
         found = front(lines("[INFO] [1700000000.1] [bot]: Scan received", SCAN_TIMES_S))
         assert "`Scan received`" in found and "which" not in found
@@ -287,6 +293,12 @@ class TestSilence:
         assert "offers less than it requests" in finding.hint
         refused = [row for row in finding.evidence.tables[0].rows if row[3] == "no"]
         assert [row[:3] for row in refused] == [("durability", "volatile", "transient_local")]
+
+    def test_a_deadline_that_nobody_offers(self):
+        asks = replace(RELIABLE, deadline_s=1.0)
+        found = position(endpoints=(subscription(qos=asks), publisher()))
+        assert "deadline infinite offered, 1 s requested" in found
+        assert "Leave `deadline` out of the subscription's QoSProfile" in found
 
     def test_one_of_two_subscriptions_that_matches_is_enough_to_look_further(self):
         endpoints = (subscription(qos=LATCHED), subscription(), publisher())

@@ -234,6 +234,13 @@ class TestSilence:
         found = failing(check, run, topic="/cmd_vel", **parameters)
         assert "the process declared a timer of 5 min" in found
 
+    def test_few_messages_of_a_node_that_declares_a_timer_but_never_spins(self):
+        run = recording(messages=messages([1.0]), declarations=declarations(spin=False))
+        found = failing("messages.count", run, topic="/cmd_vel", at_least=3)
+        assert "1 message on `/cmd_vel`" in found
+        assert "rclpy.spin() was never called" in found
+        assert "create_timer takes" not in found
+
 
 class TestEqual:
     def test_passes_for_nested_values_and_for_paths(self):
@@ -277,6 +284,9 @@ class TestEqual:
             (twist(angular=(0, 0, 28.6478897565)), "angular.z is in degrees"),
             (twist(angular=(0, 0, 0.008726646)), "in radians already"),
             (twist(angular=(0, 0, math.nan)), "angular.z is not a number"),
+            # What rclpy makes of `msg.linear.x = 1`, in Python 3.11 and in 3.12.
+            (twist((5e-324, 0, 0)), "linear.x is a float field, but an integer was put into it"),
+            (twist((4e-323, 0, 0)), "linear.x is a float field, but an integer was put into it"),
             (twist((math.inf, 0, 0)), "linear.x is infinite"),
             (twist((0, 0, 0), (0, 0, 0)), "published before its fields were set"),
         ],

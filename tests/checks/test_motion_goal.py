@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
+from grader.checks.law import Sample, examine
 from tests.checks.builder import (
     died,
     drive,
@@ -166,6 +167,13 @@ def test_bang_bang_is_never_proportional(goal, heading, size):
         assert finding.status is Status.FAILED or "hardly an error" in finding.observed, finding
 
 
+@pytest.mark.parametrize("huge", [1e160, 1e300])
+def test_huge_commands_break_nothing(huge):
+    samples = [Sample(0.1 + 0.01 * i, huge * (i % 7 - 3)) for i in range(60)]
+    verdict = examine(samples, 2.84, 0.9)
+    assert math.isfinite(verdict.r2) and verdict.r2 < 0.9
+
+
 def test_the_gain_is_told():
     run = run_to(GOAL, angular=1.7)
     finding = judge("motion.proportional", run, goal=yaml(GOAL), phase="align")
@@ -264,6 +272,30 @@ class TestMistakes:
         found = lost(run, GOAL)
         assert "it has not turned since it arrived" in found["motion.reaches"]
         assert "angular.z = 0" in found["proportional at the goal"]
+
+    def test_the_same_speed_all_the_way(self):
+        said = failing("motion.slows_down", run_to(GOAL, constant=0.1))
+        assert "commands that drive have linear.x = 0.1 m/s" in said
+        assert "linear.x = gain * distance" in said
+
+    @pytest.mark.parametrize(
+        "style", [{}, {"linear": 0.3}, {"linear": 1.0, "top": 0.1}, {"turn_first": 0.3}]
+    )
+    def test_a_speed_in_proportion_to_the_distance(self, style):
+        finding = judge("motion.slows_down", run_to(GOAL, near=0.02, **style))
+        assert finding.status is Status.PASSED, finding
+
+    def test_turning_without_a_way_does_not_slow_down(self):
+        run = drive(on_odometry(lambda _: (0.0, 0.5)), seconds=3)
+        assert "no command on `/cmd_vel` has a linear.x other than 0" in failing(
+            "motion.slows_down", run
+        )
+
+    def test_ends_a_little_before_the_goal(self):
+        run = run_to(GOAL)
+        said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.03 m", heading="0.1 rad")
+        assert "cm from the goal: it ended a little before it" in said
+        assert "Compare the distance with the tolerance" in said
 
     @pytest.mark.parametrize(
         ("goal", "words"),

@@ -7,10 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
-from grader.recording.model import Incident, Qos
+from grader.recording.model import Incident, Kind, Owner, Qos
 from tests.checks.builder import (
     Senses,
     at,
+    declarations,
     died,
     drive,
     endpoint,
@@ -228,6 +229,12 @@ class TestStops:
             said = failing(check, run, **parameters)
             assert "drove into `segments[0]` at 0.1 m/s" in said
 
+    def test_drives_into_it_long_after_the_last_scan(self):
+        run = drive(by_front(), world=WALL, seconds=12, options={"lidar": {"stops": "3 s"}})
+        said = failing("motion.no_contact", run)
+        assert "drove into `segments[0]`" in said and "; the last scan had come 6." in said
+        assert "Without scans the robot drives blindly" in said and "brake" not in said
+
     def test_too_late(self):
         late = iter(range(1000))
 
@@ -297,6 +304,35 @@ class TestRest:
         run = drive(forgetful, world=WALL, seconds=11, rest_s=None)
         said = failing("motion.stays_at_rest", run, after="stop")
         assert "set off again 10.1" in said and "`segments[0]`" in said
+
+    def test_backs_off(self):
+        run = drive(on_scan(lambda _: (-0.05, 0.0)), world=WALL, seconds=2, rest_s=None)
+        said = failing("motion.stays_at_rest", run, after="start")
+        assert "set off backwards" in said
+        assert "Stand still near an obstacle" in said
+
+    def test_scans_that_are_not_answered(self):
+        """An inf that the callback throws away."""
+        run = drive(
+            lambda senses: None,
+            world="{}",
+            seconds=2,
+            endpoints=(
+                endpoint(),
+                reader(),
+                endpoint("/scan", kind=Kind.SUBSCRIPTION, type="sensor_msgs/msg/LaserScan"),
+                endpoint(
+                    "/scan",
+                    type="sensor_msgs/msg/LaserScan",
+                    node="/probe",
+                    owner=Owner.PROBE,
+                ),
+            ),
+            declarations=declarations(timer_s=None),
+        )
+        said = failing("motion.keeps_driving", run, distance="0.2 m")
+        assert "silent, although 10 messages on `/scan` reached the node" in said
+        assert "a condition or a `return` before it" in said and "create_timer" not in said
 
     def test_a_robot_that_always_stands_did_not_stop(self):
         run = drive(on_scan(lambda _: (0.0, 0.0)), world=WALL, seconds=2)

@@ -201,6 +201,8 @@ class TestZero:
             ([0, 0, 0, math.inf], "is not a number"),
             ([0, 0, 0, math.cos(0.5)], "length 0.8776"),
             ([0, 0, 0, 0], "length 0"),
+            # What rclpy makes of Quaternion(x=0, y=0, z=0, w=1).
+            ([0, 0, 0, 5e-324], "an integer was put into a float field"),
             ([HALF, 0, 0, HALF], "instead of no rotation or no answer"),
         ],
     )

@@ -307,6 +307,19 @@ class TestMistakes:
         assert "5 intervals of 15 differ" in found
         assert "messages are left out" in found
 
+    def test_a_pause_counts_for_every_message_that_is_missing_in_it(self):
+        found = wrong([0.3] * 5 + [1.2] + [0.3] * 5)
+        assert "1 interval of 11 differs from the median by more than 30 ms" in found
+        assert "messages are left out" in found
+        assert "let no callback work or sleep for longer than the period" in found
+
+    def test_a_pause_that_the_host_made_costs_nothing(self):
+        times = after([0.3] * 5 + [1.2] + [0.3] * 5)
+        run = recording(
+            messages=messages(times), disturbance=taken(times[5], times[6], waited_s=0.9)
+        )
+        assert period(run).status is Status.ERROR
+
     def test_an_irregular_stream(self):
         found = wrong([0.3, 0.21, 0.39, 0.3, 0.25, 0.42, 0.3, 0.2, 0.37])
         assert "differ from the median by more than 30 ms" in found

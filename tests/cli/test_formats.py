@@ -126,6 +126,16 @@ def test_an_instructor_s_run_judges_everything(rosgrade: Rosgrade, tmp_path: Pat
     assert [test["visibility"] for test in data["tests"]] == ["visible", "visible", "hidden"]
     assert "zq" not in data["output"]
 
+    report = tmp_path / "rosgrade-report"
+    assert "zqtitle" in (report / "report.html").read_text(encoding="utf-8")
+    copy = report / "student-report.html"
+    assert "1 hidden check, 3 points, runs at grading" in copy.read_text(encoding="utf-8")
+    assert "zq" not in copy.read_text(encoding="utf-8")
+    copy.unlink()
+    again = rosgrade("report", report, tmp_path / "lesson")
+    assert again.returncode == 0, again.stderr
+    assert copy.is_file()
+
 
 def test_what_could_not_even_begin_says_that_grading_did_not_finish(
     rosgrade: Rosgrade, tmp_path: Path

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 import sys
+import threading
 
 import pytest
 from rich.console import Console
@@ -50,6 +51,37 @@ def test_a_scenario_that_is_run_again_begins_anew() -> None:
     assert told(MATCHED, MESSAGES, STOPPING, RECORDED, LAUNCHING) == [
         (False, "run: starting bot_publisher/bot_pub")
     ]
+
+
+def test_what_takes_long_says_for_how_long() -> None:
+    activity = Activity()
+    assert activity.say("building example_interfaces", 10.0)
+    assert not activity.say("building example_interfaces", 20.0)
+    assert activity.lines(14.0) == [(False, "building example_interfaces")]
+    assert activity.lines(52.4) == [(False, "building example_interfaces, 42 s so far")]
+    assert activity.say("reading", 60.0)
+    assert activity.lines(61.0) == [(False, "reading")]
+
+
+def test_where_lines_stay_what_still_goes_on_is_told_again(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(live, "_REMIND_S", 0.01)
+    progress = GradingProgress()
+    reminded = threading.Event()
+    plain = progress._print
+
+    def told(text: str) -> None:
+        plain(text)
+        if text.startswith("still"):
+            reminded.set()
+
+    monkeypatch.setattr(progress, "_print", told)
+    with progress.shown():
+        progress.say("building example_interfaces")
+        assert reminded.wait(20.0)
+    assert "rosgrade: still building example_interfaces\n" in capsys.readouterr().err
+    assert not [thread for thread in threading.enumerate() if thread.name == "reminder"]
 
 
 def test_scenarios_have_a_line_each_in_the_order_in_which_they_began() -> None:

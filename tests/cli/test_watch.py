@@ -79,6 +79,50 @@ def test_a_save_is_graded_again_and_ctrl_c_leaves_nothing(tmp_path: Path) -> Non
     assert not list(tmp_path.glob("rosgrade-cell*"))
 
 
+@pytest.mark.ros
+@pytest.mark.timeout(300)
+def test_the_author_s_own_yaml_is_read_again_and_a_mistake_in_it_ends_nothing(
+    tmp_path: Path,
+) -> None:
+    assignment = tmp_path / "timed_publisher"
+    shutil.copytree(ROOT / "assignments" / "timed_publisher", assignment)
+    yaml = assignment / "assignment.yaml"
+    right = yaml.read_text(encoding="utf-8")
+    title = "The package bot_publisher is there"
+    assert title in right
+    # The report lies in the assignment's own folder, as it does for an author who works there.
+    watch = subprocess.Popen(
+        [sys.executable, "-m", "grader", "watch", ".", str(REFERENCE), "--only", "package"],
+        cwd=assignment,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "80", "PYTHONUNBUFFERED": "1"},
+        stderr=subprocess.STDOUT,
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
+    )
+    assert watch.stdout is not None
+    try:
+        assert title in read_until(watch.stdout, "Ctrl-C ends")
+        yaml.write_text(right.replace("uses: package.found", "uses: package.fund"))
+        told = read_until(watch.stdout, "Ctrl-C ends")
+        line = right[: right.index("uses: package.found")].count("\n") + 1
+        assert f"assignment.yaml:{line}: " in told and "package.found" in told
+        assert "Score" not in told
+        yaml.write_text(right.replace(title, "Somebody handed in a package"))
+        told = read_until(watch.stdout, "Ctrl-C ends")
+        assert "Score: 0.5 of 0.5 points" in told
+        report = assignment / "rosgrade-report" / "report.html"
+        assert "Somebody handed in a package" in report.read_text(encoding="utf-8")
+        watch.send_signal(signal.SIGINT)
+        told, _ = watch.communicate(timeout=60)
+    finally:
+        watch.kill()
+        watch.wait()
+        watch.stdout.close()
+    assert told.endswith("No longer watching.\n")
+    assert "Traceback" not in told
+
+
 def test_a_port_that_is_taken_is_named(rosgrade: Rosgrade) -> None:
     import socket
 

@@ -9,6 +9,7 @@ from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import Grade, grade
 from grader.recording.model import (
     NS,
+    Breach,
     Call,
     Disturbance,
     LogLine,
@@ -199,6 +200,7 @@ def everywhere(text: str) -> Sample:
         processes=(replace(run.processes[0], name=text, dropped_bytes=9, survivors=(text,)),),
         log=tuple(LogLine(at(0.1), text, stream, text) for stream in ("stdout", text)),
         environment={text: text},
+        breaches=(Breach(at(0.2), "memory", text, text),),
     )
     recordings = {"listen": run}
     facts = make_facts(

@@ -71,7 +71,7 @@ def test_an_annotation_is_at_the_student_s_line():
         "title": "It publishes every 300 ms (1.02 / 3)",
     }
     assert "observed: a median of 322.4 ms" in message
-    assert "try next: Let a timer do the waiting" in message
+    assert "also: Let a timer do the waiting" in message
 
 
 def test_without_the_files_in_the_repository_there_is_no_place():

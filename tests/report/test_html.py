@@ -12,7 +12,7 @@ import pytest
 from grader import resources
 from grader.checks.finding import Finding
 from grader.grade import grade
-from grader.recording.model import LogLine
+from grader.recording.model import Breach, LogLine
 from grader.report.html import render_report
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.page import Page
@@ -128,6 +128,12 @@ class TestContent:
         assert "loop took 0.31 s" in text
         assert "after message period 2 612 ms" in text
 
+    def test_what_to_fix_first_says_when_and_where(self):
+        first = squeezed(page(lost_points()).text).partition("Fix this first ")[2]
+        first = first.partition("1 other check waits for it.")[0]
+        assert "When: 0.750 s a gap of 612 ms begins" in first
+        assert "Where: src/bot_publisher/bot_publisher/node.py:18 time.sleep(0.3)" in first
+
     def test_a_status_is_told_in_words(self):
         text = squeezed(page(lost_points()).text)
         assert "passed The package builds" in text
@@ -182,6 +188,20 @@ class TestContent:
             "recordings/listen.mcap",
         ):
             assert fact in text
+
+    def test_limits_of_the_sandbox_that_were_reached_are_told_with_their_time(self):
+        sample = full_points()
+        reached = Breach(at(0.8), "processes", "64 processes and threads", "64")
+        run = make_run(breaches=(reached,))
+        found = page(Sample(sample.grade, {"listen": run}, sample.facts))
+        text = squeezed(found.text)
+        assert "a limit of the sandbox was reached" in text
+        assert (
+            "0.800 s the processes of the submission took 64 processes and threads, 64 are "
+            "allowed; anything more is refused" in text
+        )
+        assert found.all("a", data_time="0.800")
+        assert "sandbox was reached" not in page(sample).text
 
     def test_findings_of_several_scenarios_are_told_apart(self):
         says = {"listen": FAIL, "renamed": Finding.passed("x", "y")}

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
+from grader.recording.model import Breach
 from grader.report.markdown import fence, literal, prose, render_markdown
 from grader.report.result import make_result
-from tests.report.sample import everywhere, full_points, lost_points, not_built, not_graded
+from tests.report.sample import (
+    at,
+    everywhere,
+    full_points,
+    lost_points,
+    make_run,
+    not_built,
+    not_graded,
+)
 
 PARSER = MarkdownIt("commonmark").enable(["table", "strikethrough"])
 HOSTILE = [
@@ -49,7 +60,7 @@ def test_what_a_student_reads_first():
     assert text.startswith("## timed_publisher: 3.02 of 7 points\n\n1 check failed, 1 other waits")
     assert "**Fix this first:** It publishes every 300 ms" in text
     assert "| ✗ failed | It publishes every 300 ms | 1.02 / 3 |" in text
-    assert "- **try next:** Let a timer do the waiting: `create_timer(0.3, callback)`." in text
+    assert "- **also:** Let a timer do the waiting: `create_timer(0.3, callback)`." in text
     assert "```text\nloop took 0.31 s\n```" in text
 
 
@@ -98,3 +109,12 @@ def test_a_block_of_code_ends_where_it_should(lines):
     assert [token.type for token in tokens] == [
         *("fence", "paragraph_open", "inline", "paragraph_close")
     ]
+
+
+def test_limits_of_the_sandbox_that_were_reached_are_told_and_are_text():
+    sample = full_points()
+    reached = Breach(at(0.8), "disk", "all space in <b>@home</b>", "64 MiB")
+    text = rendered(replace(sample, recordings={"listen": make_run(breaches=(reached,))}))
+    assert "**Limits of the sandbox that were reached**" in text
+    assert "- scenario listen: its processes took all space in &lt;b&gt;" in text
+    assert "Limits" not in rendered(sample)

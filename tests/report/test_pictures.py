@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.checks.finding import Case, Cases, Comparison, Plot, Span
-from grader.recording.model import Intervention, Qos
+from grader.recording.model import Breach, Intervention, Qos
 from grader.report.build_log import arrange
 from grader.report.callbacks import draw_callbacks
 from grader.report.cases import draw_cases
@@ -77,11 +77,22 @@ class TestPath:
         figure = draw_path(stopped, (target,), "p")
         (circle,) = of_class(figure.wide, "target")
         assert [float(circle.get(key)) for key in ("cx", "cy", "r")] == [0.4, 0.1, 0.08]
-        assert "the dashed circle is where it should end" in figure.caption
+        assert "goal" in words(figure.wide).split() and "goal" in words(figure.narrow).split()
+        away_m = math.dist((stopped.truth[-1].x_m, stopped.truth[-1].y_m), (0.4, 0.1))
+        told = figure.caption.partition("It ended ")[2].partition(" from the goal")[0]
+        assert told == (f"{away_m:.3g} m" if away_m >= 0.1 else f"{away_m * 100:.3g} cm")
+        assert "the dashed circle is what is near enough, 8 cm." in figure.caption
+
+    def test_a_goal_at_the_edge_of_a_large_world_keeps_its_name_in_the_picture(self, stopped):
+        figure = draw_path(stopped, (Target(Pose(0.0, 40.0, 0.0), 0.08),), "p")
+        (name,) = [item for item in parsed(figure.wide).iter("text") if item.text == "goal"]
+        assert float(name.get("y")) >= 12
 
     def test_a_robot_that_stands(self):
         run = drive(lambda _: None, world="{segments: [[1, -1, 1, 1]]}", seconds=1.0)
         assert draw_path(run, (), "p").caption == "The robot did not move."
+        caption = draw_path(run, (Target(Pose(0.5, 0.0, 0.0), 0.1),), "p").caption
+        assert caption.startswith("The robot did not move. It ended 0.5 m from the goal;")
 
     def test_without_a_robot_there_is_no_path(self):
         assert draw_path(make_run(), (), "p") is None
@@ -115,6 +126,12 @@ class TestMotion:
 
 
 class TestTimeline:
+    def test_limits_that_were_reached_have_a_lane(self):
+        reached = Breach(at(0.8), "memory", "1056 MiB of memory", "1024 MiB")
+        shown = words(draw_timeline(make_run(breaches=(reached,)), (), "t").wide)
+        assert "limits of the sandbox" in shown and "reached: memory" in shown
+        assert "limits of the sandbox" not in words(draw_timeline(make_run(), (), "t").wide)
+
     def test_nodes_and_endpoints_come_and_go(self):
         run = recording(
             nodes=(node("/bot_publisher", appeared_s=0.3, vanished_s=1.0),),

@@ -2,12 +2,15 @@
 
 import json
 import math
+from dataclasses import replace
 from itertools import accumulate
 
 import pytest
 
+from grader.assignment.model import RandomRange
 from grader.report.html import render_report
-from grader.report.replay import DIGITS, NOTHING, embedded, make_replay
+from grader.report.replay import DIGITS, NOTHING, embedded, make_replay, with_goals
+from tests.grade.sample import Told, make_loaded
 from tests.report.gallery import ahead_until, gallery, reference
 from tests.report.sample import make_run
 
@@ -46,6 +49,24 @@ def test_headings_do_not_jump_at_the_wrap(replay):
 
 def test_a_scenario_without_a_robot_has_none():
     assert make_replay(make_run(), gallery().grade.assignment.scenarios[0]) is None
+
+
+def test_goals_are_where_the_checks_want_the_robot_with_the_run_s_own_values(replay):
+    random = {"goal_x": RandomRange.model_validate([0.1, 0.5])}
+    scenario = gallery().grade.assignment.scenarios[1].model_copy(update={"random": random})
+    made = make_replay(replace(ahead_until(0.2), values={"goal_x": 0.31}), scenario)
+    spec = {"goal": ["goal_x", "-0.2", "90 deg"], "position": "8 cm"}
+    loaded = make_loaded([Told("reaches", scenarios=("drive",))], ("listen", "drive"))
+    check = loaded.assignment.checks[0].model_copy(update={"with_": spec})
+    assignment = loaded.assignment.model_copy(update={"checks": (check,)})
+    assert with_goals(made, assignment, "drive")["goals"] == [[310, -200, 1571, 80, "8 cm"]]
+    assert with_goals(made, assignment, "listen")["goals"] == []
+    other = check.model_copy(update={"id": "near", "with_": {**spec, "position": "3 cm"}})
+    plain = check.model_copy(update={"id": "law", "with_": {"goal": spec["goal"]}})
+    several = loaded.assignment.model_copy(update={"checks": (plain, check, other)})
+    assert with_goals(made, several, "drive")["goals"] == [[310, -200, 1571, 80, "8 cm"]]
+    # A run that was kept by an earlier version does not say its values.
+    assert with_goals(replay | {"given": {}}, assignment, "drive")["goals"] == []
 
 
 def test_text_in_the_data_cannot_end_its_element():

@@ -89,6 +89,7 @@ def test_a_run():
         "disturbance": {"taken_s": 0.0021, "worst_late_s": 0.0004},
         "faults": [],
         "breaches": [],
+        "remarks": [],
     }
 
 

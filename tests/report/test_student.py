@@ -23,7 +23,7 @@ from grader.report.html import render_report
 from grader.report.junit import render_junit
 from grader.report.markdown import render_markdown
 from grader.report.result import make_result, result_json
-from grader.report.student import for_student
+from grader.report.student import for_student, grade_for_student
 from grader.report.terminal import print_grade
 from grader.report.words import headline, summary
 from grader.submission.record import SourceError
@@ -95,6 +95,12 @@ def recordings():
     return {name: dataclasses.replace(make_run(), scenario=name) for name in SCENARIOS}
 
 
+def copy_of_report(loaded):
+    """The report that a student is given of a grade with everything in it."""
+    whole = grade(loaded, make_submission(), recordings())
+    return render_report(grade_for_student(whole), recordings(), make_facts(recordings={}))
+
+
 def whole_result(loaded):
     runs = recordings()
     facts = make_facts(recordings={name: f"recordings/{name}.mcap" for name in runs})
@@ -138,7 +144,11 @@ def reports_of(loaded):
 @settings(max_examples=60, deadline=None)
 @given(assignments())
 def test_no_string_of_a_hidden_check_is_in_anything_for_students(loaded):
-    for text in (*formats_of(whole_result(loaded)), *reports_of(loaded)):
+    for text in (
+        *formats_of(whole_result(loaded)),
+        *reports_of(loaded),
+        copy_of_report(loaded),
+    ):
         assert SECRET not in text
 
 
@@ -157,7 +167,25 @@ def test_the_student_s_copy_is_what_the_visible_part_alone_gives(loaded):
     assert {one.id for one in copy.scenarios} <= {one.id for one in alone.scenarios}
 
 
+@settings(max_examples=60, deadline=None)
+@given(assignments())
+def test_the_student_s_report_is_what_the_visible_part_alone_gives(loaded):
+    part = visible_part(loaded)
+    runs = {scenario.id: recordings()[scenario.id] for scenario in part.assignment.scenarios}
+    alone = grade(part, make_submission(), runs)
+    copy = grade_for_student(grade(loaded, make_submission(), recordings()))
+    assert (copy.score, copy.max_score, copy.graded) == (alone.score, alone.max_score, alone.graded)
+    assert copy.withheld == alone.withheld
+    assert [(one.id, one.status, one.waits_for) for one in copy.results] == [
+        (one.id, one.status, one.waits_for) for one in alone.results
+    ]
+    assert not any(item.traceback for one in copy.results for item in one.findings)
+    assert {one.id for one in copy.assignment.scenarios} <= set(runs)
+
+
 def test_a_result_without_hidden_checks_is_its_own_copy():
+    whole = grade(make_loaded([Told("a"), Told("b")]), make_submission(), recordings())
+    assert grade_for_student(whole) is whole
     result = whole_result(make_loaded([Told("a"), Told("b")]))
     assert for_student(result) is result
     assert result.withheld.checks == 0

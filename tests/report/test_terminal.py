@@ -2,12 +2,27 @@
 
 import io
 import unicodedata
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
 
+from grader.checks.finding import Evidence, Finding
+from grader.grade import grade
+from grader.recording.model import Breach
 from grader.report.terminal import print_grade
-from tests.report.sample import everywhere, full_points, lost_points, not_built, not_graded
+from tests.grade.sample import Told, make_loaded, make_submission
+from tests.report.sample import (
+    Sample,
+    at,
+    everywhere,
+    full_points,
+    lost_points,
+    make_facts,
+    make_run,
+    not_built,
+    not_graded,
+)
 
 AT_80 = """\
 Publish a Twist every 300 ms   ada_lovelace
@@ -23,7 +38,7 @@ Publish a Twist every 300 ms   ada_lovelace
             longest is 612 ms
   try next  The period grows with the work in the callback. A timer keeps the
             period.
-  try next  Let a timer do the waiting: `create_timer(0.3, callback)`.
+  also      Let a timer do the waiting: `create_timer(0.3, callback)`.
   where     src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)
   printed   loop took 0.31 s
 
@@ -42,7 +57,7 @@ Publish a Twist every 300 ms   ada_lovelace
   expected  a period of 300 ms within 5 % (285 to 315 ms)
   observed  a median of 322.4 ms; 2 of 3 periods are longer than 315 ms, the longest is 612 ms
   try next  The period grows with the work in the callback. A timer keeps the period.
-  try next  Let a timer do the waiting: `create_timer(0.3, callback)`.
+  also      Let a timer do the waiting: `create_timer(0.3, callback)`.
   where     src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)
   printed   loop took 0.31 s
 
@@ -54,7 +69,7 @@ Score: 3.02 of 7 points
 def printed(sample, width=80, **options):
     stream = io.StringIO()
     console = Console(file=stream, width=width, highlight=False, emoji=False, **options)
-    print_grade(console, sample.grade)
+    print_grade(console, sample.grade, sample.recordings)
     return stream.getvalue()
 
 
@@ -80,6 +95,42 @@ def test_full_points():
     text = printed(full_points())
     assert text.endswith("\nScore: 3 of 3 points\n")
     assert "Fix this first" not in text
+
+
+def test_limits_of_the_sandbox_that_were_reached_are_told():
+    sample = full_points()
+    reached = (
+        Breach(at(0.8), "memory", "1056 MiB of memory", "1024 MiB"),
+        Breach(at(1.2), "disk", "all space in /tmp and home", "256 MiB"),
+    )
+    text = printed(replace(sample, recordings={"listen": make_run(breaches=reached)}), 80)
+    assert text.endswith("""
+Limits of the sandbox that were reached
+  reached   the processes of the submission took 1056 MiB of memory, 1024 MiB
+            are allowed; they were ended for it (scenario listen, 0.8 s after
+            launch)
+  reached   the processes of the submission took all space in /tmp and home, 256
+            MiB are allowed; anything more is refused (scenario listen, 1.2 s
+            after launch)
+
+Score: 3 of 3 points
+""")
+    assert "Limits" not in printed(sample)
+
+
+def test_marks_below_a_line_of_a_traceback_are_left_out():
+    lines = (
+        "    sys.exit(load())",
+        "             ^^^^^^",
+        "    x = a / b",
+        "        ~~^~~",
+        "Error",
+    )
+    failed = Finding.failed("x", "y", "z", Evidence(log=lines))
+    loaded = make_loaded([Told("starts", failed)])
+    result = grade(loaded, make_submission(), {"listen": make_run()})
+    text = printed(Sample(result, {}, make_facts()))
+    assert "printed       sys.exit(load())\n                x = a / b\n            Error\n" in text
 
 
 def test_what_was_not_graded_has_no_score():

@@ -1,0 +1,80 @@
+"""What an instructor should know of a run although it costs nothing by itself."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
+
+from grader.checks.untouched import PROBE, Untouched
+from grader.checks.wording import code, codes, counted
+from grader.recording.model import NS, Kind, Message, Owner, Recording
+
+_FLOOD = 1000
+"""Messages within a second on one topic; the fastest sensors send fewer."""
+
+
+def remarks(recording: Recording) -> tuple[str, ...]:
+    """Say what is conspicuous about a run, one sentence each.
+
+    A limit of the sandbox that was reached is told elsewhere (``Recording.breaches``).
+    """
+    return (
+        *_posing(recording),
+        *_elsewhere(recording),
+        *_flooding(recording),
+        *_talking(recording),
+    )
+
+
+def _posing(recording: Recording) -> Iterator[str]:
+    """Names of the probe and topics of the robot, unless the assignment asks for them."""
+    for node in recording.student_nodes:
+        if node.name.rpartition("/")[2] == PROBE:
+            yield (
+                f"a node of the submission is called {code(node.name)}, as the node that watches "
+                "the run"
+            )
+    heard = {e.topic for e in recording.endpoints if e.owner is Owner.PROBE}
+    wanted = heard if recording.scene is None else set()
+    taken: dict[str, set[str]] = {}
+    for endpoint in recording.student_endpoints(Kind.PUBLISHER):
+        if endpoint.topic in set(Untouched().topics) - wanted:
+            taken.setdefault(endpoint.node, set()).add(endpoint.topic)
+    for node_name, topics in sorted(taken.items()):
+        yield f"the node {code(node_name)} publishes on {codes(sorted(topics))}, as a robot does"
+
+
+def _elsewhere(recording: Recording) -> Iterator[str]:
+    others = recording.environment.get("other_domains")
+    if others:
+        yield f"the submission joined another ROS domain: {others}"
+
+
+def _flooding(recording: Recording) -> Iterator[str]:
+    for topic, messages in recording.messages.items():
+        most = _most_within_a_second(recording, topic, messages)
+        if most > _FLOOD:
+            yield f"{most} messages were sent on {code(topic)} within 1 s"
+
+
+def _most_within_a_second(recording: Recording, topic: str, messages: Sequence[Message]) -> int:
+    """Count messages, with those that were lost because the probe could not keep up."""
+    numbers: list[int] = [*range(1, len(messages) + 1)]
+    if len(recording.student_endpoints(Kind.PUBLISHER, topic)) == 1:
+        # The numbers are of one writer, so a gap in them is as many lost messages.
+        numbers = [*accumulate((item.sequence for item in messages), max)]
+    if not numbers or numbers[-1] <= _FLOOD:
+        return 0
+    times = [message.stamp_ns for message in messages]
+    return max(
+        numbers[bisect_left(times, begin_ns + NS) - 1] - number + 1
+        for begin_ns, number in zip(times, numbers, strict=True)
+    )
+
+
+def _talking(recording: Recording) -> Iterator[str]:
+    for process in recording.processes:
+        if process.dropped_bytes:
+            left_out = counted(process.dropped_bytes, "byte")
+            yield f"{code(process.name)} printed more than is kept, by {left_out}"

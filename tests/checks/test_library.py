@@ -1,0 +1,49 @@
+"""What a student reads who imports a library that the assignment does not allow."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.checks.library import library_hint
+from grader.recording.model import Ending, Recording
+from grader.submission.record import PackageRecord, SubmissionRecord
+
+
+def run(libraries: str | None = "numpy scipy") -> Recording:
+    packages = (PackageRecord(name="robot_tools", path="."),)
+    return Recording(
+        scenario="run",
+        seed=1,
+        ending=Ending.EXITED,
+        launched_ns=0,
+        stop_ns=1,
+        end_ns=2,
+        submission=SubmissionRecord(id="ada", sha256="ab" * 32, packages=packages),
+        environment={"libraries": libraries} if libraries is not None else {},
+    )
+
+
+@pytest.mark.parametrize("message", ["No module named 'pandas'", "No module named 'pandas.core'"])
+def test_a_library_is_named_with_those_that_are_there(message: str) -> None:
+    hint = library_hint(message, run())
+    assert hint is not None
+    assert "has the standard library, ROS 2 and `numpy` and `scipy`; `pandas` is not" in hint
+    assert "ask your instructor to allow it" in hint
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "No module named 'robot_tools.node'",
+        "No module named 'robot_tool'",
+        "No module named 'geometry_msg'",
+        "No module named 'tf2_ros'",
+        "something else",
+    ],
+)
+def test_a_slip_in_a_name_of_the_student_s_or_of_ros_is_another_matter(message: str) -> None:
+    assert library_hint(message, run()) is None
+
+
+def test_without_a_sandbox_everything_that_is_installed_is_there() -> None:
+    assert library_hint("No module named 'pandas'", run(None)) is None

@@ -1,0 +1,81 @@
+"""What must be the same whenever the same submission is graded, and what need not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from grader.report.grade_part import GRADE, differences, grade_json
+from grader.report.result import make_result
+from grader.report.result_model import CheckPart, Result
+from tests.report.sample import lost_points
+
+MEASURED = {
+    "schema",
+    "rosgrade_version",
+    "environment",
+    "started",
+    "duration_s",
+}
+"""Of a result; of its parts, see the tests."""
+MEASURED_OF_A_CHECK = {"observed", "disturbed", "traceback", "evidence"}
+
+
+def result() -> Result:
+    sample = lost_points()
+    return make_result(sample.grade, sample.recordings, sample.facts)
+
+
+def changed(model: BaseModel, **values: Any) -> Any:
+    return model.model_copy(update=values)
+
+
+def with_check(**values: Any) -> Result:
+    made = result()
+    return changed(made, checks=(changed(made.checks[0], **values), *made.checks[1:]))
+
+
+def test_every_part_of_a_result_is_one_or_the_other() -> None:
+    assert {name.rstrip("_") for name in Result.model_fields} == set(GRADE) | MEASURED
+    assert not set(GRADE) & MEASURED
+    of_a_check = set(GRADE["checks"]["__all__"])
+    assert set(CheckPart.model_fields) == of_a_check | MEASURED_OF_A_CHECK
+    assert not of_a_check & MEASURED_OF_A_CHECK
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        changed(result(), started="later", duration_s=99.0, environment={"sandbox": "none"}),
+        changed(result(), submission=changed(result().submission, id="somebody else")),
+        with_check(observed="301 ms", evidence=changed(result().checks[0].evidence, log=("x",))),
+        changed(result(), scenarios=(changed(result().scenarios[0], duration_s=9.0),)),
+        changed(result(), build=changed(result().build, cached=True, log="in /tmp/x")),
+    ],
+)
+def test_measurements_are_no_part_of_it(other: Result) -> None:
+    assert grade_json(other) == grade_json(result())
+    assert differences(grade_json(result()), grade_json(other)) == []
+
+
+@pytest.mark.parametrize(
+    ("other", "place"),
+    [
+        (changed(result(), score=1.0), "score: 3.02, then 1.0"),
+        (with_check(points=0.25), ".points: "),
+        (with_check(hint="Do it otherwise."), ".hint: "),
+        (with_check(expected="another"), ".expected: "),
+        (changed(result(), checks=result().checks[1:]), "checks: "),
+        (changed(result(), build=None), "build: "),
+        (
+            changed(result(), scenarios=(changed(result().scenarios[0], seed=8),)),
+            "].seed: ",
+        ),
+    ],
+)
+def test_a_difference_is_named_with_its_place(other: Result, place: str) -> None:
+    assert grade_json(other) != grade_json(result())
+    (line,) = differences(grade_json(result()), grade_json(other))
+    assert place in line
