@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -48,6 +48,10 @@ CLASS = 100
 ROBOT_ASSIGNMENTS = ("bot_controller", "p_controller")
 SUBMISSIONS = 500
 SEGMENTS = (10, 100, 1000)
+_FEW = 3
+_TOLD_EACH = 20
+_SERIAL = 10
+"""Submissions that are graded one after the other."""
 OUTPUT = Path("rosgrade-bench.json")
 T = TypeVar("T")
 
@@ -81,21 +85,16 @@ class Samples:
 def main() -> int:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--runs", type=int, default=12, help="of a single grade")
+    parser.add_argument("--only", choices=sorted(MEASUREMENTS), action="append")
     options = parser.parse_args()
     samples = Samples()
+    began_s = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="rosgrade-bench-") as name:
-        with Runner(ros.find()) as runner:
-            for _ in range(options.runs):
-                _parts(samples, Path(name), runner)
-                _whole(samples, Path(name), "warm")
-        for _ in range(3):
-            _whole(samples, Path(name), "cold")
-        _batch(samples, Path(name))
-        _simulator(samples)
-        for robot_assignment in ROBOT_ASSIGNMENTS:
-            _robot(samples, robot_assignment, Path(name))
-        _class(samples, Path(name))
+        for what in options.only or MEASUREMENTS:
+            passed_s = time.monotonic() - began_s
+            print(f"{passed_s:4.0f} s: measuring {what}", file=sys.stderr, flush=True)
+            MEASUREMENTS[what](samples, Path(name), options.runs)
     summary = samples.summary()
     print(f"{'figure (s, or a ratio)':<56} {'min':>9} {'median':>9} {'max':>9}")
     for figure, row in summary.items():
@@ -103,6 +102,16 @@ def main() -> int:
     write_whole(OUTPUT, json.dumps({"runs": options.runs, "figures": summary}, indent=2) + "\n")
     print(f"written to {OUTPUT}")
     return 0
+
+
+def _single(samples: Samples, folder: Path, runs: int) -> None:
+    """One grade: its steps, and the whole of it as a user runs it."""
+    with Runner(ros.find()) as runner:
+        for _ in range(runs):
+            _parts(samples, folder, runner)
+            _whole(samples, folder, "warm")
+    for _ in range(_FEW):
+        _whole(samples, folder, "cold")
 
 
 def _parts(samples: Samples, folder: Path, runner: Runner) -> None:
@@ -130,11 +139,12 @@ def _parts(samples: Samples, folder: Path, runner: Runner) -> None:
     samples.timed("report", lambda: write_graded(graded, folder / "report", Clock()))
 
 
-def _batch(samples: Samples, folder: Path) -> None:
+def _batch(samples: Samples, folder: Path, _: int) -> None:
     """A class of one and the same submission, all at once and one after the other."""
     loaded = load_assignment(ASSIGNMENT)
     prepared = prepare(reference_of(ASSIGNMENT), ros.find(), cache=folder / "batch-cache")
-    for name, count, jobs in (("all at once", CLASS, None), ("one after the other", 10, 1)):
+    rates: list[float] = []
+    for name, count, jobs in (("all at once", CLASS, None), ("one after the other", _SERIAL, 1)):
         with Runner(ros.find(), Admission(cells=jobs)) as runner:
             grading = Grading(loaded, runner, folder / "batch-cache")
             work = partial(_grade_into, grading, prepared, folder / "class")
@@ -142,12 +152,18 @@ def _batch(samples: Samples, folder: Path) -> None:
                 work(0)
                 before_s, own_s = runner.cpu_s, time.process_time()
                 began_s = time.monotonic()
-                list(pool.map(work, range(count)))
+                futures = [pool.submit(work, number) for number in range(count)]
+                for done, future in enumerate(as_completed(futures), start=1):
+                    future.result()
+                    if done % _TOLD_EACH == 0:
+                        print(f"{name}: {done} of {count}", file=sys.stderr, flush=True)
                 wall_s = time.monotonic() - began_s
             cpu_s = runner.cpu_s - before_s + time.process_time() - own_s
-        samples.add(f"batch, {name}: submissions per minute", 60 * count / wall_s)
+        rates.append(60 * count / wall_s)
+        samples.add(f"batch, {name}: submissions per minute", rates[-1])
         samples.add(f"batch, {name}: CPU of each", cpu_s / count)
         samples.add(f"batch, {name}: share of what the CPUs bound", cpu_s / cpu_count() / wall_s)
+    samples.add("batch: times the rate of one after the other", rates[0] / rates[1])
 
 
 def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int) -> None:
@@ -156,11 +172,11 @@ def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int)
     write_graded(grading.grade_prepared(prepared, own / RECORDINGS_FOLDER), own, clock)
 
 
-def _simulator(samples: Samples) -> None:
+def _simulator(samples: Samples, _folder: Path, _: int) -> None:
     """What a step and a scan cost, and the share of a core at real time."""
     from sim.benchmark import scan_s, share_of_core, step_s
 
-    for _ in range(3):
+    for _ in range(_FEW):
         for segments in SEGMENTS:
             samples.add(f"simulator: a step, {segments} segments", step_s(segments))
             samples.add(f"simulator: a scan of 360 beams, {segments} segments", scan_s(segments))
@@ -169,11 +185,16 @@ def _simulator(samples: Samples) -> None:
         samples.add("simulator: share of a core at real time, 100 segments", share)
 
 
+def _robots(samples: Samples, folder: Path, _: int) -> None:
+    for name in ROBOT_ASSIGNMENTS:
+        _robot(samples, name, folder)
+
+
 def _robot(samples: Samples, name: str, folder: Path) -> None:
     """Wall time of a robot assignment against the least time that its physics needs."""
     loaded = load_assignment(name)
     prepared = prepare(reference_of(name), ros.find(), cache=folder / "robot-cache")
-    for _ in range(3):
+    for _ in range(_FEW):
         with Runner(ros.find()) as runner:
             grading = Grading(loaded, runner, folder / "robot-cache")
             began_s = time.monotonic()
@@ -184,10 +205,14 @@ def _robot(samples: Samples, name: str, folder: Path) -> None:
         samples.timed(f"{name}: HTML report with replays", partial(_report, graded))
 
 
-def _class(samples: Samples, folder: Path) -> None:
-    """Render what a class gets, from recordings that are there already."""
+def _class(samples: Samples, folder: Path, _: int) -> None:
+    """Render what a class gets, from recordings of one submission."""
     loaded = load_assignment(ASSIGNMENT)
-    found = find(folder / RECORDINGS_FOLDER)
+    prepared = prepare(reference_of(ASSIGNMENT), ros.find(), cache=folder / "class-cache")
+    with Runner(ros.find()) as runner:
+        grading = Grading(loaded, runner, folder / "class-cache")
+        grading.grade_prepared(prepared, folder / "one" / RECORDINGS_FOLDER)
+    found = find(folder / "one")
     graded = regrade(loaded, found)
     facts = RunFacts(Clock().started, 0.0)
     result = make_result(graded.grade, graded.recordings, facts)
@@ -242,6 +267,15 @@ def _whole(samples: Samples, folder: Path, build: str) -> None:
     samples.add(f"rosgrade check, {build} build: wall", wall_s)
     samples.add(f"rosgrade check, {build} build: overhead", wall_s - needed_s)
     samples.add(f"rosgrade check, {build} build: CPU", usage.ru_utime + usage.ru_stime)
+
+
+MEASUREMENTS: dict[str, Callable[[Samples, Path, int], None]] = {
+    "single": _single,
+    "batch": _batch,
+    "simulator": _simulator,
+    "robots": _robots,
+    "class": _class,
+}
 
 
 if __name__ == "__main__":

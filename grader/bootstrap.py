@@ -23,6 +23,7 @@ DISTRO = "jazzy"
 SUPPORTED = ((3, 13), (3, 12), (3, 11), (3, 10))
 WHEELS_PLATFORM = "linux-x86_64"
 VENV = ".venv"
+OLD = ".venv.old"
 STAMP = "rosgrade-setup.json"
 
 # ROS's extensions are built against the system's numpy 1, which numpy 2 breaks, and its message
@@ -186,6 +187,9 @@ def find_interpreters(environ: Mapping[str, str]) -> Iterator[Interpreter]:
 def set_up(root: Path, environ: Mapping[str, str]) -> None:
     """Bring the environment in `root` up to date; quick when it already is.
 
+    An environment that works stays until another one does: a set-up that fails or is interrupted
+    puts it back, and after one that was killed the next one does.
+
     Raises:
         SetupError: It could not be made. Nothing half-made is left, only perhaps a whole
             environment that waits for rosgrade itself.
@@ -207,24 +211,23 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
     }
     venv = root / VENV
     with _alone(root):
+        _put_back(venv)
         installed = _read_stamp(venv)
         if installed == wanted:
             return
         if venv.is_symlink() or (venv.exists() and not (venv / "pyvenv.cfg").is_file()):
             raise SetupError(f"{venv} is not a virtual environment: move it away")
         if {**installed, "pyproject": ""} != {**wanted, "pyproject": ""}:
-            _remove(venv)
-            try:
-                _create(venv, chosen)
-                _install_lock(venv, requirements(lock_text, chosen))
-                _check_imports(venv, environ)
-            except BaseException:
-                _remove(venv)
-                raise
-        # Only now, so that an interrupted set-up is not taken for a finished one.
-        _write_stamp(venv, {**wanted, "pyproject": ""})
-        _install_rosgrade(venv, root)
-        _write_stamp(venv, wanted)
+            _put_aside(venv, installed)
+        try:
+            if not venv.exists():
+                _make(venv, chosen, lock_text, environ)
+            # Only now, so that an interrupted set-up is not taken for a finished one.
+            _write_stamp(venv, {**wanted, "pyproject": ""})
+            _install_rosgrade(venv, root)
+            _write_stamp(venv, wanted)
+        finally:
+            _put_back(venv)
     _say(f"ready: {VENV}/bin/rosgrade --help")
 
 
@@ -238,6 +241,16 @@ def main() -> int:
     except KeyboardInterrupt:
         return 130
     return 0
+
+
+def _make(venv: Path, chosen: Plan, lock_text: str, environ: Mapping[str, str]) -> None:
+    try:
+        _create(venv, chosen)
+        _install_lock(venv, requirements(lock_text, chosen))
+        _check_imports(venv, environ)
+    except BaseException:
+        _remove(venv)
+        raise
 
 
 def _create(venv: Path, chosen: Plan) -> None:
@@ -350,6 +363,29 @@ def _read_stamp(venv: Path) -> Dict[str, str]:
 
 def _write_stamp(venv: Path, stamp: Mapping[str, str]) -> None:
     (venv / STAMP).write_text(json.dumps(stamp, indent=1) + "\n", encoding="utf-8")
+
+
+def _put_aside(venv: Path, stamp: Mapping[str, str]) -> None:
+    """Make room for another environment; one that works is kept beside it.
+
+    An environment works only in the place that it was made for. So the new one is made there, and
+    the old one moves, and works again when it is moved back.
+    """
+    if stamp:
+        venv.rename(venv.with_name(OLD))
+    _remove(venv)
+
+
+def _put_back(venv: Path) -> None:
+    """Use what was put aside again, unless another environment was finished since."""
+    old = venv.with_name(OLD)
+    if not old.exists():
+        return
+    if _read_stamp(venv).get("pyproject"):
+        _remove(old)
+    else:
+        _remove(venv)
+        old.rename(venv)
 
 
 def _remove(venv: Path) -> None:

@@ -45,6 +45,7 @@ _ASSIGNMENT_SECTIONS: dict[str, type[BaseModel]] = {
     "stimuli: send_goal": asking.SendGoal,
     "until": model.Until,
     "limits": limits.LimitOptions,
+    "build_limits": limits.BuildLimitOptions,
     "robot": description.RobotOptions,
     "robot: drives": description.Drive,
     "lidar": description.LidarOptions,

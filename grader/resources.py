@@ -47,6 +47,11 @@ def templates() -> Path:
     return root() / "templates"
 
 
+def carried_interfaces() -> Path:
+    """The folder with the interface packages that the wheels of ROS lack, each in its own."""
+    return PACKAGE / "submission" / "interfaces"
+
+
 def cache_folder() -> Path:
     """Folder for builds that may be deleted at any time (XDG Base Directory)."""
     base = os.environ.get("XDG_CACHE_HOME")

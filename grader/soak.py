@@ -1,10 +1,10 @@
 """``make soak``: grade the same submissions again and again on a loaded machine.
 
 Without ``N``, a class of 200, references and mutants in random order, while processes load
-every CPU in bursts: each verdict (the status of every check) is compared with the one that the
-same submission got alone on the machine before. With ``N``, both publisher references and five
-mutants ``N`` times each while every CPU is busy all the time: each verdict is compared with the
-one that the submission must get.
+every CPU in bursts: each grade (see :mod:`grader.report.grade_part`) is compared with the one
+that the same submission got alone on the machine before. With ``N``, both publisher references
+and five mutants ``N`` times each while every CPU is busy all the time: each verdict is compared
+with the one that the submission must get.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.mutation import reference_of
 from grader.batch.grading import Grading
 from grader.batch.selftest import REFERENCE, Role, Trial, TrialResult, run_trial, trials
-from grader.checks.finding import Status
+from grader.report.grade_part import differences
 from grader.resources import cache_folder
 from grader.run.admission import Admission
 from grader.run.load import cpu_count
@@ -40,10 +40,9 @@ SUBMISSIONS = {
     "timed_publisher": (REFERENCE, "period_30_ms", "sleeps_in_main", "best_effort"),
 }
 """Assignment -> what is graded: both references and five mutants."""
-DIFFERENT = 25
-"""Different submissions in a class; the others are copies of them."""
 _BURST_S = (0.3, 3.0)
 _PAUSE_S = (0.3, 3.0)
+_TOLD_EACH = 10
 
 
 @dataclass(frozen=True)
@@ -51,14 +50,15 @@ class Job:
     """One submission to grade over and over.
 
     Attributes:
-        alone: The verdict that it got alone on the machine, or None for the one it must get.
+        alone: The grade that it got alone on the machine, or None for the verdict that it must
+            get.
     """
 
     loaded: LoadedAssignment
     grading: Grading
     trial: Trial
     reference: Path
-    alone: Mapping[str, Status] | None = None
+    alone: str | None = None
 
     @property
     def name(self) -> str:
@@ -71,6 +71,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, help="runs of each of seven submissions")
     parser.add_argument("--students", type=int, default=200, help="size of the class")
+    parser.add_argument(
+        "--different", type=int, default=25, help="of the class; the others are copies of them"
+    )
     parser.add_argument("--seed", type=int, default=1, help="of the class and of the bursts")
     parser.add_argument("--sandbox", type=Choice, default=Choice.AUTO)
     parser.add_argument("--calm", action="store_true", help="do not load the CPUs")
@@ -82,7 +85,7 @@ def main() -> int:
         if options.runs:
             queue = _jobs(runner, SUBMISSIONS) * options.runs
         else:
-            queue = _class(runner, options.students, options.seed)
+            queue = _class(runner, options.students, options.different, options.seed)
         bursts = None if options.runs else options.seed
         began_s = time.monotonic()
         with _load(0 if options.calm else cpu_count(), bursts):
@@ -100,7 +103,7 @@ def _jobs(runner: Runner, wanted: Mapping[str, Sequence[str]]) -> list[Job]:
     return found
 
 
-def _class(runner: Runner, students: int, seed: int) -> list[Job]:
+def _class(runner: Runner, students: int, different: int, seed: int) -> list[Job]:
     """A class in random order, each of it graded alone before."""
     order = random.Random(seed)
     wanted: dict[str, list[str]] = {}
@@ -108,13 +111,19 @@ def _class(runner: Runner, students: int, seed: int) -> list[Job]:
         wanted[name] = [REFERENCE]
         wanted[name] += [t.id for t in trials(load_assignment(name)) if t.role is Role.MUTANT]
     everything = [(name, i) for name, ids in wanted.items() for i in ids[1:]]
-    chosen = order.sample(everything, DIFFERENT - len(wanted))
+    chosen = order.sample(everything, max(0, different - len(wanted)))
     picked = {name: [REFERENCE, *(i for n, i in chosen if n == name)] for name in wanted}
     alone = []
     for job in _jobs(runner, picked):
-        ((_, result),) = _grade_all([job], 1)
-        alone.append(replace(job, alone=_verdict(result)))
-        print(f"alone: {len(alone)} of {DIFFERENT}, {job.name}", file=sys.stderr, flush=True)
+        graded = _grade_all([job], 1)
+        if not graded:
+            sys.exit("interrupted before the class began")
+        ((_, result),) = graded
+        alone.append(replace(job, alone=result.grade))
+        lost = ", ".join(result.lost) or "full points" if result.graded else "not graded"
+        print(
+            f"alone: {len(alone)} of {different}, {job.name}: {lost}", file=sys.stderr, flush=True
+        )
     queue = [alone[number % len(alone)] for number in range(students)]
     order.shuffle(queue)
     return queue
@@ -150,6 +159,7 @@ def _burn(seed: int | None) -> None:
 
 def _grade_all(queue: Sequence[Job], at_once: int) -> list[tuple[Job, TrialResult]]:
     results = []
+    began_s = time.monotonic()
     with (
         tempfile.TemporaryDirectory(prefix="rosgrade-soak-") as name,
         ThreadPoolExecutor(max_workers=at_once) as pool,
@@ -164,8 +174,15 @@ def _grade_all(queue: Sequence[Job], at_once: int) -> list[tuple[Job, TrialResul
                 results.append((job, result))
                 for difference in _differences(job, result):
                     print(f"{job.name}: {difference}", flush=True)
-                if len(results) % 50 == 0:
-                    print(f"{len(results)} of {len(futures)} graded", file=sys.stderr, flush=True)
+                if len(results) % _TOLD_EACH == 0:
+                    rate = len(results) / (time.monotonic() - began_s)
+                    left_s = (len(futures) - len(results)) / rate
+                    print(
+                        f"{len(results)} of {len(futures)} graded, {60 * rate:.0f} a minute, "
+                        f"{left_s:.0f} s left",
+                        file=sys.stderr,
+                        flush=True,
+                    )
         except KeyboardInterrupt:
             # What is finished still counts.
             pool.shutdown(wait=False, cancel_futures=True)
@@ -178,18 +195,10 @@ def _grade_once(job: Job, folder: Path) -> TrialResult:
     return run_trial(job.trial, job.loaded, job.grading, job.reference, folder)
 
 
-def _verdict(result: TrialResult) -> dict[str, Status]:
-    return {check.id: check.status for check in result.graded.grade.results}
-
-
 def _differences(job: Job, result: TrialResult) -> list[str]:
     if job.alone is None:
         return [str(difference) for difference in result.verdict.differences]
-    return [
-        f"{check}: {job.alone[check].value} alone, {status.value} now"
-        for check, status in _verdict(result).items()
-        if status is not job.alone[check]
-    ]
+    return differences(job.alone, result.grade)
 
 
 def _summary(results: list[tuple[Job, TrialResult]], wall_s: float) -> int:
@@ -200,13 +209,16 @@ def _summary(results: list[tuple[Job, TrialResult]], wall_s: float) -> int:
     for job, result in results:
         runs[job.name] += 1
         changed[job.name] += bool(_differences(job, result))
-        errors[job.name] += not result.graded.grade.graded
-        again[job.name] += any(count > 1 for count in result.graded.runs.values())
+        errors[job.name] += not result.graded
+        again[job.name] += result.repeated
     print(f"{'submission':<40} {'runs':>5} {'changed':>8} {'errors':>7} {'run again':>10}")
     for name in sorted(runs):
         print(f"{name:<40} {runs[name]:>5} {changed[name]:>8} {errors[name]:>7} {again[name]:>10}")
     total = sum(changed.values())
-    print(f"{len(results)} grades in {wall_s:.0f} s: {total} verdicts changed")
+    print(
+        f"{len(results)} grades in {wall_s:.0f} s: {total} changed, {sum(errors.values())} not "
+        f"graded, {sum(again.values())} run again"
+    )
     return 1 if total else 0
 
 

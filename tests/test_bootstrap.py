@@ -1,5 +1,8 @@
 """The decisions of the set-up; none of these tests installs anything."""
 
+import json
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -206,3 +209,87 @@ def test_it_needs_nothing_installed() -> None:
         *sys.stdlib_module_names,
         "sitecustomize",
     }
+
+
+PRETENDED = """\
+import os, sys
+from pathlib import Path
+from grader import bootstrap
+
+def create(venv, chosen):
+    (venv / "bin").mkdir(parents=True)
+    (venv / "bin" / "python").touch()
+    (venv / "pyvenv.cfg").touch()
+    (venv / "made_for").write_text((venv.parent / "requirements.lock").read_text())
+
+def nothing(*arguments):
+    pass
+
+bootstrap._create = create
+bootstrap._install_lock = bootstrap._check_imports = bootstrap._install_rosgrade = nothing
+bootstrap._say = print
+{change}
+try:
+    bootstrap.set_up(Path(sys.argv[1]), {{}})
+except bootstrap.SetupError as error:
+    sys.exit(str(error))
+"""
+"""A set-up of an environment with nothing in it."""
+
+
+def set_up(root: Path, lock: str, change: str = "") -> "subprocess.CompletedProcess[str]":
+    (root / "requirements.lock").write_text(lock, encoding="utf-8")
+    (root / "pyproject.toml").touch()
+    command = [sys.executable, "-c", PRETENDED.format(change=change), str(root)]
+    environ = {k: v for k, v in os.environ.items() if k != "AMENT_PREFIX_PATH"}
+    return subprocess.run(
+        command, cwd=ROOT, env=environ, capture_output=True, text=True, check=False
+    )
+
+
+def made_for(root: Path) -> str:
+    """The lock that the environment in place was made for, if it is finished."""
+    stamp = json.loads((root / ".venv" / bootstrap.STAMP).read_text(encoding="utf-8"))
+    assert stamp["pyproject"]
+    return (root / ".venv" / "made_for").read_text(encoding="utf-8")
+
+
+FAILS = "def fail(*arguments):\n    raise {}\nbootstrap.{} = fail"
+STEPS = ["_create", "_install_lock", "_check_imports", "_install_rosgrade"]
+
+
+def test_other_requirements_make_another_environment(tmp_path: Path) -> None:
+    assert set_up(tmp_path, "one").returncode == 0
+    assert set_up(tmp_path, "two").returncode == 0
+    assert made_for(tmp_path) == "two"
+    assert not (tmp_path / bootstrap.OLD).exists()
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_a_set_up_that_fails_leaves_the_environment_that_worked(tmp_path: Path, step: str) -> None:
+    set_up(tmp_path, "one")
+    failed = set_up(tmp_path, "two", FAILS.format("bootstrap.SetupError('no index')", step))
+    assert failed.stderr.strip() == "no index"
+    assert made_for(tmp_path) == "one"
+    assert not (tmp_path / bootstrap.OLD).exists()
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_after_one_that_was_killed_the_next_one_goes_on_from_what_worked(
+    tmp_path: Path, step: str
+) -> None:
+    set_up(tmp_path, "one")
+    kill = f"bootstrap.{step} = lambda *_: os.kill(os.getpid(), 9)"
+    assert set_up(tmp_path, "two", kill).returncode == -signal.SIGKILL
+    # The old requirements again: nothing has to be made, as the moved environment is back.
+    assert set_up(tmp_path, "one", FAILS.format("AssertionError", "_create")).returncode == 0
+    assert made_for(tmp_path) == "one"
+    assert set_up(tmp_path, "two").returncode == 0
+    assert made_for(tmp_path) == "two"
+    assert not (tmp_path / bootstrap.OLD).exists()
+
+
+def test_a_first_set_up_that_fails_leaves_nothing(tmp_path: Path) -> None:
+    assert set_up(tmp_path, "one", FAILS.format("KeyboardInterrupt", "_install_lock")).returncode
+    assert not (tmp_path / ".venv").exists()
+    assert not (tmp_path / bootstrap.OLD).exists()

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from grader.assignment.quantity import Duration, Size
 from grader.assignment.source import Model
-from grader.sandbox.limits import Limits
+from grader.sandbox.limits import BUILD, BUILD_OUTPUT_BYTES, Limits
 
 _DEFAULTS = Limits()
 
@@ -56,4 +56,52 @@ class LimitOptions(Model):
             files=self.files,
             output_bytes=int(self.output),
             address_bytes=max(_DEFAULTS.address_bytes, 4 * int(self.memory)),
+        )
+
+
+class BuildLimitOptions(Model):
+    """What the build of a submission may take; `setup.py` and `CMakeLists.txt` are programs, too.
+
+    Without a sandbox only `wall_time` and `output` are bounded. A build that passes a limit has
+    failed.
+    """
+
+    memory: Size = Field(
+        BUILD.memory_bytes, description="Of all processes together.", validate_default=False
+    )
+    processes: int = Field(
+        BUILD.processes, ge=16, le=4096, description="Processes and threads together."
+    )
+    cpu_time: Duration = Field(
+        BUILD.cpu_s, description="CPU time of one process.", validate_default=False
+    )
+    wall_time: Duration | None = Field(
+        None,
+        description="Of the whole build; by default 2 min where all packages are ament_python, "
+        "else 5 min.",
+    )
+    file_size: Size = Field(
+        BUILD.file_bytes, description="Size of one file.", validate_default=False
+    )
+    disk: Size = Field(
+        BUILD.disk_bytes, description="Everything that it writes.", validate_default=False
+    )
+    files: int = Field(BUILD.files, ge=100, description="Files and folders that it makes.")
+    output: Size = Field(
+        BUILD_OUTPUT_BYTES,
+        description="What is written to the terminal; whoever writes more is ended.",
+        validate_default=False,
+    )
+
+    def limits(self) -> Limits:
+        """For the sandbox."""
+        return Limits(
+            memory_bytes=int(self.memory),
+            processes=self.processes,
+            cpu_s=max(1, round(self.cpu_time)),
+            file_bytes=int(self.file_size),
+            disk_bytes=int(self.disk),
+            files=self.files,
+            output_bytes=int(self.output),
+            address_bytes=max(BUILD.address_bytes, 4 * int(self.memory)),
         )

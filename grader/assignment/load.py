@@ -9,7 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from grader import resources
-from grader.assignment import rules, simulation, stimulation
+from grader.assignment import interfaces, rules, simulation, stimulation
 from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.draft import Draft
 from grader.assignment.model import Assignment, Scenario
@@ -121,7 +121,9 @@ def load_assignment(
     found += [problem for problem in more if problem not in found]
     if assignment is not None and not found:
         found += simulation.problems(source, assignment)
-        found += stimulation.problems(source, assignment)
+        known = interfaces.Interfaces.of(file.parent)
+        found += interfaces.problems(source, assignment, checks, known)
+        found += stimulation.problems(source, assignment, known)
     if assignment is None or found:
         raise AssignmentError(file, sorted(found, key=lambda problem: problem.line or 0))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
@@ -156,8 +158,12 @@ def _folder_name(source: Source) -> list[Problem]:
     return [source.problem(("id",), f"{identity!r} is not the name of its folder, {folder!r}")]
 
 
-def folder_sha256(folder: Path) -> str:
+def folder_sha256(folder: Path, besides: Path | None = None) -> str:
     """Hash the paths and contents of all files in a folder, hidden ones and caches left out.
+
+    Args:
+        folder: The folder.
+        besides: Whatever is below this is left out as well.
 
     Raises:
         UsageError: A file cannot be read.
@@ -167,6 +173,8 @@ def folder_sha256(folder: Path) -> str:
         inside = file.relative_to(folder)
         ignored = any(part.startswith(".") or part == "__pycache__" for part in inside.parts)
         if ignored or not file.is_file():
+            continue
+        if besides is not None and file.is_relative_to(besides):
             continue
         digest.update(os.fsencode(inside.as_posix()) + f"\0{_sha256(file)}\n".encode())
     return digest.hexdigest()

@@ -38,6 +38,10 @@ class MessageError(ValueError):
         super().__init__(text)
 
 
+class UnknownField(MessageError):
+    """The message has no such field."""
+
+
 def read_message(
     value: Mapping[str, Any], interface: str, find: Find, drawn: Mapping[str, float]
 ) -> dict[str, Any]:
@@ -123,7 +127,7 @@ class _Reader:
                 listed = f" It has: {', '.join(fields) or 'none'}."
                 advice = did_you_mean(name, fields) or listed
                 text = f"{where} ({interface}) has no field {name!r}.{advice}"
-                raise MessageError(text, (*place, name))
+                raise UnknownField(text, (*place, name))
             found[name] = self._field(item, fields[name], (*place, name))
         return found
 

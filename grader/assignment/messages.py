@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.assignment.document import Place
-from grader.assignment.message import Find, MessageError, read_message
+from grader.assignment.message import Find, MessageError, UnknownField, read_message
 from grader.assignment.own_check import load_function
 from grader.assignment.stimulus import MCAP_SUFFIX, MOST_MESSAGES, Publish
 
@@ -25,12 +25,14 @@ class Given:
         value: Its fields as written.
         place: Where in the entry of the YAML it stands.
         label: Where else, such as ``cases.csv:3``; empty for the YAML itself.
+        heading: Where the names of its fields stand, if that is elsewhere.
         time_s: When it is due after the first, where the source tells.
     """
 
     value: Mapping[str, Any]
     place: Place
     label: str = ""
+    heading: str = ""
     time_s: float | None = None
 
 
@@ -81,9 +83,11 @@ def messages_of(
         try:
             value = read_message(given.value, publish.type, find, drawn)
         except MessageError as error:
-            label = f"{given.label}: " if given.label else ""
-            inside = error.place if not given.label else ()
-            raise StimulusError(f"{label}{error}", (*given.place, *inside)) from None
+            if not given.label:
+                raise StimulusError(str(error), (*given.place, *error.place)) from None
+            is_name = isinstance(error, UnknownField) and given.heading
+            label = given.heading if is_name else given.label
+            raise StimulusError(f"{label}: {error}", given.place) from None
         paced_s = number * (publish.every or 0.0)
         recorded_s = given.time_s if publish.every is None else None
         found.append(Due(value, paced_s if recorded_s is None else recorded_s))
@@ -167,7 +171,7 @@ def _from_csv(file: Path, publish: Publish) -> list[Given]:
                     raise StimulusError(text, ("from",))
                 # An empty cell leaves its field out, so that rows may have arrays of any length.
                 value = {name.strip(): cell.strip() for name, cell in row.items() if cell}
-                found.append(Given(value, ("from",), label))
+                found.append(Given(value, ("from",), label, f"{publish.from_}:1"))
     except (csv.Error, UnicodeDecodeError) as error:
         raise StimulusError(f"{publish.from_} is not a CSV file: {error}", ("from",)) from error
     return found
@@ -194,7 +198,7 @@ def _from_mcap(file: Path, publish: Publish) -> list[Given]:
             one.value,
             ("from",),
             f"{publish.from_}: message {number}",
-            (one.received_ns - begin_ns) * _NS,
+            time_s=(one.received_ns - begin_ns) * _NS,
         )
         for number, one in enumerate(messages)
     ]

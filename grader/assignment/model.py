@@ -11,11 +11,12 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from grader.assignment.limits import LimitOptions
+from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.assignment.name import (
     Durability,
     Id,
     InterfaceName,
+    LibraryName,
     Namespace,
     NodeName,
     PackageName,
@@ -185,8 +186,8 @@ class Until(Model):
     )
     quiet: Duration | None = Field(
         None,
-        description="No message on any recorded topic for so long, and every timer that the "
-        "process declared has had the time to fire.",
+        description="No message on any recorded topic for so long, nor one of a stimulus that has "
+        "an end, and every timer that the process declared has had the time to fire.",
     )
     elapsed: Duration | None = Field(None, description="So long since the first match.")
     at_rest: Duration | None = Field(
@@ -295,6 +296,15 @@ class Assignment(Model):
     packages: tuple[Package, ...] = Field(min_length=1, description="What is handed in.")
     limits: LimitOptions = Field(
         default_factory=LimitOptions, description="What the student's processes may take."
+    )
+    build_limits: BuildLimitOptions = Field(
+        default_factory=BuildLimitOptions, description="What the build of a submission may take."
+    )
+    libraries: tuple[LibraryName, ...] = Field(
+        (),
+        description="Python libraries that students may import besides the standard library, ROS "
+        "and numpy, by the names that pip knows, such as `[scipy, pillow]`. In a sandbox no other "
+        "is there; on the machine that grades they must be installed.",
     )
     scenarios: tuple[Scenario, ...] = Field((), description="The runs.")
     checks: tuple[CheckSpec, ...] = Field(min_length=1, description="What is judged.")

@@ -1,4 +1,4 @@
-"""Rules for names: ids of ours, and names of ROS (REP-144, the ROS 2 topic name design).
+"""Rules for names: ids of ours, Python's, and ROS's (REP-144, the ROS 2 topic name design).
 
 Sources: https://ros.org/reps/rep-0144.html,
 https://design.ros2.org/articles/topic_and_service_names.html
@@ -14,6 +14,7 @@ from pydantic import AfterValidator, WithJsonSchema
 ID = r"[a-z][a-z0-9_]*"
 TOPIC = r"(/[A-Za-z_][A-Za-z0-9_]*)+"
 NODE = r"[A-Za-z_][A-Za-z0-9_]*"
+LIBRARY = r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?"
 INTERFACE = r"[a-z][a-z0-9_]*/(msg|srv|action)/[A-Z][A-Za-z0-9]*"
 
 
@@ -91,6 +92,22 @@ def interface_name(name: str) -> str:
     return name
 
 
+def library_name(name: str) -> str:
+    """The name of a Python distribution, as pip knows it.
+
+    Source: https://packaging.python.org/en/latest/specifications/name-normalization/
+
+    Raises:
+        ValueError: It has another form, such as a module's with a dot, or a version.
+    """
+    if not re.fullmatch(LIBRARY, name):
+        raise ValueError(
+            f"{name!r} is not the name of a Python library, such as 'scipy': letters, digits, "
+            "'-', '_' and '.', without a version"
+        )
+    return name
+
+
 def _form(pattern: str, words: str) -> WithJsonSchema:
     """The rule for a name, for editors and for the documentation."""
     return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$", "x-words": words})
@@ -107,6 +124,9 @@ InterfaceName = Annotated[
     str,
     AfterValidator(interface_name),
     _form(INTERFACE, "interface, such as `geometry_msgs/msg/Twist`"),
+]
+LibraryName = Annotated[
+    str, AfterValidator(library_name), _form(LIBRARY, "Python library, such as `scipy`")
 ]
 
 Reliability = Literal["reliable", "best_effort"]

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from grader.assignment.asking import Asking, CallService, ReadParameters, SendGoal, SetParameters
+from grader.assignment.asking import Asking, CallService, SendGoal, SetParameters
 from grader.assignment.document import Place
 from grader.assignment.drawing import fill_in
 from grader.assignment.message import Find, MessageError, read_message
@@ -68,14 +68,12 @@ def values_of(settings: SetParameters, drawn: Mapping[str, float]) -> dict[str, 
     }
 
 
-def mistakes(
-    item: Asking, find: Find | None, drawn: Mapping[str, float]
-) -> Iterator[tuple[Place, str]]:
+def mistakes(item: Asking, find: Find, drawn: Mapping[str, float]) -> Iterator[tuple[Place, str]]:
     """What does not fit in a stimulus, as far as it can be told here.
 
     Args:
         item: The entry of the YAML.
-        find: Finds definitions; None where ROS is not installed.
+        find: Finds definitions.
         drawn: Random values of the scenario.
 
     Yields:
@@ -89,16 +87,14 @@ def mistakes(
     try:
         if isinstance(item, SetParameters):
             values_of(item, drawn)
-        elif isinstance(item, CallService) and find is not None:
+        elif isinstance(item, CallService):
             requests_of(item, find, drawn)
-        elif isinstance(item, SendGoal) and find is not None:
+        elif isinstance(item, SendGoal):
             goal_of(item, find, drawn)
-        else:
-            assert find is None or isinstance(item, ReadParameters)
     except StimulusError as error:
         yield error.place, str(error)
     except KeyError:
-        # Of a package that the student hands in, perhaps.
+        # Of a package that is not installed here.
         return
 
 

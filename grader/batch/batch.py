@@ -21,6 +21,7 @@ from grader.errors import RosgradeError, UsageError
 from grader.recording.fact import to_json
 from grader.report.facts import Clock
 from grader.report.files import write_whole
+from grader.report.grade_part import grade_json
 from grader.report.result_model import Result
 from grader.submission.prepare import fingerprint
 
@@ -166,7 +167,7 @@ class Batch:
     def _copy(self, key: str, twin: Entry) -> None:
         """Give the same submission of somebody else the same result, under its own name."""
         known, original = self.ledger.result(twin.key), self.ledger.result(key)
-        if known and original and _verdict(known) == _verdict(original):
+        if known and original and grade_json(known) == grade_json(original):
             return
         found = find(self.ledger.folder(key))
         record = replace(found.submission, id=twin.key)
@@ -184,11 +185,6 @@ class Batch:
     def _write(self) -> None:
         assignment = self.loaded.assignment.id
         self.ledger.write(self._entries.values(), assignment, self.loaded.sha256)
-
-
-def _verdict(result: Result) -> tuple[object, ...]:
-    checks = tuple((check.id, check.status, check.points) for check in result.checks)
-    return (result.assignment.sha256, result.submission.sha256, checks)
 
 
 def _link(file: Path, target: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader import __version__
@@ -16,8 +16,11 @@ from grader.report.foxglove import LAYOUT_FILE, render_layout
 from grader.report.html import render_report
 from grader.report.result import write_result
 from grader.report.result_model import Result
+from grader.report.student import grade_for_student
 
 REPORT_FILE = "report.html"
+STUDENT_FILE = "student-report.html"
+"""The report without hidden checks; only where there are some."""
 RESULT_FILE = "result.json"
 INSTALL_FOLDER = "install"
 
@@ -63,6 +66,8 @@ def write_graded(
 def write_report(graded: Graded, folder: Path, facts: RunFacts) -> Path:
     """Write ``report.html``, and a Foxglove layout beside the recordings.
 
+    Where checks are hidden, the copy that a student may see is written too.
+
     Args:
         graded: What was graded.
         folder: Of the report.
@@ -76,7 +81,18 @@ def write_report(graded: Graded, folder: Path, facts: RunFacts) -> Path:
         write_whole(folder / RECORDINGS_FOLDER / LAYOUT_FILE, layout)
     report = folder / REPORT_FILE
     write_whole(report, render_report(graded.grade, graded.recordings, facts, graded.references))
+    _write_student_copy(graded, folder / STUDENT_FILE, facts)
     return report
+
+
+def _write_student_copy(graded: Graded, file: Path, facts: RunFacts) -> None:
+    grade = grade_for_student(graded.grade)
+    if grade is graded.grade:
+        file.unlink(missing_ok=True)
+        return
+    # The recordings stay with whoever grades.
+    facts = replace(facts, recordings={})
+    write_whole(file, render_report(grade, graded.recordings, facts, graded.references))
 
 
 def keep_install(graded: Graded, folder: Path) -> Path | None:

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from grader.assignment.limits import BuildLimitOptions
 from grader.assignment.load import LoadedAssignment
 from grader.batch.reference_run import read_references
 from grader.batch.type_support import TypeSupport
@@ -20,7 +21,10 @@ from grader.report.files import write_whole
 from grader.report.replay import Replay
 from grader.run.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
-from grader.submission.prepare import Prepared, prepare
+from grader.sandbox.python_tree import check_installed
+from grader.submission.bounded import OutputLimits
+from grader.submission.build import BuildLimits
+from grader.submission.prepare import Prepared, PrepareLimits, prepare
 
 RECORDINGS_FOLDER = "recordings"
 SUBMISSION_FILE = "submission.json"
@@ -69,11 +73,16 @@ class Grading:
             runner: Runs the cells.
             cache: Folder of cached builds.
             seed: Base of all seeds instead of the submission's hash.
+
+        Raises:
+            GraderFault: A library that the assignment allows is not installed here.
         """
         self._loaded = loaded
         self._runner = runner
         self._cache = cache
         self._seed = seed
+        check_installed(loaded.assignment.libraries)
+        self._prepare_limits = _prepare_limits(loaded.assignment.build_limits)
         self._type_support = TypeSupport(loaded, runner.ros, cache)
         self._scenarios = loaded.assignment.scenarios
         self._builds = threading.BoundedSemaphore(cpu_count())
@@ -101,14 +110,16 @@ class Grading:
             GraderFault: The build could not be tried.
         """
         self._type_support.prefixes(on_build)
+        sandbox = self._runner.sandbox
         # Each of them takes a CPU or more; beyond that they would only hold up each other.
         with self._builds:
             prepared = prepare(
                 path,
                 self._runner.ros,
                 cache=self._cache,
+                limits=self._prepare_limits,
                 on_progress=on_build,
-                sandbox=self._runner.sandbox,
+                sandbox=sandbox and sandbox.allowing(self._loaded.assignment.libraries),
                 stop=self._stop,
                 on_output=on_output,
             )
@@ -206,3 +217,11 @@ class Grading:
             alone=alone,
         )
         return read_recording(file)
+
+
+def _prepare_limits(options: BuildLimitOptions) -> PrepareLimits:
+    room = options.limits()
+    limits = BuildLimits(output=OutputLimits(total=room.output_bytes), room=room)
+    if options.wall_time is not None:
+        limits = replace(limits, python_s=options.wall_time, other_s=options.wall_time)
+    return PrepareLimits(build=limits)

@@ -18,6 +18,9 @@ from grader.assignment.mutant import Change, Mutant, Verdict, expected_statuses,
 from grader.assignment.mutation import apply, load_mutants
 from grader.batch.grading import Graded, Grading
 from grader.checks.finding import Status
+from grader.report.facts import RunFacts
+from grader.report.grade_part import grade_json
+from grader.report.result import make_result
 
 REFERENCE = "reference"
 
@@ -49,17 +52,23 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """How a trial went.
+    """How a trial went, without its recordings: an assignment has a hundred trials and more.
 
     Attributes:
         trial: Which.
         verdict: How the checks ended against how they must.
-        graded: Everything that was found.
+        lost: Ids of the checks that failed.
+        graded: Whether all could be judged.
+        repeated: Whether a scenario was run more than once.
+        grade: As :func:`grader.report.grade_part.grade_json` writes it.
     """
 
     trial: Trial
     verdict: Verdict
-    graded: Graded
+    lost: tuple[str, ...]
+    graded: bool
+    repeated: bool
+    grade: str
 
 
 def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Trial, ...]:
@@ -100,7 +109,12 @@ def write_submission(trial: Trial, reference: Path, folder: Path) -> Path:
 
 
 def run_trial(
-    trial: Trial, loaded: LoadedAssignment, grading: Grading, reference: Path, folder: Path
+    trial: Trial,
+    loaded: LoadedAssignment,
+    grading: Grading,
+    reference: Path,
+    folder: Path,
+    on_graded: Callable[[Graded], None] = lambda _: None,
 ) -> TrialResult:
     """Grade one trial.
 
@@ -110,15 +124,24 @@ def run_trial(
         grading: Grades it.
         reference: Folder of the reference solution.
         folder: For the submission and its recordings.
+        on_graded: Told everything that was found, which is not kept.
     """
     submission = write_submission(trial, reference, folder / "submissions")
     graded = grading.grade(submission, folder / "recordings" / trial.id)
+    on_graded(graded)
     actual = {result.id: result.status for result in graded.grade.results}
     if trial.change is None:
         expected = dict.fromkeys(actual, Status.PASSED)
     else:
         expected = expected_statuses(loaded.assignment, trial.change)
-    return TrialResult(trial, verdict(expected, actual), graded)
+    return TrialResult(
+        trial=trial,
+        verdict=verdict(expected, actual),
+        lost=tuple(name for name, status in actual.items() if status is Status.FAILED),
+        graded=graded.grade.graded,
+        repeated=any(count > 1 for count in graded.runs.values()),
+        grade=grade_json(make_result(graded.grade, graded.recordings, RunFacts("", 0.0))),
+    )
 
 
 def selftest(
@@ -129,6 +152,7 @@ def selftest(
     reference: Path | None = None,
     chosen: Callable[[Trial], bool] = lambda _: True,
     on_start: Callable[[Trial], None] = lambda _: None,
+    on_graded: Callable[[Graded], None] = lambda _: None,
 ) -> Iterator[TrialResult]:
     """Run every trial of an assignment.
 
@@ -139,6 +163,7 @@ def selftest(
         reference: Folder of the reference solution, by default rosgrade's own.
         chosen: Leaves trials out.
         on_start: Told when a trial begins.
+        on_graded: Told everything that was found of a trial, which is not kept.
 
     Yields:
         Results as they come.
@@ -149,7 +174,7 @@ def selftest(
 
         def work(trial: Trial) -> TrialResult:
             on_start(trial)
-            return run_trial(trial, loaded, grading, base, folder)
+            return run_trial(trial, loaded, grading, base, folder, on_graded)
 
         with ThreadPoolExecutor(max_workers=jobs) as pool:
             futures = [

@@ -7,13 +7,11 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from grader.assignment.interfaces import FOLDER
 from grader.assignment.load import LoadedAssignment
 from grader.ros import RosInstallation
 from grader.submission.build_cache import BuildCache
 from grader.submission.underlay import completed, install_prefix
-
-INTERFACES_FOLDER = "interfaces"
-"""Beside ``assignment.yaml``: our copy of the interface packages that the student writes."""
 
 _WORD = re.compile(r"\w+")
 
@@ -53,7 +51,7 @@ class TypeSupport:
         cache = BuildCache(self._cache)
         named = _WORD.findall(self._loaded.assignment.model_dump_json())
         ros = completed(self._ros, named, cache, on_build)
-        own = self._loaded.folder / INTERFACES_FOLDER
+        own = self._loaded.folder / FOLDER
         if not own.is_dir():
             return ros.underlays
         return (install_prefix(own, ros, cache, on_build), *ros.underlays)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
 from watchfiles import Change, watch
 
+from grader.assignment.load import folder_sha256
 from grader.batch.grading import Graded
 from grader.errors import GraderFault, RosgradeError
 from grader.submission.members import is_left_out
@@ -63,6 +64,14 @@ class Ended:
 
 
 @dataclass(frozen=True)
+class _State:
+    """What is there, as hashes."""
+
+    submission: str
+    assignment: str
+
+
+@dataclass(frozen=True)
 class _Saved:
     """A file was saved."""
 
@@ -85,16 +94,20 @@ class _Done:
 class Watching:
     """Grades at first and then at every change, until the one who iterates has enough."""
 
-    def __init__(self, submission: Path, report: Path, worker: Worker) -> None:
+    def __init__(
+        self, submission: Path, report: Path, worker: Worker, assignment: Path | None = None
+    ) -> None:
         """Set up; nothing is watched yet.
 
         Args:
             submission: A folder, or an archive that may be replaced.
             report: Whatever is written below it is no change.
             worker: Grades.
+            assignment: Folder of the assignment, which may be saved too.
         """
         self._submission = submission
         self._report = report.resolve()
+        self._assignment = assignment.resolve() if assignment is not None else None
         self._worker = worker
         self._told: queue.SimpleQueue[_Saved | _Blind | _Done] = queue.SimpleQueue()
         self._stop = threading.Event()
@@ -109,23 +122,29 @@ class Watching:
         Raises:
             GraderFault: The files cannot be watched.
         """
-        watching = threading.Thread(target=self._watch, name="watch", daemon=True)
-        watching.start()
+        watching = [
+            threading.Thread(target=look, name="watch", daemon=True)
+            for look in (self._watch_submission, self._watch_assignment)
+        ]
+        for thread in watching:
+            thread.start()
         try:
             while True:
-                sha256 = self._fingerprint()
+                state = self._fingerprint()
                 yield Began()
                 self._begin()
-                event = self._await_end(sha256)
+                event = self._await_end(state)
                 yield event
                 if isinstance(event, Ended):
                     # It may have been saved between the look at it and the copy that was graded.
                     graded = event.graded
-                    self._await_other(graded.prepared.record.sha256 if graded else sha256)
+                    sha256 = graded.prepared.record.sha256 if graded else state.submission
+                    self._await_other(replace(state, submission=sha256))
         finally:
             self._stop.set()
             self._cancel()
-            watching.join()
+            for thread in watching:
+                thread.join()
 
     def _begin(self) -> None:
         self._worker.begin()
@@ -138,7 +157,7 @@ class Watching:
         except BaseException as error:
             self._told.put(_Done(error=error))
 
-    def _await_end(self, sha256: str) -> Cancelled | Ended:
+    def _await_end(self, state: _State) -> Cancelled | Ended:
         """Wait for the end of the grading, or for another content, which ends it."""
         assert self._grading is not None
         while True:
@@ -149,18 +168,18 @@ class Watching:
                 if told.error is not None and not isinstance(told.error, RosgradeError):
                     raise told.error
                 return Ended(told.graded, told.error)
-            if self._fingerprint() != sha256:
+            if self._fingerprint() != state:
                 self._cancel()
                 return Cancelled()
 
-    def _await_other(self, sha256: str) -> None:
-        while self._fingerprint() == sha256:
+    def _await_other(self, state: _State) -> None:
+        while self._fingerprint() == state:
             self._next()
 
     def _next(self) -> _Saved | _Done:
         told = self._told.get()
         if isinstance(told, _Blind):
-            raise GraderFault(f"{self._submission} cannot be watched: {told.error}")
+            raise GraderFault(f"the files cannot be watched: {told.error}")
         return told
 
     def _cancel(self) -> None:
@@ -173,14 +192,31 @@ class Watching:
         while not self._told.empty():
             self._told.get()
 
-    def _fingerprint(self) -> str:
+    def _fingerprint(self) -> _State:
         """What is there now; nothing where it cannot be read, as in the middle of a save."""
         try:
-            return fingerprint(self._submission)
+            submission = fingerprint(self._submission)
         except RosgradeError:
-            return ""
+            submission = ""
+        try:
+            folder = self._assignment
+            assignment = folder_sha256(folder, self._report) if folder is not None else ""
+        except RosgradeError:
+            assignment = ""
+        return _State(submission, assignment)
 
-    def _watch(self) -> None:
+    def _watch_assignment(self) -> None:
+        folder = self._assignment
+        if folder is None:
+            return
+
+        def concerns(_: Change, path: str) -> bool:
+            changed = Path(path)
+            return not changed.is_relative_to(self._report)
+
+        self._watch(folder, concerns, recursive=True)
+
+    def _watch_submission(self) -> None:
         is_folder = self._submission.is_dir()
         root = self._submission.resolve() if is_folder else self._submission.resolve().parent
         name = self._submission.resolve().name
@@ -193,6 +229,11 @@ class Watching:
                 return changed.name == name
             return not is_left_out(changed.relative_to(root).as_posix())
 
+        self._watch(root, concerns, recursive=is_folder)
+
+    def _watch(
+        self, root: Path, concerns: Callable[[Change, str], bool], *, recursive: bool
+    ) -> None:
         try:
             for _ in watch(
                 root,
@@ -200,7 +241,7 @@ class Watching:
                 debounce=_LONGEST_MS,
                 step=_SETTLED_MS,
                 stop_event=self._stop,
-                recursive=is_folder,
+                recursive=recursive,
                 raise_interrupt=False,
             ):
                 self._told.put(_Saved())

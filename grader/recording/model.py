@@ -333,6 +333,8 @@ class Disturbance:
         late_ns: How much later the probe's metronome woke up than it asked to.
         waited_ns: How long threads of the student that were ready to run had to wait for a
             CPU (the kernel's run delay, /proc/PID/schedstat), the worst thread.
+
+    Of both only what others than the student's own processes can have taken.
     """
 
     time_ns: int

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording, Wait
+from grader.run.descendants import Family
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.domain import joined_domains
 from grader.run.ending import EndingConditions
@@ -60,7 +61,7 @@ class Cell:
                 lambda: self._students.inits,
                 lambda: self._output.written_bytes,
             )
-        self._meter = DisturbanceMeter(lambda: self._students.pids)
+        self._meter = DisturbanceMeter(Family(os.getpid()).look)
         self._graph = GraphObserver(
             probe.node,
             lambda: self._students.pids,

@@ -44,6 +44,35 @@ def descendants(of: int) -> dict[int, str]:
     return found
 
 
+class Family:
+    """The descendants of a process, for those who ask often: only new processes are read."""
+
+    def __init__(self, of: int) -> None:
+        """Nothing is known yet.
+
+        Args:
+            of: Id of the process; it adopts orphans of its descendants.
+        """
+        self._of = of
+        self._members: set[int] = set()
+        self._others: set[int] = set()
+
+    def look(self) -> frozenset[int]:
+        """Ids of those that live now."""
+        present = {int(name) for name in os.listdir("/proc") if name.isdigit()}  # noqa: PTH208
+        self._members &= present
+        self._others &= present
+        parents = {pid: _living_parent(str(pid)) for pid in present - self._members - self._others}
+        while new := {pid for pid, parent in parents.items() if self._is_member(parent)}:
+            self._members |= new
+            parents = {pid: parent for pid, parent in parents.items() if pid not in new}
+        self._others |= parents.keys()
+        return frozenset(self._members)
+
+    def _is_member(self, pid: int | None) -> bool:
+        return pid == self._of or pid in self._members
+
+
 def _living_parent(pid: str) -> int | None:
     """Parent of a process, or None for one that has ended or is a zombie."""
     try:

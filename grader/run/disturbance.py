@@ -4,6 +4,9 @@ Two instruments: a metronome, a thread that asks to be woken every 20 ms and not
 it was; and the kernel's run delay of each thread of the student, the time it was ready to
 run but had no CPU (second number of /proc/PID/task/TID/schedstat, see "sched-stats" in the
 kernel's documentation). A verdict that this could explain is not held against anybody.
+
+Of both only what others than the student's processes can explain is counted (see
+:mod:`grader.run.cpu_use`): who keeps the CPUs from himself was not disturbed.
 """
 
 from __future__ import annotations
@@ -11,32 +14,48 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable
 
 from grader.recording.model import NS, Disturbance
+from grader.run.cpu_use import CpuMeter, CpuTimes, Interval, interval, others_share
 
 _TICK_S = 0.02
 _TICKS_PER_SAMPLE = 5
+_STARTING = 3
+_SAMPLES_PER_LOOK = 10
+"""Processes are looked for in the first samples, and in one of so many of the others."""
+_TRIFLE_NS = 2_000_000
+"""A wait in one sample that nobody has to explain."""
+_KEPT = 100
+"""Samples of CPU times that are kept, for waits that were long."""
 
 
 class DisturbanceMeter:
     """Samples the disturbance every 100 ms from a thread of its own."""
 
-    def __init__(self, pids: Callable[[], Iterable[int]]) -> None:
+    def __init__(self, pids: Callable[[], Iterable[int]], cpu: CpuMeter | None = None) -> None:
         """Prepare the meter.
 
         Args:
             pids: The student's processes at the moment.
+            cpu: Of this machine.
         """
         self._pids = pids
+        self._known: tuple[int, ...] = ()
+        self._number = 0
         self._delays: dict[int, int] = {}
         self._samples: list[Disturbance] = []
         self._taken_ns = 0
+        self._cpu = cpu or CpuMeter()
+        self._times: CpuTimes | None = None
+        self._intervals: deque[Interval] = deque(maxlen=_KEPT)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="metronome", daemon=True)
 
     def start(self) -> None:
         """Begin to measure."""
+        self._times = self._cpu.read(self._pids())
         self._thread.start()
 
     def stop(self) -> tuple[Disturbance, ...]:
@@ -68,14 +87,28 @@ class DisturbanceMeter:
                 worst_ns = 0
 
     def _sample(self, late_ns: int) -> None:
+        looks = self._number < _STARTING or self._number % _SAMPLES_PER_LOOK == 0
+        self._number += 1
+        if looks:
+            self._known = tuple(self._pids())
         waited_ns = 0
-        for pid in self._pids():
+        for pid in self._known:
             for thread, delay_ns in run_delays(pid).items():
                 before_ns = self._delays.get(thread, 0)
                 self._delays[thread] = delay_ns
                 waited_ns = max(waited_ns, delay_ns - before_ns)
+        if looks or waited_ns + late_ns > _TRIFLE_NS:
+            self._read_cpu_times()
+            waited_ns = others_share(waited_ns, self._intervals)
+            late_ns = others_share(late_ns, self._intervals)
         self._taken_ns += waited_ns + late_ns
         self._samples.append(Disturbance(time.time_ns(), late_ns, waited_ns))
+
+    def _read_cpu_times(self) -> None:
+        times = self._cpu.read(self._known)
+        if self._times is not None:
+            self._intervals.append(interval(self._times, times, self._cpu.cpus))
+        self._times = times
 
 
 def run_delays(pid: int) -> dict[int, int]:

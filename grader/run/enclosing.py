@@ -20,7 +20,7 @@ from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.limits import Limits
 from grader.sandbox.namespaces import CELL, STUDENT
-from grader.sandbox.sandbox import TREE, Sandbox, hide
+from grader.sandbox.sandbox import TREES, Sandbox, hide
 
 _UID = 1000
 _TRACER = Path("/opt/tracer")
@@ -79,12 +79,16 @@ def enclose(
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},
         ),
-        facts={**order.facts, "sandbox": sandbox.description},
+        facts={
+            **order.facts,
+            "sandbox": sandbox.description,
+            "libraries": " ".join(sorted({"numpy", *sandbox.libraries})),
+        },
     )
 
 
 def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) -> list[str]:
-    python = sandbox.student_view(ros, TREE)
+    python = sandbox.student_view(ros, TREES)
     disk, shared = STUDENT / "disk", STUDENT / "shared"
     writable = (
         Bind(disk / "tmp", Path("/tmp"), writable=True),

@@ -70,9 +70,8 @@ class EndingConditions:
         return bool(conditions) and all(conditions)
 
     def _quiet_s(self, watch: Stopwatch) -> float:
-        last_ns = self._probe.last_message_ns
-        if last_ns is None:
-            return watch.elapsed_s
+        """Since the last message of the student's, and of ours, to which one may be the answer."""
+        last_ns = max(self._probe.last_message_ns or 0, self._player.last_ns or 0)
         return min(watch.elapsed_s, (time.time_ns() - last_ns) / NS)
 
     def _longest_silence_s(self, quiet_s: float) -> float:

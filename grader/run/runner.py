@@ -372,7 +372,8 @@ class Runner:
         if self.sandbox is None:
             return order
         limits = (scenario.limits or assignment.limits).limits()
-        return enclose(order, folder, self.sandbox, ros, install, limits)
+        sandbox = self.sandbox.allowing(assignment.libraries)
+        return enclose(order, folder, sandbox, ros, install, limits)
 
     def command(
         self, launch: Launch, default_package: str, install: Path, values: dict[str, float]

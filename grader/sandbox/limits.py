@@ -54,6 +54,7 @@ class Limits:
         ]
 
 
+BUILD_OUTPUT_BYTES = 64 * MIB
 BUILD = Limits(
     memory_bytes=2048 * MIB,
     processes=128,
@@ -62,5 +63,6 @@ BUILD = Limits(
     disk_bytes=1024 * MIB,
     files=40_000,
     address_bytes=8192 * MIB,
+    output_bytes=BUILD_OUTPUT_BYTES,
 )
 """Of a build: compilers take more than nodes."""

@@ -2,55 +2,181 @@
 
 rosgrade, its libraries and ROS's wheels share one environment. In a sandbox another one is
 mounted in its place, of the same files (hard links, or copies where links are not possible),
-that holds only what a machine with ROS and colcon has. It is made once and kept in the cache.
+that holds only what a machine with ROS and colcon has, and the libraries that the assignment
+allows. It is made once and kept in the cache, ``python/<key>/``. Whoever uses one holds a shared
+lock on ``<key>.lock``; what nobody uses is thrown away when it is old, or one of too many.
 """
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import hashlib
 import os
 import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Collection, Iterable
+import time
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from grader.errors import GraderFault
+from grader.nearest import did_you_mean
+
 VERSION = 1
+KEPT = 4
+"""Trees that nobody uses at the moment; each holds up to 0.3 GB where ROS was updated since."""
+AGE_S = 30 * 24 * 3600.0
+"""A tree goes when it was not used for so long."""
+
 _ROOTS = re.compile(r"ros-.*|colcon-.*|setuptools|numpy|pyyaml|lark|empy")
 _NAME = re.compile(r"[A-Za-z0-9._-]+")
+_LOCK = ".lock"
+_UNFINISHED = ".unfinished-"
+_STALE_S = 3600.0
+_READABLE = 0o555
+
+
+@dataclass(frozen=True)
+class PythonTree:
+    """An environment that is held: it stays as long as this object, or its process.
+
+    Attributes:
+        path: Its folder.
+        lock: Descriptor of the lock.
+    """
+
+    path: Path
+    lock: int
+
+    def __del__(self) -> None:
+        """Let it go."""
+        os.close(self.lock)
+
+
+def trees_folder(cache: Path) -> Path:
+    """Where all environments are; made if it is not there."""
+    folder = cache / "python"
+    folder.mkdir(parents=True, exist_ok=True)
+    # Whoever runs in a sandbox is another user, where rosgrade runs as root.
+    if folder.stat().st_mode & _READABLE != _READABLE:
+        folder.chmod(0o755)
+    return folder
 
 
 def student_prefix(
     cache: Path, libraries: Collection[str] = (), prefix: Path = Path(sys.prefix)
-) -> Path:
-    """The environment's folder, made if it is not there.
+) -> PythonTree:
+    """The environment, made if it is not there.
 
     Args:
         cache: rosgrade's cache folder.
         libraries: Distributions that the assignment allows besides.
         prefix: The environment that rosgrade runs in.
+
+    Raises:
+        GraderFault: A library is not installed here.
     """
-    parts = [str(VERSION), str(prefix), sys.executable, sys.version, *sorted(libraries)]
+    check_installed(libraries)
+    wanted = {_normal(name) for name in libraries}
+    parts = [str(VERSION), str(prefix), sys.executable, sys.version, *sorted(wanted)]
     # Their folders are named by distribution and version; to read them all takes 0.1 s.
     parts += sorted(path.name for path in prefix.glob("lib/python3*/site-packages/*-info"))
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-    target = cache / "python" / key
+    target = trees_folder(cache) / key
+    tree = PythonTree(target, _hold(target))
     if not target.is_dir():
-        target.parent.mkdir(parents=True, exist_ok=True)
-        _make(target, prefix, _closure(set(map(_normal, libraries))).values())
-    return target
+        _make(target, prefix, _closure(wanted).values())
+        prune(target.parent)
+    with contextlib.suppress(OSError):
+        os.utime(target)
+    return tree
+
+
+def check_installed(libraries: Collection[str]) -> None:
+    """See that what an assignment allows is there to be imported.
+
+    Raises:
+        GraderFault: It is not.
+    """
+    if not libraries:
+        return
+    installed = set(_installed())
+    for name in libraries:
+        if _normal(name) not in installed:
+            raise GraderFault(
+                f"the assignment allows the library {name!r}, which is not installed here."
+                f"{did_you_mean(name, sorted(installed))} To install it: "
+                f"{sys.executable} -m pip install {name}"
+            )
+
+
+def prune(folder: Path, kept: int = KEPT, age_s: float = AGE_S) -> None:
+    """Throw away environments that nobody uses.
+
+    Args:
+        folder: Of all environments.
+        kept: So many of those that were used last stay.
+        age_s: Those that were not used for so long do not stay in any case.
+    """
+    now_s = time.time()
+    trees: list[tuple[float, Path]] = []
+    for path in folder.iterdir():
+        with contextlib.suppress(OSError):
+            used_s = path.lstat().st_mtime
+            if path.name.startswith(_UNFINISHED):
+                if now_s - used_s > _STALE_S:
+                    shutil.rmtree(path, ignore_errors=True)
+            elif path.is_dir():
+                trees.append((used_s, path))
+    for number, (used_s, path) in enumerate(sorted(trees, reverse=True)):
+        if number >= kept or now_s - used_s > age_s:
+            with _unused(path) as unused:
+                if unused:
+                    # Renamed first: nobody finds a part of it.
+                    gone = path.with_name(f"{_UNFINISHED}{path.name}")
+                    with contextlib.suppress(OSError):
+                        path.rename(gone)
+                    shutil.rmtree(gone, ignore_errors=True)
+
+
+def _hold(target: Path) -> int:
+    lock = os.open(target.with_name(target.name + _LOCK), os.O_RDWR | os.O_CREAT, 0o600)
+    # Waits only while somebody throws it away.
+    fcntl.flock(lock, fcntl.LOCK_SH)
+    return lock
+
+
+@contextlib.contextmanager
+def _unused(path: Path) -> Iterator[bool]:
+    """Whether nobody holds an environment; nobody gets it meanwhile."""
+    # The file stays: who waits for its lock would else hold one that nobody looks at any more.
+    lock = os.open(path.with_name(path.name + _LOCK), os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            yield False
+        else:
+            yield True
+    finally:
+        os.close(lock)
 
 
 def _normal(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
+def _installed() -> dict[str, metadata.Distribution]:
+    return {_normal(item.metadata["Name"]): item for item in metadata.distributions()}
+
+
 def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:
     """Installed distributions by name: the roots, and all that they need."""
-    installed = {_normal(item.metadata["Name"]): item for item in metadata.distributions()}
+    installed = _installed()
     queue = [name for name in installed if _ROOTS.fullmatch(name) or name in libraries]
     found: dict[str, metadata.Distribution] = {}
     while queue:
@@ -66,7 +192,7 @@ def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:
 
 
 def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribution]) -> None:
-    unfinished = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=target.parent))
+    unfinished = Path(tempfile.mkdtemp(prefix=_UNFINISHED, dir=target.parent))
     try:
         unfinished.chmod(0o755)
         files = {file for item in distributions for file in _files(item, prefix)}

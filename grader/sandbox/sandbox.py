@@ -19,13 +19,13 @@ from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.limits import BUILD, MIB, Limits
 from grader.sandbox.namespaces import MOUNT_POINTS
-from grader.sandbox.python_tree import student_prefix
+from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
 from grader.sandbox.usage import descendants, folder_usage, memory_bytes, thread_count
 
 LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
 
-TREE = Path("/run/python")
-"""Where a cell finds the Python environment of students."""
+TREES = Path("/run/python")
+"""Where a cell finds the Python environments of students."""
 CODE = (Path(grader.__file__).resolve().parent, Path(sim.__file__).resolve().parent)
 
 _CELL_UID, _BUILD_UID = 2000, 1000
@@ -40,18 +40,27 @@ class Sandbox:
     """Starts things in it.
 
     Attributes:
-        cache: rosgrade's cache folder; the Python environment of students is kept in it.
+        cache: rosgrade's cache folder; the Python environments of students are kept in it.
         libraries: Distributions that students may import besides those of ROS.
     """
 
     cache: Path
     libraries: tuple[str, ...] = ()
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    _tree: PythonTree | None = field(default=None, repr=False)
+    _others: dict[tuple[str, ...], Sandbox] = field(default_factory=dict, repr=False)
 
     @property
     def description(self) -> str:
         """For the report."""
         return f"bwrap ({', '.join(LAYERS)})"
+
+    def allowing(self, libraries: tuple[str, ...]) -> Sandbox:
+        """The same sandbox for an assignment that allows these libraries."""
+        if libraries == self.libraries:
+            return self
+        with self._lock:
+            return self._others.setdefault(libraries, Sandbox(self.cache, libraries))
 
     @cached_property
     def filter_file(self) -> Path:
@@ -75,23 +84,30 @@ class Sandbox:
             Path(unfinished.name).replace(file)
         return file
 
-    @cached_property
+    @property
     def python_tree(self) -> Path:
-        """The Python environment of students."""
-        with self._lock:
-            return student_prefix(self.cache, self.libraries)
+        """The Python environment of students; it is not thrown away while this sandbox is used.
 
-    def student_view(self, ros: RosInstallation, tree: Path | None = None) -> list[Bind]:
+        Raises:
+            GraderFault: A library is not installed here.
+        """
+        with self._lock:
+            if self._tree is None:
+                self._tree = student_prefix(self.cache, self.libraries)
+            return self._tree.path
+
+    def student_view(self, ros: RosInstallation, trees: Path | None = None) -> list[Bind]:
         """What untrusted code sees of Python and ROS.
 
         Args:
             ros: The installation.
-            tree: Where :attr:`python_tree` is to be found.
+            trees: Where the folder of all :attr:`python_tree` is to be found.
         """
         own = Path(sys.prefix)
         binds = [Bind.same(path) for path in _python_and_ros(ros) if path != own]
         if _in_environment():
-            binds.append(Bind(tree or self.python_tree, own))
+            tree = self.python_tree
+            binds.append(Bind(trees / tree.name if trees else tree, own))
         return binds
 
     def nursery_command(
@@ -111,7 +127,7 @@ class Sandbox:
         """
         binds = [Bind.same(path) for path in _python_and_ros(ros)]
         binds += [Bind.same(path) for path in CODE if not _is_within(path, binds)]
-        binds += [Bind(self.python_tree, TREE), Bind.same(cells, writable=True)]
+        binds += [Bind(trees_folder(self.cache), TREES), Bind.same(cells, writable=True)]
         arguments = [*bubblewrap.namespaces(_CELL_UID), *bubblewrap.system(), "--tmpfs", "/tmp"]
         for place in MOUNT_POINTS:
             arguments += ["--dir", str(place)]
@@ -120,18 +136,21 @@ class Sandbox:
         return bubblewrap.launch(arguments, binds, last, command)
 
     @contextmanager
-    def build(self, ros: RosInstallation, folders: Sequence[Path]) -> Iterator[BuildRoom]:
+    def build(
+        self, ros: RosInstallation, folders: Sequence[Path], limits: Limits = BUILD
+    ) -> Iterator[BuildRoom]:
         """Let a part of a build write to folders.
 
         Args:
             ros: What it builds with.
             folders: What it may write to; the first is its working directory. They are ours
                 again afterwards.
+            limits: What it may take.
         """
         for folder in folders:
             bubblewrap.give(folder)
         try:
-            yield BuildRoom(self, ros, tuple(folders))
+            yield BuildRoom(self, ros, tuple(folders), limits)
         finally:
             for folder in folders:
                 bubblewrap.take_back(folder)

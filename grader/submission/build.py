@@ -7,35 +7,33 @@ business of a sandbox around them.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import re
 import shutil
 import threading
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.submission import buildlog
+from grader.sandbox.limits import BUILD, Limits
+from grader.submission import apart, buildlog
 from grader.submission.bounded import Outcome, OutputLimits, run_bounded
 from grader.submission.build_cache import INSTALL, BuildCache, CachedBuild
+from grader.submission.build_key import build_key
 from grader.submission.culprit import Sources, find_culprit, last_started
 from grader.submission.installed import site_packages, tidy
-from grader.submission.locate import Located
+from grader.submission.locate import Located, only
 from grader.submission.members import MIB
 from grader.submission.record import BuildRecord
 from grader.submission.rosdistro import PACKAGES
+from grader.submission.toolchain import check_headers, check_toolchain
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
-
-VERSION = 2
-"""Raise it when the same submission would now be built differently."""
 
 _CMAKE_INCLUDE = Path(__file__).with_name("wheels.cmake")
 _PROGRESS = re.compile(r"(Starting >>>|Finished <<<) (\S+)")
@@ -55,7 +53,8 @@ class BuildLimits:
         other_s: Wall time where one is not.
         install_bytes: Size of the install space.
         install_files: Number of files in it.
-        output: What is kept of the log.
+        output: What is kept of the log, and how much ends the build.
+        room: What it may take in a sandbox.
     """
 
     python_s: float = 120.0
@@ -63,6 +62,7 @@ class BuildLimits:
     install_bytes: int = 512 * MIB
     install_files: int = 20_000
     output: OutputLimits = field(default_factory=OutputLimits)
+    room: Limits = BUILD
 
 
 def build(
@@ -72,9 +72,10 @@ def build(
     *,
     only_python: bool,
     cache: BuildCache,
+    built_apart: Sequence[str] = (),
+    is_apart: bool = False,
     limits: BuildLimits | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
-    environ: Mapping[str, str] = os.environ,
     sandbox: Sandbox | None = None,
     stop: threading.Event | None = None,
     on_output: Callable[[str], None] = lambda _: None,
@@ -89,9 +90,10 @@ def build(
         only_python: All packages are ament_python.
         cache: Where builds are kept; failed ones too, but not those that were ended by the
             time limit.
+        built_apart: Packages that are built apart from the others, each of them kept as well.
+        is_apart: This is one of them.
         limits: What is too much.
         on_progress: Told in a few words what happens.
-        environ: The caller's environment.
         sandbox: What the build runs in, or None.
         stop: Ends the build from another thread when it is set.
         on_output: Called with each line of colcon's as it comes.
@@ -108,53 +110,58 @@ def build(
         ros,
         limits,
         only_python,
+        is_apart,
         wall_s,
         on_progress,
-        environ,
         sandbox,
         stop,
         on_output,
     )
-    key = build_key(located.sha256, ros, sandboxed=sandbox is not None)
+    alone = partial(
+        build,
+        ros=ros,
+        only_python=False,
+        cache=cache,
+        is_apart=True,
+        limits=limits,
+        on_progress=on_progress,
+        sandbox=sandbox,
+        stop=stop,
+    )
+    terms = [*_terms(limits, sandbox), *(["apart"] if is_apart else [])]
+    key = build_key(located.sha256, ros, sandboxed=sandbox is not None, terms=terms)
     on_progress("looking for an earlier build")
     with cache.locked(key, wait_s=wall_s + _COMPILE_S):
         found = cache.find(key)
         if found is not None:
             return found
+        parts = dict(_parts(located, sources, built_apart, alone))
         with cache.unfinished() as unfinished:
-            record = workshop.build(unfinished / INSTALL)
+            record = workshop.build(unfinished / INSTALL, parts)
             if record.timed_out:
                 return CachedBuild(record, None)
             return cache.store(key, unfinished, record)
 
 
-def build_key(sha256: str, ros: RosInstallation, *, sandboxed: bool = False) -> str:
-    """Name a build by everything that it depends on.
+def _parts(
+    located: Located,
+    sources: Sources,
+    names: Iterable[str],
+    build_alone: Callable[[Located, Sources], CachedBuild],
+) -> Iterator[tuple[str, CachedBuild]]:
+    """Build packages apart from the others, or take them from the cache.
 
-    Args:
-        sha256: The submission's hash.
-        ros: Installing or updating a package changes the times of its files.
-        sandboxed: What a sandbox refuses may fail a build.
+    One that does not build alone is left out: it is built with the others, which also tells the
+    student why it fails.
     """
-    watched = [prefix / "share/ament_index/resource_index/packages" for prefix in ros.prefixes]
-    watched += [ros.python, *site_packages_of(ros)]
-    parts = [
-        VERSION,
-        sha256,
-        ros.source,
-        ros.distro,
-        str(ros.python),
-        [str(prefix) for prefix in ros.prefixes],
-        [path.stat().st_mtime_ns for path in watched if path.exists()],
-        sorted(ros.packages),
-        *(["sandbox"] if sandboxed else []),
-    ]
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
-
-
-def site_packages_of(ros: RosInstallation) -> list[Path]:
-    """Folders that hold colcon and setuptools, as far as they come with this ROS."""
-    return [path for prefix in ros.prefixes for path in site_packages(prefix)]
+    for name in names:
+        folder = sources.folders[name]
+        with only(located, folder, name) as part:
+            files = {file.path for file in part.files}
+            built = build_alone(part, Sources(files, {name: name}))
+        if built.build.succeeded and built.install is not None:
+            log = apart.as_handed_in(built.build.log, name, folder)
+            yield name, replace(built, build=replace(built.build, log=log))
 
 
 @dataclass(frozen=True)
@@ -166,19 +173,24 @@ class _Workshop:
     ros: RosInstallation
     limits: BuildLimits
     only_python: bool
+    is_apart: bool
     wall_s: float
     on_progress: Callable[[str], None]
-    environ: Mapping[str, str]
     sandbox: Sandbox | None = None
     stop: threading.Event | None = None
     on_output: Callable[[str], None] = lambda _: None
 
-    def build(self, install: Path) -> BuildRecord:
+    def build(self, install: Path, parts: Mapping[str, CachedBuild]) -> BuildRecord:
         # Beside the copy, so that relative paths in the log are the same on every run.
         scratch = self.located.root.with_name("scratch")
         scratch.mkdir()
         environment = self._environment(scratch)
-        finished: set[str] = set()
+        for name, part in parts.items():
+            assert part.install is not None
+            apart.lay(name, part.install, install)
+            for line in part.build.log.splitlines():
+                self.on_output(line)
+        finished = set(parts)
         outcome = self._colcon_build(environment, scratch, install, finished)
         self._check_machine(outcome, scratch, install)
         problem = tidy(
@@ -186,6 +198,7 @@ class _Workshop:
         )
         problem = problem or _ended_by_us(outcome, self.wall_s)
         record = self._record(outcome, finished, problem, scratch, install)
+        record = _with_parts(record, parts.values())
         if finished:
             self._compile(environment, install, scratch)
         else:
@@ -212,8 +225,9 @@ class _Workshop:
         outcomes: list[Outcome] = []
         while True:
             command = self._command(environment, scratch, install)
-            if failed:
+            if failed or finished:
                 command += ["--packages-skip", *sorted(failed | finished)]
+            if failed:
                 command += ["--packages-skip-by-dep", *sorted(failed)]
             outcome = self._run(
                 command,
@@ -232,14 +246,14 @@ class _Workshop:
             failed = started - finished
 
     def _environment(self, scratch: Path) -> dict[str, str]:
-        environment = self.ros.environment(self.environ)
+        """Variables of a build; none of the caller's, on which what is kept would depend."""
+        environment = self.ros.environment({})
         for name in ("HOME", "TMPDIR", "COLCON_HOME"):
             folder = scratch / name.lower()
             folder.mkdir()
             environment[name] = str(folder)
         # Messages of CMake and the compiler are searched for whom to blame.
         environment["LC_ALL"] = "C.UTF-8"
-        environment.pop("XDG_RUNTIME_DIR", None)
         return environment
 
     def _command(self, environment: Mapping[str, str], scratch: Path, install: Path) -> list[str]:
@@ -250,8 +264,13 @@ class _Workshop:
         command += ["--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"]
         command += ["--base-paths", *folders]
         if not self.only_python:
+            check_toolchain(environment["PATH"])
             # Linters and test frameworks are not there to be found on a small installation.
             command += ["--cmake-args", "-DBUILD_TESTING=OFF"]
+            # Quicker than make, but stricter with rules that a student may have written; of these
+            # an interface package has none.
+            if self.is_apart and shutil.which("ninja", path=environment["PATH"]):
+                command += ["-GNinja"]
             if self.ros.source == "wheels":
                 # Where a sandbox shows it, too.
                 include = shutil.copy(_CMAKE_INCLUDE, scratch)
@@ -272,6 +291,7 @@ class _Workshop:
             free = min(shutil.disk_usage(path).free for path in (scratch, install.parent))
             if free < _LEAST_FREE_BYTES:
                 raise GraderFault("the disk is full: the submission could not be built")
+        check_headers(outcome.output)
         lacking = buildlog.missing_cmake_packages(outcome.output) & PACKAGES
         lacking -= self.ros.packages | set(self.sources.folders)
         if lacking:
@@ -334,7 +354,8 @@ class _Workshop:
         )
         if self.sandbox is None:
             return run(command, environment=environment, excess=self._watched())
-        with self.sandbox.build(self.ros, (scratch, self.located.root, install.parent)) as room:
+        folders = (scratch, self.located.root, install.parent)
+        with self.sandbox.build(self.ros, folders, self.limits.room) as room:
             return run(
                 room.command(command, environment),
                 environment=room.environment,
@@ -354,6 +375,16 @@ class _Workshop:
         return look
 
 
+def _terms(limits: BuildLimits, sandbox: Sandbox | None) -> list[str]:
+    """What else may decide whether a build succeeds, where it is not as usual."""
+    usual = BuildLimits()
+    terms = [repr(limits.output)] if limits.output != usual.output else []
+    if sandbox is not None:
+        terms += [repr(limits.room)] if limits.room != usual.room else []
+        terms += sorted(sandbox.libraries)
+    return terms
+
+
 def _is_cut_off(output: str) -> bool:
     """Whether colcon started a package and never said how that ended, nor why it stopped."""
     started = set(re.findall(r"^Starting >>> (\S+)", output, re.MULTILINE))
@@ -370,6 +401,16 @@ def _together(outcomes: Sequence[Outcome]) -> Outcome:
         ended_by_us=last.ended_by_us,
         output="".join(item.output for item in outcomes),
         duration_s=sum(item.duration_s for item in outcomes),
+    )
+
+
+def _with_parts(record: BuildRecord, parts: Iterable[CachedBuild]) -> BuildRecord:
+    """The record of a build together with what was built apart before."""
+    builds = [part.build for part in parts]
+    return replace(
+        record,
+        duration_s=round(record.duration_s + sum(one.duration_s for one in builds), 3),
+        log=buildlog.ending("".join(one.log for one in builds) + record.log),
     )
 
 

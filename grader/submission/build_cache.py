@@ -28,6 +28,8 @@ INSTALL = "install"
 
 _RECORD = "build.json"
 _UNFINISHED = ".unfinished-"
+_PRUNED = "pruned.stamp"
+_PRUNE_EACH_S = 600.0
 _LOCK_POLL_S = 0.05
 _STALE_S = 24 * 3600.0
 
@@ -161,8 +163,21 @@ class BuildCache:
                 (self._folder / key).rename(unfinished / "damaged")
             unfinished.rename(self._folder / key)
         shutil.rmtree(self._folder / key / "damaged", ignore_errors=True)
-        self.prune(keep=key)
+        if self._is_due():
+            self.prune(keep=key)
         return CachedBuild(build, self._folder / key / INSTALL if installed else None)
+
+    def _is_due(self) -> bool:
+        """Whether to look for old builds: in a batch not after every one, as that takes long."""
+        marker = self._folder / _PRUNED
+        try:
+            if time.time() - marker.stat().st_mtime < _PRUNE_EACH_S:
+                return False
+        except OSError:
+            pass
+        with contextlib.suppress(OSError):
+            marker.touch()
+        return True
 
     def prune(self, keep: str = "") -> None:
         """Throw away builds that are old, or the least recently used of too many."""

@@ -14,14 +14,14 @@ import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import GraderFault, SubmissionError, UsageError
 from grader.submission import archive
 from grader.submission.listing import Listing, SubmissionFile, find_packages, list_files
 from grader.submission.members import ArchiveLimits
-from grader.submission.paths import shown
+from grader.submission.paths import is_within, shown
 
 _CHUNK = 1024 * 1024
 _URL = re.compile(r"(https?|ssh|git|file|ftp):/|[\w.-]+@[\w.-]+:")
@@ -86,6 +86,34 @@ def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Lo
             packages=tuple(find_packages(file.path for file in listing.files)),
             skipped=tuple(listing.skipped),
         )
+
+
+@contextmanager
+def only(located: Located, folder: str, name: str) -> Iterator[Located]:
+    """Open one package of a submission for as long as the context lasts, without the others.
+
+    Args:
+        located: The submission.
+        folder: The package's folder; not the submission itself.
+        name: What the folder is called here, wherever it was.
+
+    Yields:
+        The package as if it had been handed in alone, with a copy of its own.
+
+    Raises:
+        GraderFault: This machine cannot hold the copy.
+    """
+    inside = [
+        replace(file, path=file.path[len(folder) + 1 :])
+        for file in located.files
+        if is_within(file.path, folder)
+    ]
+    with tempfile.TemporaryDirectory(prefix="apart-", dir=located.root.parent) as scratch:
+        root = Path(scratch, "submission")
+        root.mkdir()
+        sha256 = _copy(located.root / folder, Listing(inside), root / name)
+        files = tuple(replace(file, path=f"{name}/{file.path}") for file in inside)
+        yield Located(located.id, sha256, root, files, (name,))
 
 
 def check_path(path: Path | str) -> Path:

@@ -46,6 +46,7 @@ class Manifest:
         error: Why colcon does not accept it, or None.
         dependencies: In its order; ``known`` is not yet told.
         groups: Groups that it is a member of (REP-149).
+        asks_for_groups: Whether it depends on whatever is a member of a group.
     """
 
     name: str | None
@@ -53,6 +54,7 @@ class Manifest:
     error: SourceError | None = None
     dependencies: tuple[Dependency, ...] = ()
     groups: tuple[str, ...] = ()
+    asks_for_groups: bool = False
 
 
 @dataclass
@@ -106,6 +108,7 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
         error=SourceError(file, *error) if error else None,
         dependencies=tuple(dependencies[:_MAX_DEPENDENCIES]),
         groups=tuple(document.texts("member_of_group")[:_MAX_DEPENDENCIES]),
+        asks_for_groups=bool(document.texts("group_depend")),
     )
 
 

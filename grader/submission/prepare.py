@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import os
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.errors import SubmissionError
 from grader.ros import RosInstallation
+from grader.submission.apart import built_apart
 from grader.submission.archive import SUFFIXES
 from grader.submission.build import BuildLimits, build
 from grader.submission.build_cache import BuildCache, CacheLimits
@@ -65,7 +66,6 @@ def prepare(
     cache: Path,
     limits: PrepareLimits | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
-    environ: Mapping[str, str] = os.environ,
     sandbox: Sandbox | None = None,
     stop: threading.Event | None = None,
     on_output: Callable[[str], None] = lambda _: None,
@@ -81,7 +81,6 @@ def prepare(
         cache: Folder for builds, such as ``$XDG_CACHE_HOME/rosgrade``.
         limits: What is too much.
         on_progress: Told in a few words what happens.
-        environ: The caller's environment; only its locale and time zone are passed on.
         sandbox: What it is built in, or None.
         stop: Ends the build from another thread when it is set.
         on_output: Called with each line of the build's log as it comes; an earlier build's log
@@ -97,9 +96,7 @@ def prepare(
     try:
         with opened(source, limits.archive) as located:
             builds = BuildCache(cache, limits.cache)
-            return _prepare(
-                located, ros, builds, limits, on_progress, environ, sandbox, stop, on_output
-            )
+            return _prepare(located, ros, builds, limits, on_progress, sandbox, stop, on_output)
     except SubmissionError as error:
         record = SubmissionRecord(submission_id(source), _hash(source), problem=str(error))
         return Prepared(record, None)
@@ -142,7 +139,6 @@ def _prepare(
     cache: BuildCache,
     limits: PrepareLimits,
     on_progress: Callable[[str], None],
-    environ: Mapping[str, str],
     sandbox: Sandbox | None,
     stop: threading.Event | None,
     on_output: Callable[[str], None],
@@ -171,9 +167,9 @@ def _prepare(
         ros,
         only_python=all(package.build_type == "ament_python" for package in packages),
         cache=cache,
+        built_apart=built_apart(packages, located.files),
         limits=limits.build,
         on_progress=on_progress,
-        environ=environ,
         sandbox=sandbox,
         stop=stop,
         on_output=on_output,

@@ -13,13 +13,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.errors import GraderFault
+from grader.resources import carried_interfaces
 from grader.ros import RosInstallation
 from grader.submission.build import BuildLimits, build
 from grader.submission.build_cache import BuildCache
 from grader.submission.culprit import Sources
 from grader.submission.locate import opened
 
-CARRIED = Path(__file__).with_name("interfaces")
+CARRIED = carried_interfaces()
 """One folder for each package that the wheels lack."""
 
 # Thirty interfaces take 95 s of CPU, and whoever builds them may have little of it.
@@ -57,8 +58,9 @@ def install_prefix(
             ros,
             only_python=False,
             cache=cache,
+            is_apart=True,
             limits=_LIMITS,
-            on_progress=lambda what: on_progress(f"interfaces of ours: {what}"),
+            on_progress=lambda what: on_progress(f"{what} (ours, once on this machine)"),
         )
     if built.install is None or not built.build.succeeded:
         reason = built.build.culprit or built.build.log[-2000:]

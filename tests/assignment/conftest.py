@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +12,8 @@ from grader.assignment.model import InterfaceName, TopicName
 from grader.assignment.quantity import Duration
 from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.checks.finding import Finding
+from grader.errors import GraderFault
+from grader.ros import RosInstallation
 from tests.assignment.lessons import GOOD
 
 
@@ -77,3 +79,27 @@ def write(tmp_path: Path) -> Callable[..., Path]:
         return folder
 
     return _write
+
+
+@pytest.fixture
+def ros_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Let a ROS be installed that has just these interfaces; None for no ROS at all."""
+
+    def install(definitions: Mapping[str, str] | None) -> None:
+        prefix = tmp_path / "ros"
+        index = prefix / "share/ament_index/resource_index/rosidl_interfaces"
+        index.mkdir(parents=True)
+        for name, text in (definitions or {}).items():
+            file = prefix / "share" / f"{name}.{name.split('/')[1]}"
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding="utf-8")
+            (index / name.split("/")[0]).touch()
+
+        def find() -> RosInstallation:
+            if definitions is None:
+                raise GraderFault("no ROS 2 found")
+            return RosInstallation("wheels", Path("python"), (prefix,))
+
+        monkeypatch.setattr("grader.ros.find", find)
+
+    return install

@@ -37,13 +37,11 @@ DEFINITIONS = {
 
 
 @pytest.fixture
-def mistakes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[str]]:
+def mistakes(tmp_path: Path, ros_with: Callable[..., None]) -> Callable[[str], list[str]]:
     """Load an assignment with these stimuli; each mistake as ``line: text``."""
     folder = tmp_path / "lesson"
     folder.mkdir()
-    monkeypatch.setattr(
-        "grader.assignment.stimulation._definitions", lambda: DEFINITIONS.__getitem__
-    )
+    ros_with(DEFINITIONS)
 
     def load(stimuli: str) -> list[str]:
         file = folder / "assignment.yaml"
@@ -67,7 +65,7 @@ def mistakes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str],
         "- {call: /enable, type: std_srvs/srv/SetBool, requests: [{}, {data: false}], every: 1 s}",
         "- {call: list_parameters, every: 500 ms}",
         "- {call: /go, type: x/srv/Go, request: {to.x: $speed, to.y: 30 deg}}",
-        "- {call: /other, type: unknown_msgs/srv/Other, request: {any: thing}}",
+        "- {call: /other, type: nav2_msgs/srv/Other, request: {any: thing}}",
         "- {read_parameters: bot, after: 1 s}",
         "- {set_parameters: {speed: $speed, names: [a, b]}, node: /robot/bot}",
         "- {send_goal: /fib, type: x/action/Fibonacci, goal: {order: 5}, cancel_after: 1 s}",

@@ -37,11 +37,11 @@ ALIVE = "  - {id: alive, uses: node.alive, points: 1}\n"
 
 
 @pytest.fixture
-def mistakes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
+def mistakes(tmp_path: Path, ros_with: Callable[..., None]) -> Callable[..., list[str]]:
     """Load an assignment with a check worth 2 points; each mistake as ``line: text``."""
     folder = tmp_path / "lesson"
     folder.mkdir()
-    monkeypatch.setattr("grader.assignment.stimulation._definitions", lambda: None)
+    ros_with(None)
 
     def load(uses: str, parameters: str, replace: tuple[str, str] = ("", "")) -> list[str]:
         text = HEAD + ALIVE + f"  - {{id: it, uses: {uses}, with: {{{parameters}}}, points: 2}}\n"

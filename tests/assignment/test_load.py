@@ -277,6 +277,20 @@ def test_waiting_for_messages_that_are_not_recorded_is_a_mistake(mistakes: Mista
     ]
 
 
+def test_limits_of_the_build_and_libraries_are_told_with_their_line(mistakes: Mistakes) -> None:
+    begin = GOOD.index("scenarios:")
+    line = GOOD[:begin].count("\n") + 1
+    written = "build_limits: {memory: 3 s, wall_tme: 9 s}\nlibraries: [numpy, scipy==1.2]\n"
+    unit, key, library = mistakes(GOOD[:begin] + written + GOOD[begin:])
+    assert unit.startswith(f"{line}: build_limits.memory: ")
+    assert "a size is needed here" in unit
+    assert key.startswith(f"{line}: build_limits.wall_tme: unknown key 'wall_tme'")
+    assert "Did you mean 'wall_time'?" in key
+    assert library.startswith(
+        f"{line + 1}: libraries[1]: 'scipy==1.2' is not the name of a Python library"
+    )
+
+
 def test_checks_of_a_run_need_a_scenario(mistakes: Mistakes) -> None:
     start, end = GOOD.index("scenarios:"), GOOD.index("checks:")
     assert mistakes(GOOD[:start] + GOOD[end:]) == [

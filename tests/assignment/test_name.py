@@ -7,6 +7,7 @@ import pytest
 from grader.assignment.name import (
     check_id,
     interface_name,
+    library_name,
     namespace,
     node_name,
     package_name,
@@ -23,6 +24,7 @@ from grader.assignment.name import (
         (node_name, ["bot_publisher", "Bot", "_probe"]),
         (namespace, ["/", "/robot", "/fleet/robot_1"]),
         (interface_name, ["geometry_msgs/msg/Twist", "std_srvs/srv/SetBool", "a/action/Go2"]),
+        (library_name, ["scipy", "opencv-python", "ruamel.yaml", "PyYAML", "a"]),
     ],
 )
 def test_good_names_are_kept(rule, good) -> None:  # type: ignore[no-untyped-def]
@@ -36,6 +38,8 @@ def test_good_names_are_kept(rule, good) -> None:  # type: ignore[no-untyped-def
         (check_id, "1st", "'1st' is not an id"),
         (check_id, "", "'' is not an id"),
         (check_id, "a\n", "is not an id"),
+        (library_name, "scipy>=1", "'scipy>=1' is not the name of a Python library"),
+        (library_name, "-e.", "without a version"),
         (package_name, "bot-publisher", "'bot-publisher' is not a package name"),
         (package_name, "BotPublisher", r"\(REP-144\)"),
         (topic_name, "cmd_vel", "'cmd_vel' is relative: write the full name, '/cmd_vel'"),

@@ -1,28 +1,41 @@
 """Submissions that fight: each costs its own points, is named in its report, and nothing else.
 
-They are graded together, several at once, with an honest submission before and after them that
-must get the same grade as ever.
+A class of honest submissions is graded twice: by itself, and with all hostile ones among it,
+several at once. Every honest grade must be the same, byte for byte.
 """
 
 from __future__ import annotations
 
+import html
 import os
+import random
 import re
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
-from grader.batch.grading import Graded, Grading
+from grader import ros
+from grader.assignment.load import load_assignment
+from grader.batch.batch import Batch, Done
+from grader.batch.crew import LocalCrew
+from grader.batch.files import REPORT_FILE
+from grader.batch.grading import Grading
+from grader.batch.intake import take_in
+from grader.batch.ledger import Ledger
 from grader.checks.finding import Status
-from grader.report.html import render_report
-from grader.report.facts import RunFacts
+from grader.report.grade_part import grade_json
+from grader.report.result import result_json
+from grader.report.result_model import Result
 from grader.run.descendants import descendants
+from grader.run.runner import Runner
+from grader.sandbox.sandbox import Sandbox
+from tests.attacks.conftest import LESSON
 from tests.attacks.submissions import write_submission
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
+
+AT_ONCE = 4
 
 BOMB = """\
 import os
@@ -98,6 +111,12 @@ for port in (7400, 7401, 7410, 7411, 7412, 7413):
     for _ in range(200):
         udp.sendto(b'RTPS' + random.randbytes(200), ('127.0.0.1', port))
 """
+HOGS = """\
+for number in range(8):
+    if os.fork() == 0:
+        while True:
+            pass
+"""
 INJECTION = """\
 print('\\x1b[2J\\x1b]0;owned\\x07<script>alert(1)</script>')
 raise RuntimeError('<script>alert(2)</script><img src=x onerror=alert(3)>\\x1b[31m=cmd|calc')
@@ -111,7 +130,7 @@ class Attack:
     Attributes:
         lost: Checks that fail; others pass or are skipped because of them.
         maybe: Checks that may fail besides.
-        named: Texts that its findings, log or breaches hold.
+        named: Texts that its report or its result hold.
     """
 
     attack: str = ""
@@ -131,7 +150,8 @@ ATTACKS = {
     "kills_its_group": Attack("os.killpg(0, signal.SIGKILL)", lost=ALIVE, named=("SIGKILL",)),
     "fork_bomb": Attack(BOMB, lost=ALIVE, named=("sessions",)),
     "heap": Attack(
-        "x = []\nwhile True:\n    x.append(bytearray(2**24))",
+        # Pages that nobody touches: the limit is reached at once, however busy the machine is.
+        "x = []\nwhile True:\n    x.append(bytes(2**24))",
         lost=frozenset({"messages"}),
         # A program that ran out of memory cannot always end itself.
         maybe=frozenset({"alive", "ends"}),
@@ -181,17 +201,24 @@ ATTACKS = {
         named=("joined ROS domain 5",),
     ),
     "forged_tracer": Attack(FORGED),
-    "squats_the_probe_s_name": Attack(SQUAT),
+    "squats_the_probe_s_name": Attack(
+        SQUAT,
+        named=("is called `/rosgrade_probe`, as the node", "publishes on `/clock` and `/odom`"),
+    ),
     "is_called_as_the_probe": Attack(name="rosgrade_probe", lost=frozenset({"node"})),
-    "floods_topics_and_rosout": Attack(FLOOD_TOPICS),
+    "floods_topics_and_rosout": Attack(
+        FLOOD_TOPICS, named=("messages were sent on `/cmd_vel` within 1 s",)
+    ),
     "garbage_on_dds_ports": Attack(GARBAGE),
+    # It may be too late for its own sake, but that is never the machine's doing.
+    "burns_the_cpus": Attack(HOGS, maybe=frozenset({"ends", "messages"})),
     "injection": Attack(INJECTION, lost=ALIVE, named=("RuntimeError",)),
     "shadows_modules": Attack(
         files={"numpy/__init__.py": "raise SystemExit('trojan')", "yaml/__init__.py": "raise SystemExit('trojan')"},
         lost=frozenset({"starts"}),
     ),
     "build_fork_bomb": Attack(
-        at_build=BOMB, lost=frozenset({"builds"}), named=("it started 128 processes",)
+        at_build=BOMB, lost=frozenset({"builds"}), named=("it started 64 processes",)
     ),
     "build_plants_links": Attack(
         at_build="import os\nos.makedirs('../install', exist_ok=True)\n"
@@ -209,7 +236,7 @@ ATTACKS = {
     "build_disk": Attack(
         at_build="import os\nfor i in range(40):\n    open(f'{os.environ[\"HOME\"]}/{i}', 'wb').write(bytes(2**26))",
         lost=frozenset({"builds"}),
-        named=("MiB",),
+        named=("it wrote more than 128 MiB",),
     ),
     "build_output": Attack(
         at_build="import sys\nwhile True:\n    sys.stderr.write('spam ' * 10**5)",
@@ -219,98 +246,140 @@ ATTACKS = {
 }
 
 
-def status(graded: Graded) -> dict[str, Status]:
-    return {result.id: result.status for result in graded.grade.results}
+HONEST = {
+    "right": Attack(),
+    "misnamed": Attack(name="publisher_bot", lost=frozenset({"node"})),
+    "stops_too_early": Attack("node.timer.cancel()", lost=frozenset({"messages"})),
+    "crashes": Attack("raise ValueError('a mistake')", lost=ALIVE),
+    "uses_what_is_allowed": Attack(at_import="import scipy"),
+    "uses_what_is_not": Attack(
+        at_import="import pydantic",
+        lost=frozenset({"starts"}),
+        named=("No module named 'pydantic'", "`numpy` and `scipy`; `pydantic` is not among them"),
+    ),
+    "does_not_build": Attack(at_build="raise ValueError('a mistake')", lost=frozenset({"builds"})),
+}
+"""Right and wrong, without any bad intent."""
+UNSEEN = frozenset(
+    {
+        "kills_the_probe",
+        "forged_tracer",
+        "garbage_on_dds_ports",
+        "burns_the_cpus",
+        "build_plants_links",
+    }
+)
+"""What is refused or ignored without any effect: nobody is told, see docs/sandbox.md."""
 
 
-def told(graded: Graded) -> str:
-    """All that a report is made from."""
-    findings = [str(result.findings) for result in graded.grade.results]
-    runs = [
-        f"{recording.breaches} {recording.processes} {[line.text for line in recording.log]}"
-        for recording in graded.recordings.values()
-    ]
-    build = graded.prepared.record.build
-    return "\n".join([*findings, *runs, build.log if build else ""])
+@dataclass(frozen=True)
+class Handed:
+    """What came of a submission in a batch: all that an instructor gets of it."""
+
+    result: Result
+    page: str
+
+    @property
+    def told(self) -> str:
+        """All that is said of it."""
+        return html.unescape(self.page) + result_json(self.result)
+
+    @property
+    def failed(self) -> set[str]:
+        """Checks that cost points by themselves."""
+        return {check.id for check in self.result.checks if check.status is Status.FAILED}
+
+    def __str__(self) -> str:
+        """What a failing test shows."""
+        lines = [
+            f"{check.id} {check.status.value}: {check.observed} {check.evidence.log[-5:]}"
+            for check in self.result.checks
+            if check.status is not Status.PASSED
+        ]
+        build = self.result.build
+        lines += [f"{run.ending} {run.breaches} {run.faults}" for run in self.result.scenarios]
+        return "\n".join([*lines, build.log[-500:] if build and not build.succeeded else ""])
 
 
-def gist(graded: Graded) -> str:
-    """What a failing test shows."""
-    lines = [
-        f"{result.id} {result.status.value}: {result.decisive.finding.observed}"
-        for result in graded.grade.results
-        if result.status is not Status.PASSED
-    ]
-    for recording in graded.recordings.values():
-        lines += [f"{recording.breaches} {recording.processes} {recording.faults}"]
-        lines += [line.text for line in recording.log][-5:]
-    build = graded.prepared.record.build
-    return "\n".join([*lines, build.log[-500:] if build and not build.succeeded else ""])
-
-
-@pytest.fixture(scope="module")
-def honest(grading: Grading, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Graded]:
-    folder = tmp_path_factory.mktemp("honest")
-    submission = write_submission(folder / "ada")
-
-    def grade(name: str) -> Graded:
-        return grading.grade(submission, folder / name)
-
-    return grade
-
-
-@pytest.fixture(scope="module")
-def graded(
-    grading: Grading, honest: Callable[[str], Graded], tmp_path_factory: pytest.TempPathFactory
-) -> dict[str, Graded]:
-    """All of them, graded at once with honest ones among them."""
-    folder = tmp_path_factory.mktemp("hostile")
-
-    def grade(name: str) -> Graded:
-        if name.startswith("honest"):
-            return honest(name)
-        attack = ATTACKS[name]
-        submission = write_submission(
-            folder / name,
-            attack=attack.attack,
-            at_import=attack.at_import,
-            at_build=attack.at_build,
-            name=attack.name,
-            files=attack.files,
+def grade_class(folder: Path, members: dict[str, Attack]) -> dict[str, Handed]:
+    """Grade a class as `rosgrade batch` does, in an order of its own, with nothing cached."""
+    submissions, staging = folder / "class", folder / "staging"
+    staging.mkdir(parents=True)
+    for name, member in members.items():
+        write_submission(
+            submissions / name,
+            attack=member.attack,
+            at_import=member.at_import,
+            at_build=member.at_build,
+            name=member.name,
+            files=member.files,
         )
-        return grading.grade(submission, folder / "out" / name)
+    rows = take_in(submissions, staging)
+    random.Random(1).shuffle(rows)
+    loaded = load_assignment(LESSON)
+    cache = folder / "cache"
+    with (
+        Runner(ros.find(), sandbox=Sandbox(cache)) as runner,
+        Ledger(folder / "out").opened() as ledger,
+    ):
+        batch = Batch(loaded, ledger)
+        crew = LocalCrew(Grading(loaded, runner, cache), AT_ONCE)
+        try:
+            done = list(batch.grade(batch.read(rows)[1], crew))
+        finally:
+            crew.close()
+        assert {item.entry.key for item in done} == set(members)
+        return {item.entry.key: _handed(item, ledger) for item in done}
 
-    names = ["honest_before", *ATTACKS, "honest_after"]
-    names.insert(len(names) // 2, "honest_among")
-    with ThreadPoolExecutor(2) as pool:
-        return dict(zip(names, pool.map(grade, names), strict=True))
+
+def _handed(done: Done, ledger: Ledger) -> Handed:
+    assert done.result is not None, done.entry
+    page = (ledger.folder(done.entry.key) / REPORT_FILE).read_text(encoding="utf-8")
+    return Handed(done.result, page)
+
+
+@pytest.fixture(scope="module")
+def calm(sandbox: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Handed]:
+    """The honest ones among themselves."""
+    return grade_class(tmp_path_factory.mktemp("calm"), HONEST)
+
+
+@pytest.fixture(scope="module")
+def graded(sandbox: Sandbox, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Handed]:
+    """The same honest ones, with all the others among them."""
+    return grade_class(tmp_path_factory.mktemp("hostile"), {**HONEST, **ATTACKS})
 
 
 @pytest.mark.timeout(500)
 @pytest.mark.parametrize("name", ATTACKS)
-def test_an_attack_costs_its_own_points_and_is_named(name: str, graded: dict[str, Graded]) -> None:
-    attack, result = ATTACKS[name], graded[name]
-    failed = {check for check, found in status(result).items() if found is Status.FAILED}
-    assert attack.lost <= failed <= attack.lost | attack.maybe, gist(result)
-    assert result.grade.graded, gist(result)
+def test_an_attack_costs_its_own_points_and_is_named(name: str, graded: dict[str, Handed]) -> None:
+    attack, handed = ATTACKS[name], graded[name]
+    assert attack.lost <= handed.failed <= attack.lost | attack.maybe, str(handed)
+    assert handed.result.graded, str(handed)
     for text in attack.named:
-        assert text in told(result), gist(result)
+        assert text in handed.told, str(handed)
+    assert attack.named or attack.lost or name in UNSEEN
 
 
-@pytest.mark.parametrize("name", ["honest_before", "honest_among", "honest_after"])
-def test_nothing_else_changes(name: str, graded: dict[str, Graded]) -> None:
-    assert graded[name].grade.full_points, gist(graded[name])
+@pytest.mark.timeout(500)
+@pytest.mark.parametrize("name", HONEST)
+def test_an_honest_grade_is_the_same_byte_for_byte(
+    name: str, calm: dict[str, Handed], graded: dict[str, Handed]
+) -> None:
+    assert calm[name].failed == HONEST[name].lost, str(calm[name])
+    for text in HONEST[name].named:
+        assert text in calm[name].told, str(calm[name])
+    assert grade_json(graded[name].result) == grade_json(calm[name].result)
 
 
-def test_nothing_is_left_running(graded: dict[str, Graded]) -> None:
+def test_nothing_is_left_running(graded: dict[str, Handed]) -> None:
     # Whoever outlived its parent in a namespace is still a descendant of the one who made it.
     commands = descendants(os.getpid()).values()
     assert not [line for line in commands if re.search("86397|bot_pub|setup.py", line)]
 
 
-def test_what_it_prints_is_shown_and_never_executed(graded: dict[str, Graded]) -> None:
-    result = graded["injection"]
-    page = render_report(result.grade, result.recordings, RunFacts("now", 1.0))
+def test_what_it_prints_is_shown_and_never_executed(graded: dict[str, Handed]) -> None:
+    page = graded["injection"].page
     assert "alert(2)" in page
     assert "<script>alert" not in page and "<img src=x" not in page
     assert "\x1b" not in page

@@ -19,6 +19,7 @@ from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
 from grader.batch.worker import Order, make_grading
 from grader.errors import UsageError
+from grader.report.grade_part import grade_json
 from grader.sandbox.choice import Choice
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
@@ -101,14 +102,14 @@ def test_a_worker_that_dies_loses_nothing_and_changes_nothing(
     local = LocalCrew(make_grading(order, loaded), 4)
     near = grade(order, submissions, tmp_path / "near", local, None)
     assert all(item.result is not None for item in far)
-    assert [verdicts(item) for item in far] == [verdicts(item) for item in near]
+    assert [judged(item) for item in far] == [judged(item) for item in near]
     assert len({item.result.score for item in far if item.result}) == 2
 
 
-def verdicts(done: Done) -> list[tuple[str, str, float]]:
-    """What was judged of a submission."""
+def judged(done: Done) -> str:
+    """The grade of a submission."""
     assert done.result is not None, done.entry
-    return [(check.id, check.status.value, check.points) for check in done.result.checks]
+    return grade_json(done.result)
 
 
 def test_no_scheduler_is_said() -> None:

@@ -6,6 +6,8 @@ The runner is replaced at its seam by one that leaves recordings made by hand.
 from __future__ import annotations
 
 import dataclasses
+import gc
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,14 +15,17 @@ import pytest
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.batch import grading as grading_module
 from grader.batch.grading import Graded, Grading
 from grader.batch.regrading import compare, find, regrade
+from grader.batch.selftest import Role, Trial, run_trial
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Disturbance, Ending, Endpoint, Kind, Node, Owner, Qos, Recording
 from grader.run.runner import Runner
-from grader.submission.prepare import Prepared
+from grader.submission.build import BuildLimits
+from grader.submission.prepare import Prepared, PrepareLimits
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 
 YAML = """\
@@ -189,6 +194,65 @@ def test_recordings_are_judged_again_without_running_anything(
         YAML.replace("within: 2 s", "within: 3 s"), encoding="utf-8"
     )
     assert regrade(load_assignment(lesson.folder), found).grade.full_points
+
+
+def test_of_a_trial_only_what_is_printed_is_kept(
+    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    class Once:
+        """Grades by giving away what was graded before."""
+
+        def __init__(self, graded: Graded) -> None:
+            self.graded = [graded]
+
+        def grade(self, *_: object) -> Graded:
+            return self.graded.pop()
+
+    once = Once(grade(recording(stop_s=2.5))[0])
+    told: list[weakref.ref[Graded]] = []
+    trial = Trial(Role.REFERENCE, "reference", "the reference solution", None)
+    result = run_trial(
+        trial,
+        lesson,
+        once,  # type: ignore[arg-type]
+        tmp_path,
+        tmp_path,
+        lambda graded: told.append(weakref.ref(graded)),
+    )
+    gc.collect()
+    assert [graded() for graded in told] == [None]
+    assert (result.lost, result.graded, result.repeated) == (("ends",), True, False)
+    assert not result.verdict.right
+    assert '"id": "ends"' in result.grade
+
+
+def test_a_limit_of_the_build_is_the_author_s(lesson: LoadedAssignment, tmp_path: Path) -> None:
+    asked: list[PrepareLimits] = []
+
+    def note(*_: object, limits: PrepareLimits, **__: object) -> Prepared:
+        asked.append(limits)
+        return Prepared(record=dataclasses.replace(SUBMISSION, build=None), install=None)
+
+    written = "build_limits: {wall_time: 30 s, output: 1 MiB, memory: 1 GiB}\nscenarios:"
+    file = lesson.folder / "assignment.yaml"
+    file.write_text(YAML.replace("scenarios:", written, 1), encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(grading_module, "prepare", note)
+        for loaded in (lesson, load_assignment(lesson.folder)):
+            Grading(loaded, ScriptedRunner(), tmp_path).grade(tmp_path, tmp_path / "out")
+    usual, own = (limits.build for limits in asked)
+    assert usual == BuildLimits()
+    assert (own.python_s, own.other_s, own.output.total) == (30.0, 30.0, 2**20)
+    assert own.room.memory_bytes == 2**30
+
+
+def test_a_library_that_is_not_installed_is_told_before_anything_is_graded(
+    lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    file = lesson.folder / "assignment.yaml"
+    file.write_text(YAML + "libraries: [no-such-library]\n", encoding="utf-8")
+    with pytest.raises(GraderFault, match="'no-such-library', which is not installed here"):
+        Grading(load_assignment(lesson.folder), ScriptedRunner(), tmp_path)
 
 
 def test_a_regrade_says_who_gains_what_and_why(

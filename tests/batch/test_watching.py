@@ -163,6 +163,33 @@ def test_a_bug_is_not_hidden(watched: SimpleNamespace) -> None:
         next(watched.events)
 
 
+def test_a_saved_file_of_the_assignment_is_graded_with(tmp_path: Path) -> None:
+    submission = tmp_path / "ws"
+    submission.mkdir()
+    (submission / "package.xml").write_text("<package/>")
+    assignment = tmp_path / "mine"
+    assignment.mkdir()
+    file = assignment / "assignment.yaml"
+    file.write_text("one")
+    played = Played(submission)
+    # The author works in the assignment's own folder, and so the report lies in it.
+    report = assignment / "rosgrade-report"
+    events = Watching(submission, report, played, assignment).events()
+    next(events), next(events)
+    report.mkdir()
+    (report / "report.html").write_text("x")
+    (assignment / "__pycache__").mkdir()
+    (assignment / "__pycache__" / "checks.pyc").write_text("x")
+    saved = threading.Timer(0.5, lambda: file.write_text("two"))
+    saved.start()
+    assert isinstance(next(events), Began)
+    assert file.read_text() == "two"
+    assert isinstance(next(events), Ended)
+    assert played.grades == 2
+    saved.join()
+    events.close()
+
+
 def test_an_archive_that_is_replaced_is_graded_again(tmp_path: Path) -> None:
     import zipfile
 

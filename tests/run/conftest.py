@@ -63,13 +63,22 @@ def run_node(tmp_path: Path) -> Iterator[RunNode]:
     def run(
         source: str,
         progress: Callable[[str, Mapping[str, Any]], None] | None = None,
+        worlds: Path = Path(),
         **scenario: Any,
     ) -> Recording:
         folder = tmp_path / str(next(numbers))
         course = assignment(**scenario)
         runner.progress = progress or (lambda _scenario, _event: None)
         file = folder / "run.mcap"
-        runner.run(course, course.scenarios[0], SUBMISSION, install(folder, source), file, seed=1)
+        runner.run(
+            course,
+            course.scenarios[0],
+            SUBMISSION,
+            install(folder, source),
+            file,
+            seed=1,
+            worlds=worlds,
+        )
         return read_recording(file)
 
     yield run

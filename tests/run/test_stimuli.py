@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
+from mcap_ros2.writer import Writer
 
 from grader.recording.model import Ending, Kind, Owner
 from tests.run.conftest import RunNode
@@ -52,6 +55,24 @@ rclpy.spin(Latched())
 """
 
 
+TWO_EARS = """\
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import Int64, String
+
+class TwoEars(Node):
+    def __init__(self):
+        super().__init__("two_ears")
+        self.echo = self.create_publisher(String, "/echo", 10)
+        self.count = self.create_publisher(Int64, "/count", 10)
+        self.create_subscription(String, "/chatter", self.echo.publish, 10)
+        self.create_subscription(Int64, "/numbers", self.count.publish, 10)
+
+rclpy.init()
+rclpy.spin(TwoEars())
+"""
+
+
 def echoing(**scenario: object) -> dict[str, object]:
     return {
         "record": [{"topic": "/echo", "type": STRING}],
@@ -84,6 +105,45 @@ def test_each_message_goes_out_when_the_one_before_was_answered(run_node: RunNod
     (ours,) = [item for item in recording.endpoints if item.topic == "/chatter"
                and item.kind is Kind.PUBLISHER]  # fmt: skip
     assert ours.owner is Owner.PROBE
+
+
+def test_messages_of_files_reach_the_node_in_their_order_and_at_their_times(
+    run_node: RunNode, tmp_path: Path
+) -> None:
+    # Written by the writer of the MCAP project, as `ros2 bag record --storage mcap` would.
+    times_s = [0.0, 0.5, 0.6, 1.5]
+    with (tmp_path / "words.mcap").open("wb") as stream, Writer(stream) as writer:
+        schema = writer.register_msgdef(STRING, "string data")
+        for number, time_s in enumerate(times_s):
+            stamp_ns = 1_700_000_000_000_000_000 + round(time_s * 1e9)
+            for topic in ("/other", "/chatter"):
+                message = {"data": f"{topic} {number}"}
+                writer.write_message(topic, schema, message, stamp_ns, stamp_ns, number)
+    (tmp_path / "numbers.csv").write_text("data\n7\n-1\n9223372036854775807\n", encoding="utf-8")
+    recording = run_node(
+        TWO_EARS,
+        worlds=tmp_path,
+        **echoing(
+            record=[{"topic": "/echo", "type": STRING}, {"topic": "/count", "type": INT}],
+            stimuli=[
+                {"publish": "/chatter", "type": STRING, "from": "words.mcap"},
+                {"publish": "/numbers", "type": INT, "from": "numbers.csv", "every": "200 ms"},
+            ],
+            until={"stimuli": "done", "quiet": "300 ms"},
+        ),
+    )
+    assert recording.ending is Ending.UNTIL
+    heard = {
+        topic: [one.value["data"] for one in recording.on(topic)] for topic in ("/echo", "/count")
+    }
+    assert heard["/echo"] == [f"/chatter {number}" for number in range(4)]
+    assert heard["/count"] == [7, -1, 2**63 - 1]
+    for topic, due_s in (("/chatter", times_s), ("/numbers", [0.0, 0.2, 0.4])):
+        stamps = [one.stamp_ns for one in recording.sent[topic]]
+        # A late cell is no test of ours; nothing comes before its time, but for how late the
+        # first one was.
+        gaps = [(stamp - stamps[0]) / 1e9 - due for stamp, due in zip(stamps, due_s, strict=True)]
+        assert min(gaps) > -0.2
 
 
 def test_what_was_published_before_the_launch_reaches_the_node_and_then_a_late_joiner(

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import os
 from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
-from grader.assignment.limits import LimitOptions
+from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.recording.model import Breach
 from grader.run.enclosure import Enclosure
-from grader.sandbox.limits import Limits
+from grader.sandbox.limits import BUILD, Limits
 from grader.sandbox.usage import descendants, folder_usage, memory_bytes, thread_count
 
 
@@ -34,6 +36,14 @@ def test_the_address_space_grows_with_the_memory() -> None:
     assert LimitOptions.model_validate({"memory": "8 GiB"}).limits().address_bytes == 32 * 2**30
 
 
+def test_an_author_s_limits_of_the_build_reach_it() -> None:
+    limits = BuildLimitOptions.model_validate({"memory": "1 GiB", "disk": "64 MiB", "files": 500})
+    assert limits.limits() == dataclasses.replace(
+        BUILD, memory_bytes=2**30, disk_bytes=64 * 2**20, files=500
+    )
+    assert BuildLimitOptions().limits() == BUILD
+
+
 @pytest.mark.parametrize(
     ("written", "problem"),
     [
@@ -49,9 +59,6 @@ def test_a_wrong_limit_is_refused_with_its_reason(written: object, problem: str)
 
 
 def test_the_enclosure_of_an_order_survives_json() -> None:
-    import dataclasses
-    import json
-
     enclosure = Enclosure(("--ro-bind", "/a", "/b"), "/cell/x", Limits(), {"/ws/a": "/cell/a"})
     assert Enclosure.from_dict(json.loads(json.dumps(dataclasses.asdict(enclosure)))) == enclosure
     assert enclosure.outside("/ws/a/lib/x") == Path("/cell/a/lib/x")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from grader.errors import GraderFault
 from grader.sandbox import bubblewrap, trial
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.choice import Choice
-from grader.sandbox.python_tree import student_prefix
+from grader.sandbox.python_tree import check_installed, prune, student_prefix
 from grader.sandbox.sandbox import Sandbox, hide
 from grader.sandbox.trial import Trial, choose
 
@@ -65,19 +66,73 @@ def test_a_missing_program_is_named_with_its_package(monkeypatch: pytest.MonkeyP
 
 
 def test_the_student_s_python_holds_ros_and_nothing_of_ours(tmp_path: Path) -> None:
-    tree = student_prefix(tmp_path)
+    tree = student_prefix(tmp_path).path
     (site,) = tree.glob("lib/python3*/site-packages")
     there = {path.name for path in site.iterdir()}
     assert {"rclpy", "geometry_msgs", "numpy", "colcon_core"} <= there
     assert not {"pydantic", "typer", "mcap", "scipy", "_rosgrade.pth", "pyseccomp.py"} & there
     assert not (tree / "bin" / "rosgrade").exists()
-    assert student_prefix(tmp_path) == tree
+    assert student_prefix(tmp_path).path == tree
     assert not list(tree.parent.glob(".unfinished*"))
 
 
 def test_a_library_that_the_assignment_allows_is_there(tmp_path: Path) -> None:
-    (site,) = student_prefix(tmp_path, ["scipy"]).glob("lib/python3*/site-packages")
+    sandbox = Sandbox(tmp_path).allowing(("SciPy",))
+    (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")
     assert (site / "scipy").is_dir()
+    assert sandbox.allowing(("SciPy",)) is sandbox
+    assert sandbox.allowing(()).python_tree != sandbox.python_tree
+
+
+def test_a_library_that_is_not_installed_is_named_with_the_way_to_get_it() -> None:
+    with pytest.raises(GraderFault, match=r"'scypi', which is not installed here. Did you mean "):
+        check_installed(["numpy", "scypi"])
+    with pytest.raises(GraderFault, match="-m pip install no-such-library-at-all"):
+        check_installed(["no-such-library-at-all"])
+
+
+def trees(folder: Path, ages_s: dict[str, float]) -> None:
+    now_s = time.time()
+    for name, age_s in ages_s.items():
+        (folder / name / "lib").mkdir(parents=True)
+        os.utime(folder / name, (now_s - age_s, now_s - age_s))
+
+
+def test_old_trees_are_thrown_away_and_the_last_used_stay(tmp_path: Path) -> None:
+    trees(tmp_path, {"a": 10, "b": 20, "c": 30, "d": 5000, ".unfinished-x": 10**6})
+    prune(tmp_path, kept=2, age_s=1000)
+    assert {path.name for path in tmp_path.iterdir() if path.is_dir()} == {"a", "b"}
+    prune(tmp_path, kept=2, age_s=15)
+    assert {path.name for path in tmp_path.iterdir() if path.is_dir()} == {"a"}
+
+
+def test_a_tree_that_another_process_uses_stays(tmp_path: Path) -> None:
+    trees(tmp_path, {"used": 10**9, "unused": 10**9})
+    holds = (
+        "import fcntl, sys\n"
+        "lock = open(sys.argv[1], 'w')\n"
+        "fcntl.flock(lock, fcntl.LOCK_SH)\n"
+        "print('held', flush=True)\ninput()\n"
+    )
+    command = [sys.executable, "-S", "-c", holds, str(tmp_path / "used.lock")]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes) as user:
+        assert user.stdout is not None
+        assert user.stdout.readline() == "held\n"
+        prune(tmp_path, kept=0)
+        assert (tmp_path / "used" / "lib").is_dir()
+        assert not (tmp_path / "unused").exists()
+        user.communicate("\n")
+    prune(tmp_path, kept=0)
+    assert not (tmp_path / "used").exists()
+
+
+def test_what_a_sandbox_uses_is_not_thrown_away(tmp_path: Path) -> None:
+    sandbox = Sandbox(tmp_path)
+    tree = sandbox.python_tree
+    os.utime(tree, (1, 1))
+    prune(tree.parent, kept=0)
+    assert (tree / "pyvenv.cfg").exists()
 
 
 def test_a_build_room_writes_only_where_it_may(tmp_path: Path) -> None:

@@ -72,6 +72,34 @@ PACKAGE = {
     "bot_publisher/node.py": NODE,
 }
 """A good ament_python package, what ``ros2 pkg create`` and a lecture make."""
+MANIFEST_OF_MSGS = (
+    MANIFEST.replace("bot_publisher", "bot_msgs")
+    .replace("ament_python", "ament_cmake")
+    .replace(
+        "<depend>rclpy</depend>",
+        "<buildtool_depend>ament_cmake</buildtool_depend>"
+        "<depend>rosidl_default_generators</depend>"
+        "<member_of_group>rosidl_interface_packages</member_of_group>",
+    )
+)
+CMAKE_OF_MSGS = """\
+cmake_minimum_required(VERSION 3.8)
+project(bot_msgs)
+find_package(ament_cmake REQUIRED)
+find_package(geometry_msgs REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(${PROJECT_NAME} "msg/Bot.msg" DEPENDENCIES geometry_msgs)
+if(BUILD_TESTING)
+  find_package(ament_lint_auto REQUIRED)
+endif()
+ament_package()
+"""
+INTERFACES = {
+    "src/bot_msgs/package.xml": MANIFEST_OF_MSGS,
+    "src/bot_msgs/CMakeLists.txt": CMAKE_OF_MSGS,
+    "src/bot_msgs/msg/Bot.msg": "uint8 BURGER=1\nuint8 model\ngeometry_msgs/Pose2D pose\n",
+}
+"""A good package with a message."""
 
 
 class Tree:

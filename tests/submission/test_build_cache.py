@@ -28,7 +28,7 @@ def cache(tmp_path: Path) -> BuildCache:
 
 
 def names(tmp_path: Path) -> set[str]:
-    return {path.name for path in (tmp_path / "builds").iterdir()}
+    return {path.name for path in (tmp_path / "builds").iterdir() if path.suffix != ".stamp"}
 
 
 def test_what_was_stored_is_found_and_said_to_be_cached(cache: BuildCache) -> None:
@@ -134,8 +134,11 @@ def test_builds_that_were_not_used_for_long_go(cache: BuildCache, tmp_path: Path
     for key, days in (("old", 31), ("used", 29)):
         stored(cache, key)
         age(tmp_path, key, days * DAY_S)
+    stored(cache, "soon after another")
+    assert names(tmp_path) == {"old", "used", "soon after another"}
+    age(tmp_path, "pruned.stamp", 3600)
     stored(cache, "new")
-    assert names(tmp_path) == {"used", "new"}
+    assert names(tmp_path) == {"used", "soon after another", "new"}
 
 
 def test_the_least_recently_used_go_when_there_is_too_much(tmp_path: Path) -> None:

@@ -1,0 +1,145 @@
+"""CPU time: what the student's own processes took, and how much of a wait others can explain.
+
+A thread waits for a CPU because somebody else runs on it. Where that is the student's own other
+threads and processes, the wait is the submission's; only what others took, rosgrade's own
+processes among them, is a disturbance.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.recording.model import NS
+
+_STAT = Path("/proc/stat")
+_TICK_NS = NS // os.sysconf("SC_CLK_TCK")
+# CPUCLOCK_SCHED: the running time of a whole process; linux/posix-timers_types.h.
+_PROCESS_CLOCK = 2
+
+
+@dataclass(frozen=True)
+class Interval:
+    """CPU time in an interval.
+
+    Attributes:
+        begin_ns: Its beginning.
+        end_ns: Its end.
+        others_ns: CPU time of all CPUs together that neither the student's processes had nor
+            nobody: the host's other processes, ours, and what a hypervisor took.
+    """
+
+    begin_ns: int
+    end_ns: int
+    others_ns: int
+
+
+def others_share(waited_ns: int, intervals: Iterable[Interval]) -> int:
+    """How much of a wait for a CPU others than the student can explain, at most.
+
+    Every nanosecond that a thread waits on a CPU's queue while somebody else's thread runs there
+    is one of that one's CPU time; so what others had during the wait bounds their share, however
+    the scheduler arranged it.
+
+    Args:
+        waited_ns: Length of a wait that was over within the last interval; it may have begun
+            before it.
+        intervals: Without gaps, oldest first; nothing is known without any.
+
+    Returns:
+        Nanoseconds, at most ``waited_ns``.
+    """
+    known = list(intervals)
+    if not known:
+        return waited_ns
+    began_ns = known[-1].begin_ns - waited_ns
+    return min(waited_ns, sum(item.others_ns for item in known if item.end_ns > began_ns))
+
+
+@dataclass(frozen=True)
+class CpuTimes:
+    """CPU times so far, at one moment.
+
+    Attributes:
+        time_ns: The moment, on the steady clock.
+        student_ns: Of the student's processes, with those that they have waited for.
+        idle_ns: Of nobody, on the CPUs that may be used; 0 where it is not known.
+    """
+
+    time_ns: int
+    student_ns: int
+    idle_ns: int
+
+
+def interval(before: CpuTimes, after: CpuTimes, cpus: int) -> Interval:
+    """What happened between two moments.
+
+    Args:
+        before: The first.
+        after: The second.
+        cpus: Number of CPUs.
+    """
+    all_ns = cpus * (after.time_ns - before.time_ns)
+    # A process that nobody waited for takes its time with it when it ends.
+    student_ns = max(0, after.student_ns - before.student_ns)
+    idle_ns = max(0, after.idle_ns - before.idle_ns)
+    return Interval(before.time_ns, after.time_ns, max(0, all_ns - student_ns - idle_ns))
+
+
+class CpuMeter:
+    """Reads CPU times of this machine."""
+
+    def __init__(self) -> None:
+        """Find out which CPUs are ours to use."""
+        self._cpus = os.sched_getaffinity(0)
+        # A container's stand-in (lxcfs) calls a CPU idle that another container uses.
+        self._knows_idle = not os.path.ismount(_STAT)
+
+    @property
+    def cpus(self) -> int:
+        """How many CPUs there are."""
+        return len(self._cpus)
+
+    def read(self, pids: Iterable[int]) -> CpuTimes:
+        """Read them now.
+
+        Args:
+            pids: The student's processes; those that have ended count nothing.
+        """
+        student_ns = sum(map(_process_ns, pids))
+        return CpuTimes(time.monotonic_ns(), student_ns, self._idle_ns())
+
+    def _idle_ns(self) -> int:
+        if not self._knows_idle:
+            return 0
+        try:
+            return idle_ticks(_STAT.read_text(), self._cpus) * _TICK_NS
+        except (OSError, ValueError, IndexError):
+            return 0
+
+
+def idle_ticks(stat: str, cpus: Iterable[int]) -> int:
+    """Ticks in which CPUs had nothing to do, waits for a disk among them.
+
+    Args:
+        stat: Content of /proc/stat (proc(5)).
+        cpus: Their numbers.
+    """
+    wanted = {f"cpu{number}" for number in cpus}
+    rows = (line.split() for line in stat.splitlines())
+    return sum(int(row[4]) + int(row[5]) for row in rows if row and row[0] in wanted)
+
+
+def _process_ns(pid: int) -> int:
+    """CPU time of a process with all its threads and all children that it has waited for."""
+    try:
+        own_ns = time.clock_gettime_ns(~pid << 3 | _PROCESS_CLOCK)
+        with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  often
+            # The command's name may contain anything, but the last ")" ends it.
+            fields = file.read().rpartition(b")")[2].split()
+        return own_ns + _TICK_NS * (int(fields[13]) + int(fields[14]))
+    except (OSError, IndexError, ValueError):
+        return 0

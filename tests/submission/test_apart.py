@@ -1,0 +1,301 @@
+"""Which packages of a submission are built apart, and what comes of it."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from grader.ros import RosInstallation
+from grader.submission.apart import as_handed_in, built_apart, lay
+from grader.submission.locate import only, opened
+from grader.submission.package import read_package
+from grader.submission.prepare import Prepared, prepare
+from grader.submission.record import Definition
+
+from .samples import CMAKE_OF_MSGS as CMAKE
+from .samples import INTERFACES, MANIFEST, MANIFEST_OF_MSGS, SETUP_PY, Tree
+
+MSGS = "src/bot_msgs"
+NODE = "from bot_msgs.msg import Bot\n\n\ndef main():\n    print(Bot(model=Bot.BURGER))\n"
+NEEDS_MSGS = MANIFEST.replace("rclpy", "bot_msgs")
+
+
+def workspace(tree: Tree, node: str = NODE, manifest: str = NEEDS_MSGS) -> None:
+    tree.write(dict(INTERFACES))
+    tree.package({"bot_publisher/node.py": node, "package.xml": manifest})
+
+
+def apart(tree: Tree, ros: RosInstallation) -> tuple[str, ...]:
+    with opened(tree.root) as located:
+        packages = [read_package(located, folder, ros) for folder in located.packages]
+        return built_apart(packages, located.files)
+
+
+def test_an_interface_package_beside_a_node_is_built_apart(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    workspace(tree)
+    tree.write({f"{MSGS}/README.md": "Messages of the course.\n", f"{MSGS}/LICENSE": "free\n"})
+    assert apart(tree, named_ros) == ("bot_msgs",)
+
+
+def test_where_nothing_else_is_there_it_is_just_built(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    tree.write(dict(INTERFACES))
+    assert apart(tree, named_ros) == ()
+
+
+COURSE = """
+set(files "msg/Bot.msg")
+if(BUILD_TESTING)
+  find_package(ament_lint_auto REQUIRED)
+  set(ament_cmake_copyright_FOUND TRUE)
+  ament_lint_auto_find_test_dependencies()
+endif()
+"""
+GLOB = "FILE(GLOB INTERFACES RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} msg/*.msg srv/*.srv)\n"
+
+
+@pytest.mark.parametrize("more", [COURSE, GLOB, "# as in http://example.org\n"])
+def test_usual_styles_are_built_apart(tree: Tree, named_ros: RosInstallation, more: str) -> None:
+    workspace(tree)
+    tree.write(
+        {f"{MSGS}/CMakeLists.txt": CMAKE.replace("ament_package()", f"{more}ament_package()")}
+    )
+    assert apart(tree, named_ros) == ("bot_msgs",)
+
+
+# What could see, or change, something that is not in the package.
+@pytest.mark.parametrize(
+    "more",
+    [
+        'file(GLOB more "../other/msg/*.msg")',
+        "execute_process(COMMAND id)",
+        "include(more.cmake)",
+        "add_subdirectory(more)",
+        "file(READ msg/Bot.msg text)",
+        "FILE(DOWNLOAD x y)",
+        "install(CODE [[message(hello)]])",
+        "get_filename_component(up ${CMAKE_SOURCE_DIR} DIRECTORY)",
+        'if(EXISTS "/etc/hostname")\nendif()',
+        'if("$ENV{HOME}")\nendif()',
+        "find_package(bot_publisher)",
+        "if(EXISTS ${CMAKE_INSTALL_PREFIX}/lib)\nendif()",
+        "add_library(more more.cpp)",
+        "function(more)\nendfunction()",
+    ],
+)
+def test_who_may_look_at_others_is_built_with_them(
+    tree: Tree, named_ros: RosInstallation, more: str
+) -> None:
+    workspace(tree)
+    tree.write(
+        {f"{MSGS}/CMakeLists.txt": CMAKE.replace("ament_package()", f"{more}\nament_package()")}
+    )
+    assert apart(tree, named_ros) == ()
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {f"{MSGS}/include/bot.hpp": "#pragma once\n"},
+        {f"{MSGS}/bot_msgs/__init__.py": ""},
+        {f"{MSGS}/CMakeLists.txt": "project(bot_msgs)\n"},
+        {f"{MSGS}/package.xml": MANIFEST_OF_MSGS.replace("geometry_msgs", "bot_publisher")},
+        {f"{MSGS}/package.xml": MANIFEST_OF_MSGS.replace("ada@example.org", "a@b.c")},
+        {
+            f"{MSGS}/package.xml": MANIFEST_OF_MSGS.replace(
+                "<depend>geometry_msgs</depend>", "<group_depend>all</group_depend>"
+            )
+        },
+    ],
+    ids=["code", "module", "no interfaces", "needs the other", "wrong manifest", "group"],
+)
+def test_other_packages_are_built_together(
+    tree: Tree, named_ros: RosInstallation, files: dict[str, str]
+) -> None:
+    workspace(tree)
+    tree.write(dict(files))
+    assert apart(tree, named_ros) == ()
+
+
+def test_a_package_with_a_link_is_built_with_the_others(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    workspace(tree)
+    tree.write({"src/shared/Arm.msg": "uint8 x\n"})
+    (tree.root / MSGS / "msg/Arm.msg").symlink_to("../../shared/Arm.msg")
+    assert apart(tree, named_ros) == ()
+
+
+def test_alone_a_package_has_its_own_files_and_a_hash_of_them(tree: Tree) -> None:
+    workspace(tree)
+    names = {name.removeprefix("src/") for name in INTERFACES}
+    with opened(tree.root) as located, only(located, MSGS, "bot_msgs") as first:
+        assert sorted(first.files, key=lambda file: file.path) == list(first.files)
+        assert {file.path for file in first.files} == names
+        there = {path.relative_to(first.root).as_posix() for path in first.root.rglob("*.*")}
+        assert there == names
+        assert first.packages == ("bot_msgs",)
+    tree.write({"src/bot_publisher/bot_publisher/node.py": "other = 1\n"})
+    with opened(tree.root) as located, only(located, MSGS, "bot_msgs") as same:
+        assert same.sha256 == first.sha256
+    tree.write({f"{MSGS}/msg/Bot.msg": "uint8 other\n"})
+    with opened(tree.root) as located, only(located, MSGS, "bot_msgs") as changed:
+        assert changed.sha256 != first.sha256
+
+
+def test_a_log_names_files_where_they_were_handed_in() -> None:
+    log = (
+        "Starting >>> bot_msgs\n"
+        "CMake Warning at bot_msgs/CMakeLists.txt:3 (message):\n"
+        "-- Installing: install/share/bot_msgs/msg/Bot.msg\n"
+        "-- in build/bot_msgs/rosidl_adapter and my_bot_msgs/msg\n"
+    )
+    assert as_handed_in(log, "bot_msgs", "ws/src/mine") == log.replace(
+        "at bot_msgs/", "at ws/src/mine/"
+    )
+
+
+def test_an_install_space_is_laid_where_it_belongs(tmp_path: Path) -> None:
+    built, install = tmp_path / "built", tmp_path / "install"
+    share = built / "share/bot_msgs"
+    (share / "__pycache__").mkdir(parents=True)
+    line = '_colcon_package_sh_COLCON_CURRENT_PREFIX="/cache/.unfinished-1/install"\n'
+    (share / "package.sh").write_text(f"# a script\n{line}")
+    (share / "local_setup.sh").write_text(
+        ': ${AMENT_CURRENT_PREFIX:="/cache/.unfinished-1/install"}'
+    )
+    (share / "link.sh").symlink_to("package.sh")
+    lay("bot_msgs", built, install)
+    for name in ("package.sh", "local_setup.sh"):
+        text = (install / "share/bot_msgs" / name).read_text()
+        assert f'="{install}"' in text
+        assert "unfinished" not in text
+    assert not (install / "share/bot_msgs/__pycache__").exists()
+    assert (share / "package.sh").read_text().endswith(line)
+
+
+def built(tree: Tree, ros: RosInstallation) -> Prepared:
+    return prepare(tree.root, ros, cache=tree.root.parent / "cache")
+
+
+def kept(tree: Tree) -> set[str]:
+    return {file.parent.name for file in (tree.root.parent / "cache/builds").glob("*/build.json")}
+
+
+def printed(found: Prepared, ros: RosInstallation) -> str:
+    """What the node prints, run from the install space as a cell does."""
+    assert found.install is not None
+    return subprocess.run(
+        [str(ros.python), str(found.install / "lib/bot_publisher/bot_pub")],
+        env=ros.environment({"HOME": str(found.install)}, (found.install,)),
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    ).stdout
+
+
+# setup.py is a student's program: it finds the install space, and spoils what is there.
+SPOILS = """\
+import os, pathlib
+for place in os.environ['PYTHONPATH'].split(':'):
+    for file in pathlib.Path(place).rglob('bot_msgs/**/*.py'):
+        file.write_text('raise SystemExit("spoiled")')
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+def test_messages_are_built_once_and_used_by_each_version_of_a_node(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    workspace(tree)
+    first = built(tree, real_ros)
+    assert first.record.build is not None
+    assert first.record.build.succeeded, first.record.build.log
+    assert re.findall("Finished <<< (\\S+)", first.record.build.log) == [
+        "bot_msgs",
+        "bot_publisher",
+    ]
+    assert str(tree.root.parent) not in first.record.build.log
+    assert "model=1" in printed(first, real_ros)
+    package = first.record.package("bot_publisher")
+    assert package is not None
+    assert package.ros_imports[0].module == "bot_msgs"
+    messages = first.record.package("bot_msgs")
+    assert messages is not None
+    text = INTERFACES[f"{MSGS}/msg/Bot.msg"]
+    assert messages.definitions == (Definition(f"{MSGS}/msg/Bot.msg", text),)
+    assert messages.generated == (Definition("msg/Bot.msg", text),)
+    assert messages.groups == ("rosidl_interface_packages",)
+    assert messages.cmake == CMAKE
+    assert len(kept(tree)) == 2
+
+    # A hostile one has the same messages; only its own are spoiled.
+    tree.write({"src/bot_publisher/setup.py": f"{SPOILS}{SETUP_PY}"})
+    spoiled = built(tree, real_ros)
+    assert len(kept(tree)) == 3
+    with pytest.raises(subprocess.CalledProcessError):
+        printed(spoiled, real_ros)
+
+    # Another student has them in another folder.
+    workspace(tree, NODE.replace("Bot.BURGER", "2"))
+    (tree.root / MSGS).rename(tree.root / "messages")
+    second = built(tree, real_ros)
+    assert len(kept(tree)) == 4
+    assert second.record.build is not None
+    assert not second.record.build.cached
+    assert "model=2" in printed(second, real_ros)
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+def test_it_is_the_same_as_when_all_is_built_together(
+    tree: Tree, real_ros: RosInstallation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workspace(tree)
+    first = built(tree, real_ros).install
+    monkeypatch.setattr("grader.submission.prepare.built_apart", lambda *_: ())
+    tree.write({"src/bot_publisher/bot_publisher/other.py": ""})
+    second = built(tree, real_ros).install
+    assert first is not None
+    assert second is not None
+    one, other = content(first), content(second)
+    assert set(other) - set(one) == {"lib/python3.11/site-packages/bot_publisher/other.py"}
+    assert {name for name in one if one[name] != other[name]} <= {
+        # Lists other.py.
+        "lib/python3.11/site-packages/bot_publisher-0.0.0-py3.11.egg-info/SOURCES.txt",
+    }
+
+
+def content(install: Path) -> dict[str, str]:
+    """Text files of an install space by their names, without the place where it was built."""
+    place = re.compile(r"/\S*/\.unfinished-\w+/install")
+    return {
+        path.relative_to(install).as_posix(): place.sub("", path.read_text(errors="replace"))
+        for path in install.rglob("*")
+        if path.is_file() and path.suffix not in (".pyc", ".so")
+    }
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+def test_a_message_that_does_not_build_is_told_as_if_all_were_built_together(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    workspace(tree)
+    tree.write({f"{MSGS}/msg/Bot.msg": "uint8 model\nunit8 x\n"})
+    found = built(tree, real_ros)
+    build = found.record.build
+    assert build is not None
+    assert build.failed_packages == ("bot_msgs", "bot_publisher")
+    assert build.culprit is not None
+    assert (build.culprit.file, build.culprit.line) == (f"{MSGS}/msg/Bot.msg", 2)
+    assert build.log.count("Failed   <<< bot_msgs") == 1
+    assert found.install is None
