@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from grader import ros
 from grader.assignment.asking import Asking
 from grader.assignment.document import Place
 from grader.assignment.drawing import draw_values
+from grader.assignment.interfaces import Interfaces
 from grader.assignment.message import Find
 from grader.assignment.messages import StimulusError, messages_of
 from grader.assignment.model import Assignment, Scenario
@@ -15,34 +15,32 @@ from grader.assignment.quantity import format_duration
 from grader.assignment.requests import mistakes
 from grader.assignment.source import Source
 from grader.assignment.stimulus import Join, Kill, Publish, Restart
-from grader.errors import GraderFault, Problem
+from grader.errors import Problem
 from grader.nearest import did_you_mean
-from grader.recording.definition import definition_finder
 
 
-def problems(source: Source, assignment: Assignment) -> Iterator[Problem]:
+def problems(source: Source, assignment: Assignment, known: Interfaces) -> Iterator[Problem]:
     """Find what does not fit; functions are tried with the seed 0.
 
-    Fields of messages are checked where the definitions are at hand: those of ROS where it is
-    installed, never those of a package that is still to be handed in.
+    Fields of messages are checked where the definitions are at hand.
 
     Args:
         source: The document.
         assignment: What was read from it.
+        known: Definitions at hand.
     """
-    find = _definitions()
     for index, scenario in enumerate(assignment.scenarios):
         names: set[str] = set()
         for number, item in enumerate(scenario.stimuli):
             place: Place = ("scenarios", index, "stimuli", number)
             if isinstance(item, Publish):
-                yield from _publish(source, place, scenario, item, find)
+                yield from _publish(source, place, scenario, item, known.find)
             elif isinstance(item, Join):
                 yield from _join(source, place, scenario, item, names)
             elif isinstance(item, Kill | Restart):
                 yield from _process(source, place, item, assignment, scenario)
             elif isinstance(item, Asking):
-                for inside, text in mistakes(item, find, draw_values(scenario, 0)):
+                for inside, text in mistakes(item, known.find, draw_values(scenario, 0)):
                     yield source.problem((*place, *inside), text)
             after = getattr(item, "after", None)
             if after is not None and after >= scenario.timeout:
@@ -60,15 +58,8 @@ def _has_end(item: object) -> bool:
     return isinstance(item, Join | Kill | Restart | Asking)
 
 
-def _definitions() -> Find | None:
-    try:
-        return definition_finder(ros.find().prefixes)
-    except GraderFault:
-        return None
-
-
 def _publish(
-    source: Source, place: Place, scenario: Scenario, item: Publish, find: Find | None
+    source: Source, place: Place, scenario: Scenario, item: Publish, find: Find
 ) -> Iterator[Problem]:
     recorded = scenario.recorded_types
     if item.publish in recorded:
@@ -79,14 +70,12 @@ def _publish(
         listed = f" It records: {', '.join(recorded) or 'nothing'}."
         text = f"the scenario does not record {item.answer!r}.{advice or listed}"
         yield source.problem((*place, "answer"), text)
-    if find is None:
-        return
     try:
         messages = messages_of(item, source.file.parent, find, 0, draw_values(scenario, 0))
     except StimulusError as error:
         yield source.problem((*place, *error.place), str(error))
     except KeyError:
-        # Of a package that the student hands in, perhaps.
+        # Of a package that is not installed here.
         return
     else:
         if item.before_launch > len(messages):

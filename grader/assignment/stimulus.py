@@ -71,7 +71,8 @@ class Publish(Model):
     answer: TopicName | None = Field(
         None,
         description="Send the next message only when one was received on this recorded topic, or "
-        "when `within` has passed.",
+        "when `within` has passed. One that is the same as before may be a copy, and counts a "
+        "moment later.",
     )
     within: Duration = Field(
         1.0, description="How long to wait for an `answer`.", validate_default=False

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from mcap_ros2.writer import Writer
 
 from grader.assignment.load import load_assignment
 from grader.assignment.messages import messages_of
@@ -51,11 +52,9 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def mistakes(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], list[str]]:
+def mistakes(folder: Path, ros_with: Callable[..., None]) -> Callable[[str], list[str]]:
     """Load an assignment with these stimuli; each mistake as ``line: text``."""
-    monkeypatch.setattr(
-        "grader.assignment.stimulation._definitions", lambda: DEFINITIONS.__getitem__
-    )
+    ros_with(DEFINITIONS)
 
     def load(stimuli: str) -> list[str]:
         file = folder / "assignment.yaml"
@@ -85,7 +84,7 @@ GOOD = [
     publish("message: {linear: {x: $goal, y: 30 cm}, angular.z: 0}", "geometry_msgs/msg/Twist"),
     publish("message: {data: [1, 2.5, 90 deg]}", "std_msgs/msg/Float64MultiArray"),
     publish("message: {stamp: now, frame_id: now}", "std_msgs/msg/Header"),
-    publish("message: {anything: goes}", "student_msgs/msg/Unknown"),
+    publish("message: {anything: goes}", "nav2_msgs/msg/Unknown"),
     "      - {join: /echo, type: std_msgs/msg/String, name: late, after: 1 s}\n",
     "      - {kill: echo, after: 1 s}\n      - {restart: echo, after: 2 s}\n",
     "      - {kill: echo, package: bot, after: 1 s, signal: SIGKILL}\n",
@@ -214,13 +213,28 @@ FILES = [
     ("from: none.csv\nevery: 1 s", "cannot read none.csv: No such file"),
     ("from: ../other.csv\nevery: 1 s", r"\.\./other.csv is not in the assignment's folder"),
     ("from: empty.csv\nevery: 1 s", "empty.csv has no message"),
-    ("from: wrong.csv\nevery: 1 s", "wrong.csv:3: the message .* has no field 'q'|wrong.csv:2:"),
+    ("from: wrong.csv\nevery: 1 s", r"wrong.csv:1: the message .* has no field 'q'. It has: data"),
     ("from: long.csv\nevery: 1 s", "long.csv:2: more values than the first row names"),
+    ("from: latin.csv\nevery: 1 s", "latin.csv is not a CSV file: 'utf-8' codec can't decode"),
     ("from: bag.mcap", "bag.mcap: no MCAP file that can be read"),
+    ("from: cut.mcap", "cut.mcap: no MCAP file that can be read"),
+    ("from: half.mcap", "half.mcap: no MCAP file that can be read"),
+    ("from: none.mcap", "cannot read none.mcap: No such file"),
+    ("from: other.mcap", "other.mcap has no messages on /chatter. Its topics: /talk"),
+    ("from: type.mcap", "type.mcap has /chatter as std_msgs/msg/UInt8, not std_msgs/msg/String"),
     ("python: cases.py:none\nevery: 1 s", "has no 'none'. Its functions: raises, text"),
     ("python: cases.py:raises\nevery: 1 s", "cases.py:2: ZeroDivisionError: division by zero"),
     ("python: cases.py:text\nevery: 1 s", "must return a list of messages"),
 ]
+
+
+def bag(file: Path, topic: str, type: str, definition: str, data: object) -> bytes:
+    """Write an MCAP file with two messages, by the writer of the MCAP project."""
+    with file.open("wb") as stream, Writer(stream) as writer:
+        schema = writer.register_msgdef(type, definition)
+        for number in range(2):
+            writer.write_message(topic, schema, {"data": data}, number, number, number)
+    return file.read_bytes()
 
 
 @pytest.mark.parametrize(("rest", "words"), FILES)
@@ -231,11 +245,34 @@ def test_a_file_that_is_wrong_is_named(
     (folder / "empty.csv").write_text("data\n", encoding="utf-8")
     (folder / "wrong.csv").write_text("data,q\na,1\n", encoding="utf-8")
     (folder / "long.csv").write_text("data\na,1\n", encoding="utf-8")
+    (folder / "latin.csv").write_bytes("data\nGrüße\n".encode("latin-1"))
     (folder / "bag.mcap").write_bytes(b"no")
+    whole = bag(folder / "other.mcap", "/talk", "std_msgs/msg/String", "string data", "hello")
+    (folder / "cut.mcap").write_bytes(whole[:-10])
+    (folder / "half.mcap").write_bytes(whole[: len(whole) // 2])
+    bag(folder / "type.mcap", "/chatter", "std_msgs/msg/UInt8", "uint8 data", 1)
     (folder / "cases.py").write_text(
         "def raises(seed):\n    return 1 / 0\ndef text(seed):\n    return 'a'\n", encoding="utf-8"
     )
     (found,) = mistakes(publish(rest))
+    assert re.search(words, found), found
+
+
+@pytest.mark.parametrize(
+    ("type", "rows", "words"),
+    [
+        ("std_msgs/msg/UInt8", "data\n1\n256\n", r"n.csv:3: data: .*256.* is no uint8, a whole"),
+        ("std_msgs/msg/UInt8", "data\n\n1\nfive\n", r"n.csv:4: data: expected a number.*five"),
+        ("geometry_msgs/msg/Twist", "linear.x,linear.w\n1,2\n", r"n.csv:1: linear .* no field 'w'"),
+        ("std_msgs/msg/Float64MultiArray", "data[1]\n1\n", r"data\[0\] is missing before data"),
+    ],
+)  # fmt: skip
+def test_a_cell_of_a_csv_file_that_does_not_fit_is_named_with_its_line(
+    mistakes: Callable[[str], list[str]], folder: Path, type: str, rows: str, words: str
+) -> None:
+    (folder / "n.csv").write_text(rows, encoding="utf-8")
+    (found,) = mistakes(publish("from: n.csv\nevery: 1 s", type))
+    assert found.startswith("16: scenarios[0].stimuli[0].from: n.csv:")
     assert re.search(words, found), found
 
 

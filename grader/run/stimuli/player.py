@@ -80,6 +80,11 @@ class Player:
         """Whether the run goes on although no process of the student's runs any more."""
         return any(item.keeps_run for item in self._playing)
 
+    @property
+    def last_ns(self) -> int | None:
+        """When the last message was published that an answer may still come to."""
+        return max((item.last_ns for item in self._playing if item.last_ns), default=None)
+
     def begin(self) -> None:
         """Now was the first match."""
         if self._began_s is None:

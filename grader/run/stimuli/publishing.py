@@ -11,9 +11,11 @@ from grader.checks.compatibility import refusals
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Kind, Qos, Wait
 from grader.run.probe import import_interface, qos_profile
+from grader.run.stimuli.answers import Answers
 from grader.run.stimuli.filling import filled
 from grader.run.stimuli.orders import PublishOrder
 from grader.run.stimuli.stage import Playing, Stage
+from grader.run.stopwatch import Stopwatch
 
 _POLL_S = 0.02
 # Of a node that declares nothing to us, the writer that answers may match a moment later.
@@ -43,8 +45,9 @@ class Publishing(Playing):
         self._began_ns = 0
         self._ready_s: float | None = None
         self._next_s: float | None = None
-        self._sent_s = 0.0
-        self._heard = 0
+        self._answers = Answers(order.within_s)
+        self._since_sent = Stopwatch(stage.meter)
+        self._read = 0
         self._now_s = 0.0
         self._given_up = False
         for _ in range(min(order.before_launch, len(order.messages))):
@@ -56,7 +59,10 @@ class Publishing(Playing):
         order = self._order
         if order.repeat_s is not None or self._given_up:
             return True
-        return self._sent >= len(order.messages) and self._is_answered()
+        if self._sent < len(order.messages):
+            return False
+        self._listen()
+        return self._answers.is_over(self._since_sent.elapsed_s)
 
     @property
     def due_s(self) -> float | None:
@@ -75,11 +81,13 @@ class Publishing(Playing):
         if self._next_s is None:
             self._await_listener(elapsed_s)
         while self._is_more and self._next_s is not None and elapsed_s >= self._next_s:
-            if not self._is_answered():
+            self._listen()
+            if not self._answers.may_go_on(self._since_sent.elapsed_s):
                 return
-            self._heard = self._answers()
+            if self._order.answer is not None:
+                self._answers.ask()
             self._publish()
-            self._sent_s = elapsed_s
+            self._since_sent = Stopwatch(self._stage.meter)
             # A late cell must not make up for it with a burst.
             self._next_s = max(self._next_s, elapsed_s - self._gap_s()) + self._gap_s()
 
@@ -120,14 +128,15 @@ class Publishing(Playing):
         matched = self._publisher.get_subscription_count()
         return bool(able) and matched >= len(able) and self._stage.is_heard
 
-    def _answers(self) -> int:
-        return self._stage.probe.counts.get(self._order.answer or "", 0)
-
-    def _is_answered(self) -> bool:
-        """Whether the newest message was answered, or has had its time for it."""
-        if self._order.answer is None or self._sent <= self._order.before_launch:
-            return True
-        return self._answers() > self._heard or self._now_s - self._sent_s >= self._order.within_s
+    def _listen(self) -> None:
+        """Take note of the answers that came since the last time."""
+        if self._order.answer is None:
+            return
+        messages = self._stage.probe.messages
+        for message in messages[self._read :]:
+            if message.topic == self._order.answer and not (message.is_sent or message.join):
+                self._answers.hear(message.cdr, self._since_sent.elapsed_s)
+        self._read = len(messages)
 
     def _publish(self) -> None:
         order = self._order
@@ -137,6 +146,8 @@ class Publishing(Playing):
         stamp_ns = time.time_ns()
         self._publisher.publish(cdr)
         self._sent += 1
+        if order.repeat_s is None:
+            self.last_ns = stamp_ns
         self._stage.probe.messages.append(
             RawMessage(
                 topic=order.topic,

@@ -104,6 +104,9 @@ class Playing(ABC):
     topic: str | None = None
     """Topic on which a subscription of the student's counts as the first match."""
 
+    last_ns: int | None = None
+    """When it last published something, if there is an end to that."""
+
     @abstractmethod
     def tick(self, elapsed_s: float | None) -> None:
         """Do what is due.
