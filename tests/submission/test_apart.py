@@ -210,6 +210,7 @@ for place in os.environ['PYTHONPATH'].split(':'):
 """
 
 
+@pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow
 def test_messages_are_built_once_and_used_by_each_version_of_a_node(
@@ -254,6 +255,7 @@ def test_messages_are_built_once_and_used_by_each_version_of_a_node(
     assert "model=2" in printed(second, real_ros)
 
 
+@pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow
 def test_it_is_the_same_as_when_all_is_built_together(
@@ -284,6 +286,7 @@ def content(install: Path) -> dict[str, str]:
     }
 
 
+@pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow
 def test_a_message_that_does_not_build_is_told_as_if_all_were_built_together(

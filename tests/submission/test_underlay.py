@@ -90,6 +90,7 @@ def test_underlays_are_seen_behind_the_submission(
         assert paths[:2] == [f"{over}{below}", f"{under}{below}"]
 
 
+@pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow
 def test_a_package_of_ours_that_does_not_build_is_our_fault(tmp_path: Path) -> None:
