@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from grader import resources, ros
+from grader.assignment.interfaces import FOLDER
 from grader.assignment.load import load_assignment
-from grader.batch.type_support import INTERFACES_FOLDER, TypeSupport
+from grader.batch.type_support import TypeSupport
 from grader.recording.interface import sections_of
 from grader.ros import RosInstallation
 
@@ -21,7 +22,7 @@ def test_an_assignment_of_ros_messages_needs_nothing(tmp_path: Path) -> None:
 
 
 def test_the_copy_is_that_of_the_reference() -> None:
-    copies = load_assignment("custom_interface").folder / INTERFACES_FOLDER
+    copies = load_assignment("custom_interface").folder / FOLDER
     for copy in (path for path in copies.rglob("*") if path.is_file()):
         reference = resources.reference() / "custom_interface" / copy.relative_to(copies)
         assert copy.read_bytes() == reference.read_bytes(), copy
