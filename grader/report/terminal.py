@@ -19,6 +19,7 @@ from grader.recording.model import Recording
 from grader.report import words
 from grader.report.changes import Change, changes
 from grader.report.clean import clean, one_line
+from grader.report.remarks import remarks
 
 _STYLE = {
     Status.PASSED: "green",
@@ -55,7 +56,7 @@ def print_grade(
     for result in (*grade.of(Status.FAILED), *grade.of(Status.ERROR)):
         console.print()
         _explain(console, result)
-    _tell_limits(console, recordings)
+    _tell_runs(console, recordings)
     console.print()
     _conclude(console, grade)
 
@@ -84,7 +85,7 @@ def print_changes(
     for result in explained:
         console.print()
         _explain(console, result)
-    _tell_limits(console, recordings)
+    _tell_runs(console, recordings)
     console.print()
     _conclude(console, after, before)
 
@@ -194,17 +195,28 @@ def _rows(result: CheckResult, item: ScenarioFinding) -> Iterator[tuple[str, str
         yield "printed", "\n".join(lines[-_LOG_LINES:])
 
 
-def _tell_limits(console: Console, recordings: Mapping[str, Recording]) -> None:
-    """Say which limits of the sandbox were reached, in which run and when."""
-    reached = [(run, breach) for run in recordings.values() for breach in run.breaches]
-    if not reached:
-        return
-    console.print()
-    console.print(Text("Limits of the sandbox that were reached", "bold"))
-    for run, breach in reached:
-        when = f"{run.since_launch_s(breach.time_ns):.1f} s after launch"
-        text = f"{words.limit_reached(breach)} (scenario {run.scenario}, {when})"
-        console.print(_hanging(console, "reached", text))
+def _tell_runs(console: Console, recordings: Mapping[str, Recording]) -> None:
+    """Say which limits of the sandbox were reached, when, and what else is worth knowing."""
+    reached = [
+        f"{words.limit_reached(breach)} (scenario {run.scenario}, "
+        f"{run.since_launch_s(breach.time_ns):.1f} s after launch)"
+        for run in recordings.values()
+        for breach in run.breaches
+    ]
+    remarked = [
+        f"{remark} (scenario {run.scenario})"
+        for run in recordings.values()
+        for remark in remarks(run)
+    ]
+    for title, label, texts in (
+        (words.LIMITS_REACHED, "reached", reached),
+        (words.WORTH_KNOWING, "remark", remarked),
+    ):
+        if texts:
+            console.print()
+            console.print(Text(title, "bold"))
+            for text in texts:
+                console.print(_hanging(console, label, text))
 
 
 def _conclude(console: Console, grade: Grade, before: Grade | None = None) -> None:

@@ -53,6 +53,8 @@ ENVIRONMENT = {
 }
 
 
+LIMITS_REACHED = "Limits of the sandbox that were reached"
+WORTH_KNOWING = "Worth knowing"
 ADVICE = ("try next", "also")
 """What stands before the first piece of advice, and before every other."""
 

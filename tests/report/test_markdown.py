@@ -118,3 +118,12 @@ def test_limits_of_the_sandbox_that_were_reached_are_told_and_are_text():
     assert "**Limits of the sandbox that were reached**" in text
     assert "- scenario listen: its processes took all space in &lt;b&gt;" in text
     assert "Limits" not in rendered(sample)
+
+
+def test_what_is_worth_knowing_of_a_run_is_told_and_is_text():
+    sample = full_points()
+    run = make_run(environment={"other_domains": "<b>7</b>"})
+    text = rendered(replace(sample, recordings={"listen": run}))
+    assert "**Worth knowing**" in text
+    assert "- scenario listen: the submission joined another ROS domain: &lt;b&gt;7" in text
+    assert "Worth knowing" not in rendered(sample)

@@ -118,6 +118,19 @@ Score: 3 of 3 points
     assert "Limits" not in printed(sample)
 
 
+def test_what_is_worth_knowing_of_a_run_is_told():
+    sample = full_points()
+    run = make_run(environment={"other_domains": "7"})
+    text = printed(replace(sample, recordings={"listen": run}), 80)
+    assert text.endswith("""
+Worth knowing
+  remark    the submission joined another ROS domain: 7 (scenario listen)
+
+Score: 3 of 3 points
+""")
+    assert "Worth knowing" not in printed(sample)
+
+
 def test_marks_below_a_line_of_a_traceback_are_left_out():
     lines = (
         "    sys.exit(load())",
