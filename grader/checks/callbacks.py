@@ -38,7 +38,7 @@ class Runs(Reported):
         description="How far the median of the times between starts may be from the period: a "
         "share of it or a time.",
     )
-    at_least: int = Field(3, ge=2, description="How often each callback must have run.")
+    at_least: int = Field(3, ge=1, description="How often each callback must have run.")
 
     @model_validator(mode="after")
     def _one_way(self) -> Runs:
@@ -54,7 +54,8 @@ def run(recording: Recording, parameters: Runs) -> Finding:
     A timer's callback starts once in each `period` (the median of the times between its starts);
     a subscription's callback runs once for each message that the probe sent; messages that still
     wait at the end because other callbacks work without a pause do not count. Each run must have
-    reported its start and its end.
+    reported its start and its end. A start that is late because callbacks worked without a pause
+    until then counts as on time: whether they should have run at once is judged elsewhere.
 
     Explains reports in another form or with other names, periods in milliseconds, callbacks that
     never end or never run, messages that were dropped, and a callback that is registered twice.
@@ -100,7 +101,7 @@ def _judge_period(
 ) -> Finding | None:
     """The finding of a callback that does not run at its period, or None."""
     expected = _run_words(parameters)
-    begins = [item.begin_ns for item in reports.of(callback)]
+    begins = _unhindered(recording, reports, callback, period_s)
     measured = [
         Interval(a, b, (b - a) / NS, begins[max(0, index - 1)])
         for index, (a, b) in enumerate(pairwise(begins))
@@ -127,6 +128,39 @@ def _judge_period(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
     return None if cause is None else cause.finding(expected)
+
+
+def _unhindered(
+    recording: Recording, reports: Reports, callback: str, period_s: float
+) -> list[int]:
+    """Starts of a timer's callback, without the delay by callbacks that worked until then.
+
+    Whether those should have run at the same time is judged elsewhere.
+    """
+    found: list[int] = []
+    for item in reports.of(callback):
+        due_ns = found[-1] + round(period_s * NS) if found else item.begin_ns
+        before = [
+            other.end_ns or recording.stop_ns
+            for other in reports.runs
+            if other.begin_ns < item.begin_ns
+        ]
+        newest_ns = max(before, default=0)
+        # What begins while others still work did not wait for them.
+        waited = due_ns < newest_ns <= item.begin_ns
+        hindered = waited and _worked(recording, reports, due_ns, item.begin_ns)
+        found.append(min(due_ns, item.begin_ns) if hindered else item.begin_ns)
+    return found
+
+
+def _worked(recording: Recording, reports: Reports, from_ns: int, to_ns: int) -> bool:
+    """Whether callbacks worked without a pause from one time to another."""
+    free_ns = from_ns
+    for item in reports.runs:
+        if item.begin_ns >= to_ns or item.begin_ns - free_ns > _PAUSE_S * NS:
+            break
+        free_ns = max(free_ns, item.end_ns or recording.stop_ns)
+    return to_ns - free_ns <= _PAUSE_S * NS
 
 
 def _period_hint(recording: Recording, found_s: float, wanted_s: float) -> str:
@@ -187,13 +221,8 @@ def _busy(recording: Recording, reports: Reports, callback: str) -> bool:
     What waits then is in a queue; whether callbacks should have run at the same time is judged
     elsewhere.
     """
-    mine = reports.of(callback)
-    free_ns = max(item.end_ns or recording.stop_ns for item in mine)
-    for item in reports.runs:
-        if item.begin_ns - free_ns > _PAUSE_S * NS:
-            return False
-        free_ns = max(free_ns, item.end_ns or recording.stop_ns)
-    return recording.stop_ns - free_ns <= _PAUSE_S * NS
+    newest_ns = max(item.end_ns or recording.stop_ns for item in reports.of(callback))
+    return _worked(recording, reports, newest_ns, recording.stop_ns)
 
 
 class Work(Reported):

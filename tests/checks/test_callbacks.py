@@ -153,6 +153,20 @@ class TestRun:
         assert finding.status is Status.ERROR
         assert finding.disturbed
 
+    def test_a_thread_that_is_never_free_is_not_a_wrong_period(self):
+        begins = [1.0 + 0.405 * index for index in range(13)]
+        names = ["timer_1", "timer_2", "chatter"] * 4 + ["timer_1"]
+        runs = [(name, begin, begin + 0.4) for name, begin in zip(names, begins, strict=True)]
+        finding = judged("run", run(*runs), TIMERS, period="1 s")
+        assert finding.status is Status.PASSED
+
+    @pytest.mark.parametrize("period_s", [1.2, 1.5])
+    def test_a_wrong_period_beside_the_work_of_others_is_told(self, period_s):
+        mine = [("timer_1", 1 + period_s * i, 1.4 + period_s * i) for i in range(4)]
+        others = [("timer_2", 1.2 + i, 1.6 + i) for i in range(5)]
+        words = failed("run", run(*mine, *others), ["timer_1"], period="1 s")
+        assert "`timer_1` starts every" in words
+
     def test_too_few_runs(self):
         words = failed("run", run(*only(serial(), "timer_1")[:2]), ["timer_1"], period="1 s")
         assert "ran only 2 times" in words
