@@ -75,6 +75,10 @@ class CachedBuild:
     install: Path | None
 
 
+BUILDS = "builds"
+"""Name of the folder of builds in a cache folder."""
+
+
 class BuildCache:
     """The builds in one cache folder; several processes may use it at once."""
 
@@ -85,7 +89,7 @@ class BuildCache:
             folder: The caller's cache folder, ``builds`` below it is used.
             limits: When old builds are thrown away.
         """
-        self._folder = folder / "builds"
+        self._folder = folder / BUILDS
         self._limits = limits or CacheLimits()
 
     @contextlib.contextmanager
