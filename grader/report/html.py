@@ -122,6 +122,8 @@ def environment() -> Environment:
     # Imported late: the commands that write no report start faster without it.
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+    from grader.report.compiled import CompiledTemplates
+
     environment = Environment(
         loader=FileSystemLoader(resources.templates()),
         autoescape=True,
@@ -129,6 +131,7 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         finalize=_cleaned,
+        bytecode_cache=CompiledTemplates(resources.cache_folder() / "templates"),
     )
     environment.filters["prose"] = _prose
     environment.filters["number"] = words.number
