@@ -181,14 +181,39 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
     gone_m = way_m(run.truth)
     seen = f"{metres(gone_m)} for {metres(straight_m)}, {_longer(gone_m / straight_m)}"
     evidence = Evidence(plots=(run.distance_plot,))
-    if gone_m <= straight_m * (1.0 + parameters.most):
+    allowed_m = straight_m * (1.0 + parameters.most)
+    if gone_m <= allowed_m:
         return Finding.passed(expected, seen, evidence)
+    late = _why_far(run, seen, gone_m - allowed_m)
+    if late is not None:
+        return late.finding(expected)
     return Finding.failed(
         expected,
         seen,
         "It drives while it still looks elsewhere: a larger angular gain, or turn on the spot "
         "first and drive when the heading error is small.",
         Evidence(moments=(_farthest(run),), plots=evidence.plots),
+    )
+
+
+def _why_far(run: Approach, seen: str, more_m: float) -> Cause | None:
+    """The cause if commands that came late by the machine's doing may explain a long path.
+
+    Args:
+        run: The run.
+        seen: What was seen.
+        more_m: How much longer than allowed it is, in m.
+    """
+    lost_s = taken_s(run.recording, run.truth[0].time_ns, run.truth[-1].time_ns)
+    fastest = max(abs(step.linear_m_s) for step in run.truth)
+    # What it drives on without a command, it has to come back.
+    if lost_s <= 0.0 or 2.0 * lost_s * fastest < more_m:
+        return None
+    return Cause(
+        f"{seen}; the machine took up to {format_duration(lost_s)} from the run, which may "
+        "explain it",
+        ours=True,
+        disturbed=True,
     )
 
 

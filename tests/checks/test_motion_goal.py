@@ -392,6 +392,20 @@ class TestMistakes:
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
         failing("motion.settles", run, within=f"{took_s - 2.0} s")
 
+    @pytest.mark.parametrize(("lost_s", "status"), [(0.8, Status.ERROR), (0.1, Status.FAILED)])
+    def test_a_detour_is_excused_by_as_much_as_the_machine_took(self, lost_s, status):
+        goal = (-0.8, 0.1, 0.0)
+        run = run_to(goal, angular=0.5, linear=0.3, seconds=60)
+        steps = list(zip(run.truth, run.truth[1:], strict=False))
+        gone_m = sum(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in steps)
+        # At 0.22 m/s it goes 0.18 m in 0.8 s, and has to come back: more than these 0.2 m.
+        most = (gone_m - 0.2) / math.hypot(0.8, 0.1) - 1.0
+        run = simulated(
+            run.truth, run.scene, messages=run.messages, disturbance=taken(0, 3.0, waited_s=lost_s)
+        )
+        finding = judge("motion.path_length", run, goal=yaml(goal), most=f"{100 * most} %")
+        assert (finding.status, finding.disturbed) == (status, status is Status.ERROR)
+
 
 def test_drive_plain_silence_says_why():
     run = drive(lambda _: None, seconds=2)
