@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pydantic import Field
 
 from grader.assignment.quantity import Duration, Size
@@ -11,12 +13,41 @@ from grader.sandbox.limits import BUILD, BUILD_OUTPUT_BYTES, Limits
 _DEFAULTS = Limits()
 
 
-class LimitOptions(Model):
+class _Bounds(Model):
+    """What the options of runs and builds have in common; each says its own defaults."""
+
+    _least_address_bytes: ClassVar[int]
+
+    memory: Size
+    processes: int
+    cpu_time: Duration
+    file_size: Size
+    disk: Size
+    files: int
+    output: Size
+
+    def limits(self) -> Limits:
+        """For the sandbox."""
+        return Limits(
+            memory_bytes=int(self.memory),
+            processes=self.processes,
+            cpu_s=max(1, round(self.cpu_time)),
+            file_bytes=int(self.file_size),
+            disk_bytes=int(self.disk),
+            files=self.files,
+            output_bytes=int(self.output),
+            address_bytes=max(self._least_address_bytes, 4 * int(self.memory)),
+        )
+
+
+class LimitOptions(_Bounds):
     """What the processes of a student may take in a sandbox.
 
     Without a sandbox nothing is bounded but time. How long a run lasts is bounded by
     `discovery`, `timeout` and `shutdown`.
     """
+
+    _least_address_bytes = _DEFAULTS.address_bytes
 
     memory: Size = Field(
         _DEFAULTS.memory_bytes, description="Of all processes together.", validate_default=False
@@ -45,26 +76,15 @@ class LimitOptions(Model):
         validate_default=False,
     )
 
-    def limits(self) -> Limits:
-        """For the sandbox."""
-        return Limits(
-            memory_bytes=int(self.memory),
-            processes=self.processes,
-            cpu_s=max(1, round(self.cpu_time)),
-            file_bytes=int(self.file_size),
-            disk_bytes=int(self.disk),
-            files=self.files,
-            output_bytes=int(self.output),
-            address_bytes=max(_DEFAULTS.address_bytes, 4 * int(self.memory)),
-        )
 
-
-class BuildLimitOptions(Model):
+class BuildLimitOptions(_Bounds):
     """What the build of a submission may take; `setup.py` and `CMakeLists.txt` are programs, too.
 
     Without a sandbox only `wall_time` and `output` are bounded. A build that passes a limit has
     failed.
     """
+
+    _least_address_bytes = BUILD.address_bytes
 
     memory: Size = Field(
         BUILD.memory_bytes, description="Of all processes together.", validate_default=False
@@ -92,16 +112,3 @@ class BuildLimitOptions(Model):
         description="What is written to the terminal; whoever writes more is ended.",
         validate_default=False,
     )
-
-    def limits(self) -> Limits:
-        """For the sandbox."""
-        return Limits(
-            memory_bytes=int(self.memory),
-            processes=self.processes,
-            cpu_s=max(1, round(self.cpu_time)),
-            file_bytes=int(self.file_size),
-            disk_bytes=int(self.disk),
-            files=self.files,
-            output_bytes=int(self.output),
-            address_bytes=max(BUILD.address_bytes, 4 * int(self.memory)),
-        )
