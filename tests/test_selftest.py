@@ -48,7 +48,7 @@ def test_the_mutation_score_is_perfect(name: str) -> None:
             selftest(loaded, grading, jobs=2 * cpu_count(), chosen=lambda trial: trial.id in kept)
         )
     wrong = {
-        result.trial.id: [str(difference) for difference in result.verdict.differences]
+        result.trial.id: (*map(str, result.verdict.differences), *result.told)
         for result in results
         if not result.verdict.right
     }

@@ -12,6 +12,7 @@ from grader.assignment.limits import BuildLimitOptions
 from grader.assignment.load import LoadedAssignment
 from grader.batch.reference_run import read_references
 from grader.batch.type_support import TypeSupport
+from grader.checks.finding import Status
 from grader.errors import GraderFault
 from grader.grade import Grade, grade
 from grader.recording.fact import to_json
@@ -161,7 +162,8 @@ class Grading:
             runs.update(dict.fromkeys(again, attempt))
             result = grade(self._loaded, prepared.record, recordings, faults)
             again = sorted(
-                set(result.disturbed_scenarios())
+                set(result.disturbed_scenarios(Status.ERROR))
+                | {name for name in result.disturbed_scenarios(Status.FAILED) if runs[name] == 1}
                 | {name for name, recording in recordings.items() if recording.faults}
                 | set(faults)
             )

@@ -6,6 +6,7 @@ mutant must lose exactly the checks that it names.
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -16,6 +17,7 @@ from pathlib import Path
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import Change, Mutant, Verdict, expected_statuses, verdict
 from grader.assignment.mutation import apply, load_mutants
+from grader.assignment.quantity import format_duration
 from grader.batch.grading import Graded, Grading
 from grader.checks.finding import Status
 from grader.report.facts import RunFacts
@@ -61,6 +63,7 @@ class TrialResult:
         graded: Whether all could be judged.
         repeated: Whether a scenario was run more than once.
         grade: As :func:`grader.report.grade_part.grade_json` writes it.
+        told: What the checks said that ended otherwise than they must.
     """
 
     trial: Trial
@@ -69,6 +72,7 @@ class TrialResult:
     graded: bool
     repeated: bool
     grade: str
+    told: tuple[str, ...] = ()
 
 
 def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Trial, ...]:
@@ -134,14 +138,32 @@ def run_trial(
         expected = dict.fromkeys(actual, Status.PASSED)
     else:
         expected = expected_statuses(loaded.assignment, trial.change)
+    outcome = verdict(expected, actual)
     return TrialResult(
         trial=trial,
-        verdict=verdict(expected, actual),
+        verdict=outcome,
         lost=tuple(name for name, status in actual.items() if status is Status.FAILED),
         graded=graded.grade.graded,
         repeated=any(count > 1 for count in graded.runs.values()),
         grade=grade_json(make_result(graded.grade, graded.recordings, RunFacts("", 0.0))),
+        told=tuple(
+            line
+            for one in outcome.differences
+            if one.actual is not None
+            for line in _told(graded, one.check)
+        ),
     )
+
+
+def _told(graded: Graded, check: str) -> Iterator[str]:
+    for item in graded.grade.result(check).findings:
+        place, taken = "", ""
+        recording = graded.recordings.get(item.scenario or "")
+        if recording is not None:
+            place = f" in {item.scenario}"
+            taken_s = recording.taken_s(recording.launched_ns, recording.end_ns)
+            taken = f" (the machine took {format_duration(taken_s)} from the run)"
+        yield f"{check}{place}: {item.finding.observed}{taken}"
 
 
 def selftest(
@@ -150,6 +172,7 @@ def selftest(
     *,
     jobs: int,
     reference: Path | None = None,
+    keep: Path | None = None,
     chosen: Callable[[Trial], bool] = lambda _: True,
     on_start: Callable[[Trial], None] = lambda _: None,
     on_graded: Callable[[Graded], None] = lambda _: None,
@@ -161,6 +184,8 @@ def selftest(
         grading: Grades submissions of it.
         jobs: Submissions at the same time; the cells are admitted by the runner.
         reference: Folder of the reference solution, by default rosgrade's own.
+        keep: Where the submissions and recordings of trials go that ended otherwise than they
+            must, a folder for each.
         chosen: Leaves trials out.
         on_start: Told when a trial begins.
         on_graded: Told everything that was found of a trial, which is not kept.
@@ -174,7 +199,11 @@ def selftest(
 
         def work(trial: Trial) -> TrialResult:
             on_start(trial)
-            return run_trial(trial, loaded, grading, base, folder, on_graded)
+            result = run_trial(trial, loaded, grading, base, folder, on_graded)
+            if keep is not None and not result.verdict.right:
+                for part in ("submissions", "recordings"):
+                    _keep(folder / part / trial.id, keep / trial.id / part)
+            return result
 
         with ThreadPoolExecutor(max_workers=jobs) as pool:
             futures = [
@@ -188,6 +217,12 @@ def selftest(
                     future.cancel()
                 grading.close()
                 raise
+
+
+def _keep(folder: Path, target: Path) -> None:
+    if folder.is_dir():
+        shutil.rmtree(target, ignore_errors=True)
+        shutil.copytree(folder, target, symlinks=True)
 
 
 @dataclass(frozen=True)

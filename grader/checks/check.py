@@ -51,6 +51,11 @@ class Check:
         return inspect.getdoc(self.judge) or ""
 
     @property
+    def of_control(self) -> bool:
+        """Whether it judges what a control loop did: where a robot went and was told to go."""
+        return self.name.startswith("motion.")
+
+    @property
     def title(self) -> str:
         """First line of the documentation, without the full stop."""
         return self.documentation.partition("\n")[0].rstrip(".")

@@ -166,8 +166,8 @@ class Finding:
             YAML is shown besides.
         credit: Share of the points in [0, 1].
         evidence: Where to see it.
-        disturbed: For an error: the host took so much that the verdict would not be fair;
-            the run is worth repeating.
+        disturbed: The run is worth repeating. For an error: the host took so much that the
+            verdict would not be fair. For a failure: the host may have had a part in it.
     """
 
     status: Status

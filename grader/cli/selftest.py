@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -31,6 +32,13 @@ def selftest(
         bool,
         typer.Option("--record", help="Grade only the reference, and keep its runs for reports."),
     ] = False,
+    keep: Annotated[
+        Path | None,
+        typer.Option(
+            file_okay=False,
+            help="Folder for the submissions and recordings of what was judged wrongly.",
+        ),
+    ] = None,
     sandbox: SandboxChoice = Choice.AUTO,
     quiet: Quiet = False,
 ) -> None:
@@ -60,6 +68,7 @@ def selftest(
                 loaded,
                 grading,
                 jobs=jobs or 2 * cpu_count(),
+                keep=keep and keep / loaded.assignment.id,
                 chosen=lambda trial: not record or trial.role is Role.REFERENCE,
                 on_graded=partial(_keep, loaded, kept) if record else lambda _: None,
             ):
@@ -104,3 +113,6 @@ def _print(console: Console, assignment: str, results: list[TrialResult]) -> Non
             escape(wrong or ", ".join(result.lost) or "nothing"),
         )
     console.print(table)
+    for result in results:
+        for line in result.told:
+            console.print(f"{result.trial.id}: {line}", markup=False, soft_wrap=True)

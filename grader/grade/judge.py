@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from grader.assignment.model import CheckSpec
 from grader.checks.check import Subject
 from grader.checks.finding import Finding, Status
+from grader.checks.lateness import was_out_of_hand
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding
 from grader.grade.order import dependency_order
 from grader.grade.points import points_for
@@ -156,6 +158,14 @@ def _judge(
     try:
         finding = bound.check.judge(subject, bound.parameters)
         misuse = _misuse(finding)
+        if (
+            not misuse
+            and finding.status is Status.FAILED
+            and isinstance(subject, Recording)
+            and bound.check.of_control
+            and was_out_of_hand(subject)
+        ):
+            finding = replace(finding, disturbed=True)
     except Exception as error:
         # Whatever a check raises is a bug in it, and must not cost the student anything.
         told = "".join(traceback.format_exception(error))

@@ -135,13 +135,18 @@ class Grade:
             default=None,
         )
 
-    def disturbed_scenarios(self) -> tuple[str, ...]:
-        """Scenarios that the host disturbed too much to judge: worth repeating alone."""
+    def disturbed_scenarios(self, status: Status) -> tuple[str, ...]:
+        """Scenarios that are worth repeating alone, because the host disturbed them.
+
+        Args:
+            status: ``ERROR`` for those that could not be judged; ``FAILED`` for those where the
+                host may have had a part in a failure.
+        """
         disturbed = {
             item.scenario
             for result in self.results
             for item in result.findings
-            if item.finding.status is Status.ERROR and item.finding.disturbed
+            if item.finding.status is status and item.finding.disturbed
         }
         return tuple(
             scenario.id for scenario in self.assignment.scenarios if scenario.id in disturbed

@@ -145,6 +145,36 @@ def test_a_disturbed_run_is_repeated_alone(grade: Grade) -> None:
     assert graded.runs == {"run": 2}
 
 
+def test_a_failure_of_a_robot_that_the_host_held_up_counts_if_it_happens_again(
+    grade: Grade, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def doubted(loaded: LoadedAssignment, *arguments: object) -> object:
+        graded = judge(loaded, *arguments)
+        results = tuple(
+            dataclasses.replace(
+                result,
+                findings=tuple(
+                    dataclasses.replace(
+                        item, finding=dataclasses.replace(item.finding, disturbed=True)
+                    )
+                    for item in result.findings
+                ),
+            )
+            for result in graded.results
+        )
+        return dataclasses.replace(graded, results=results)
+
+    judge = grading_module.grade
+    monkeypatch.setattr(grading_module, "grade", doubted)
+    wrong = recording(stop_s=2.5)
+    graded, runner = grade(wrong, recording())
+    assert graded.grade.full_points
+    assert runner.alone == [False, True]
+    graded, runner = grade(wrong, wrong)
+    assert graded.grade.result("ends").status is Status.FAILED
+    assert runner.alone == [False, True]
+
+
 def test_after_three_disturbed_runs_it_is_not_graded_and_costs_nothing(grade: Grade) -> None:
     disturbed = recording(stop_s=2.5, taken_s=3.0)
     graded, runner = grade(disturbed, disturbed, disturbed)

@@ -38,6 +38,7 @@ class Told:
     title: str = ""
     hint: str = ""
     visibility: str = "visible"
+    uses: str = "told.told"
     asked: list[Any] = field(default_factory=list, compare=False)
 
     def bound(self) -> BoundCheck:
@@ -45,7 +46,7 @@ class Told:
             {
                 "id": self.id,
                 "title": self.title or f"Title of {self.id}",
-                "uses": "told.told",
+                "uses": self.uses,
                 "points": self.points,
                 "requires": self.requires,
                 "scenarios": self.scenarios,
@@ -54,7 +55,7 @@ class Told:
             }
         )
         return BoundCheck(
-            spec, Check("told.told", self.subject, NoParameters, self._judge), NoParameters()
+            spec, Check(self.uses, self.subject, NoParameters, self._judge), NoParameters()
         )
 
     def _judge(self, subject: Any, parameters: NoParameters) -> Any:

@@ -6,10 +6,11 @@ from grader.checks.check import Subject
 from grader.checks.finding import Finding, Status
 from grader.errors import GraderFault
 from grader.grade import grade
-from grader.recording.model import Ending
+from grader.recording.model import NS, Disturbance, Ending, Truth
 from grader.submission.record import BuildRecord, SourceError
 from tests.grade.sample import (
     FAIL,
+    LAUNCHED_NS,
     PASS,
     Told,
     make_loaded,
@@ -23,6 +24,13 @@ def judge(*checks, scenarios=("listen",), submission=None, recordings=None):
     if recordings is None:
         recordings = {name: make_recording(name) for name in scenarios}
     return grade(make_loaded(checks, scenarios), submission, recordings)
+
+
+def drive(seconds):
+    """A robot that stands there, told about every second."""
+    return tuple(
+        Truth(LAUNCHED_NS + k * NS, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None) for k in range(seconds)
+    )
 
 
 def statuses(result):
@@ -202,7 +210,27 @@ class TestOurFaults:
             Told("node", {"a": PASS, "b": Finding.error("", "broken"), "c": disturbed}),
             scenarios=("a", "b", "c"),
         )
-        assert result.disturbed_scenarios() == ("a", "c")
+        assert result.disturbed_scenarios(Status.ERROR) == ("a", "c")
+        assert result.disturbed_scenarios(Status.FAILED) == ()
+
+    @pytest.mark.parametrize(
+        ("uses", "waited_s", "every_s", "again"),
+        [
+            pytest.param("motion.reaches", 0.3, 9.0, True, id="held up once for long"),
+            pytest.param("motion.reaches", 0.01, 0.2, False, id="many short waits"),
+            pytest.param("motion.reaches", 0.0, 9.0, False, id="left alone"),
+            pytest.param("node.exists", 0.3, 9.0, False, id="not about a control loop"),
+        ],
+    )
+    def test_where_a_held_up_robot_went_is_worth_a_second_run(self, uses, waited_s, every_s, again):
+        waits = [
+            Disturbance(LAUNCHED_NS + round(k * every_s * NS), 0, round(waited_s * NS))
+            for k in range(1, round(20 / every_s))
+        ]
+        run = make_recording("a", truth=drive(20), disturbance=tuple(waits))
+        result = judge(Told("goal", FAIL, uses=uses), scenarios=("a",), recordings={"a": run})
+        assert result.result("goal").status is Status.FAILED
+        assert result.disturbed_scenarios(Status.FAILED) == (("a",) if again else ())
 
 
 class TestNotRun:
