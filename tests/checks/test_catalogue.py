@@ -2,14 +2,19 @@
 
 import json
 import math
+import subprocess
+import sys
 from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from grader import checks
 from grader.checks.catalogue import CATALOGUE, gather, get
-from grader.checks.check import Subject
+from grader.checks.check import Check, Subject
 from grader.checks.finding import Finding, Status
 from grader.recording.model import (
     Call,
@@ -174,6 +179,24 @@ def ahead_to_the_goal():
 
 def test_every_check_is_tried_here():
     assert set(PARAMETERS) == set(CATALOGUE)
+
+
+def test_every_check_that_is_defined_is_found_by_its_family():
+    modules = [
+        import_module(f"grader.checks.{module.name}") for module in iter_modules(checks.__path__)
+    ]
+    defined = {
+        item.name for module in modules for item in vars(module).values() if isinstance(item, Check)
+    }
+    assert {name for name in defined if name in CATALOGUE} == defined == set(CATALOGUE)
+
+
+def test_an_assignment_without_rotations_does_not_wait_for_numpy():
+    code = (
+        "import sys; from grader.assignment.load import load_assignment; "
+        "load_assignment('timed_publisher'); assert 'numpy' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize("name", sorted(set(PARAMETERS) - ABSENT))
