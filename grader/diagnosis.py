@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from importlib import metadata
 
 from grader import ros
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.errors import GraderFault
 from grader.run.load import cpu_count
 

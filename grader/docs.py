@@ -18,7 +18,7 @@ from pydantic import BaseModel
 
 from grader import resources
 from grader.assignment import asking, limits, model, mutant, stimulus
-from grader.assignment.quantity import UNITS, Dimension, format_duration
+from grader.assignment.unit import UNITS, Dimension, format_duration
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance

@@ -23,7 +23,6 @@ from pydantic import AfterValidator, Field, model_validator
 from grader.assignment.name import topic_name
 from grader.assignment.quantity import (
     AngularSpeed,
-    Dimension,
     Duration,
     DurationOrZero,
     Frequency,
@@ -32,6 +31,7 @@ from grader.assignment.quantity import (
     Speed,
 )
 from grader.assignment.source import Model, read_source
+from grader.assignment.unit import Dimension
 from sim.coordinates import PoseInPlane, PositiveMetres
 from sim.motion import ORIGIN, Pose
 

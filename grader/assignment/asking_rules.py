@@ -14,7 +14,7 @@ from grader.assignment.binding import BoundCheck
 from grader.assignment.document import Place
 from grader.assignment.draft import Draft
 from grader.assignment.model import Scenario
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks.action import OfGoals, Result
 from grader.checks.action_end import Cancels, Preempts
 from grader.checks.lifecycle import State

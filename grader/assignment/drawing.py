@@ -6,7 +6,7 @@ import random
 from typing import Any
 
 from grader.assignment.model import Scenario
-from grader.assignment.quantity import parse_any
+from grader.assignment.unit import parse_any
 from grader.errors import UsageError
 from grader.nearest import did_you_mean
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.assignment.document import Place, path
-from grader.assignment.quantity import parse_any
+from grader.assignment.unit import parse_any
 from grader.nearest import did_you_mean
 from grader.recording.interface import FLOATS, INTEGERS, TEXTS, Field, fields_of
 

@@ -23,9 +23,10 @@ from grader.assignment.name import (
     Reliability,
     TopicName,
 )
-from grader.assignment.quantity import Duration, DurationOrZero, PositiveLength, parse_any
+from grader.assignment.quantity import Duration, DurationOrZero, PositiveLength
 from grader.assignment.source import Model
 from grader.assignment.stimulus import Stimulus
+from grader.assignment.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
 
 __all__ = [

@@ -1,178 +1,21 @@
-"""Quantities with units: ``300 ms`` in YAML, seconds in the code.
-
-Inside the program every quantity is a float in SI units (REP-103: metres, seconds,
-radians); this module is the only place that knows other units.
-"""
+"""Quantities with units as fields of models: ``300 ms`` in YAML, seconds in the code."""
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-
-class Dimension(Enum):
-    """A physical dimension, with its units as factors to SI."""
-
-    TIME = "time"
-    FREQUENCY = "frequency"
-    LENGTH = "length"
-    ANGLE = "angle"
-    SPEED = "speed"
-    ANGULAR_SPEED = "angular speed"
-    ACCELERATION = "acceleration"
-    ANGULAR_ACCELERATION = "angular acceleration"
-    RATIO = "ratio"
-    SIZE = "size"
-
-    @property
-    def phrase(self) -> str:
-        """The name with its article."""
-        return f"{'an' if self.value[0] in 'aeiou' else 'a'} {self.value}"
-
-
-_DEGREE = math.pi / 180.0
-UNITS: dict[Dimension, dict[str, float]] = {
-    Dimension.TIME: {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    Dimension.FREQUENCY: {"Hz": 1.0, "kHz": 1e3, "mHz": 1e-3},
-    Dimension.LENGTH: {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3},
-    Dimension.ANGLE: {"rad": 1.0, "deg": _DEGREE},
-    Dimension.SPEED: {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-    Dimension.ANGULAR_SPEED: {"rad/s": 1.0, "deg/s": _DEGREE},
-    Dimension.ACCELERATION: {"m/s^2": 1.0, "cm/s^2": 1e-2},
-    Dimension.ANGULAR_ACCELERATION: {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
-    Dimension.RATIO: {"%": 1e-2},
-    Dimension.SIZE: {"B": 1.0, "KiB": 2.0**10, "MiB": 2.0**20, "GiB": 2.0**30},
-}
-
-# What people write instead, in lower case.
-_MISSPELT = {
-    **{unit.casefold(): unit for units in UNITS.values() for unit in units if unit != "mHz"},
-    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
-    **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
-    **dict.fromkeys(("μs", "usec", "microsecond", "microseconds"), "us"),
-    **dict.fromkeys(("minute", "minutes"), "min"),
-    **dict.fromkeys(("hertz", "1/s"), "Hz"),
-    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
-    **dict.fromkeys(("degree", "degrees", "°"), "deg"),
-    **dict.fromkeys(("radian", "radians"), "rad"),
-    **dict.fromkeys(("°/s", "degrees/s"), "deg/s"),
-    **dict.fromkeys(("percent", "pct"), "%"),
-    **dict.fromkeys(("m/s2", "m/s²", "m/s/s"), "m/s^2"),
-    **dict.fromkeys(("rad/s2", "rad/s²"), "rad/s^2"),
-    **dict.fromkeys(("kb", "k"), "KiB"),
-    **dict.fromkeys(("mb",), "MiB"),
-    **dict.fromkeys(("gb", "g"), "GiB"),
-    **dict.fromkeys(("byte", "bytes"), "B"),
-}
-
-_NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*([^\s0-9:.,+-]\S*)?\s*")
-
-
-def parse_quantity(text: str | int | float, dimension: Dimension) -> float:
-    """Read a quantity.
-
-    Args:
-        text: A number and a unit such as ``"300 ms"``. Zero may stand without a unit, and so
-            may a ratio below one (``0.05`` is ``5 %``).
-        dimension: What must be given.
-
-    Returns:
-        The value in SI units.
-
-    Raises:
-        ValueError: With a message that names the allowed units.
-    """
-    allowed = ", ".join(UNITS[dimension])
-    if isinstance(text, bool) or not isinstance(text, str | int | float):
-        raise ValueError(f"expected {dimension.phrase} with a unit ({allowed})")
-    match = _QUANTITY.fullmatch(str(text))
-    if not match:
-        raise ValueError(
-            f"{text!r} is not {dimension.phrase}: write a number and a unit ({allowed})"
-        )
-    unit = match[2]
-    value = float(match[1]) * (_factor(unit, dimension) if unit else 1.0)
-    if not math.isfinite(value):
-        raise ValueError(f"{text!r} is not finite")
-    if not unit and value != 0.0:
-        if dimension is not Dimension.RATIO:
-            example = f"{match[1]} {next(iter(UNITS[dimension]))}"
-            raise ValueError(f"{text!r} has no unit: write for example {example!r}")
-        if abs(value) >= 1.0:
-            raise ValueError(f"{text!r} has no unit: did you mean '{match[1]} %'?")
-    return value
-
-
-def write_quantity(value: float, dimension: Dimension) -> str:
-    """Write a value in SI units so that :func:`parse_quantity` reads the same value again."""
-    if dimension is Dimension.RATIO:
-        return repr(value) if abs(value) < 1.0 else f"{value * 100.0!r} %"
-    return f"{value!r} {next(iter(UNITS[dimension]))}"
-
-
-def parse_any(text: str | int | float) -> tuple[float, str]:
-    """Read a number with any unit, or without one.
-
-    Returns:
-        The value in SI units and the SI unit, such as ``(1.57, "rad")``; an empty unit for a
-        bare number.
-
-    Raises:
-        ValueError: It is not a number, or has an unknown unit.
-    """
-    match = None if isinstance(text, bool) else _QUANTITY.fullmatch(str(text))
-    if not match:
-        raise ValueError(f"{text!r} is not a number, with or without a unit")
-    if not match[2]:
-        return float(match[1]), ""
-    for dimension, units in UNITS.items():
-        if match[2] in units:
-            return parse_quantity(text, dimension), next(iter(units))
-    raise ValueError(f"unknown unit {match[2]!r} in {text!r}")
-
-
-def _factor(unit: str, dimension: Dimension) -> float:
-    """Factor of a unit to SI.
-
-    Raises:
-        ValueError: The unit does not exist, or belongs to another dimension.
-    """
-    units = UNITS[dimension]
-    if unit in units:
-        return units[unit]
-    allowed = ", ".join(units)
-    for other, theirs in UNITS.items():
-        if unit in theirs:
-            raise ValueError(
-                f"{unit!r} is a unit of {other.value}, but {dimension.phrase} "
-                f"is needed here ({allowed})"
-            )
-    meant = _MISSPELT.get(unit.casefold())
-    if meant in units:
-        raise ValueError(f"unknown unit {unit!r}. Did you mean {meant!r}?")
-    raise ValueError(f"unknown unit {unit!r}: {dimension.phrase} has one of {allowed}")
-
-
-_SHOWN_TIMES = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
-
-
-def format_duration(seconds: float) -> str:
-    """Write a time for people: ``300 ms``, ``1.25 s``, ``5 min``, at most four digits."""
-    size = abs(seconds)
-    if size >= 300.0:
-        return f"{seconds / 60.0:.4g} min"
-    for factor, unit in _SHOWN_TIMES:
-        if size >= factor:
-            return f"{seconds / factor:.4g} {unit}"
-    return f"{seconds * 1e9:.3g} ns" if size else "0 s"
+from grader.assignment.unit import (
+    UNITS,
+    Dimension,
+    parse_quantity,
+    quantity_pattern,
+    write_quantity,
+)
 
 
 def refusal(text: str) -> PydanticCustomError:
@@ -227,11 +70,9 @@ class QuantityOf:
     ) -> dict[str, Any]:
         """Describe the quantity to an editor."""
         units = UNITS[self.dimension]
-        pattern = "|".join(re.escape(unit) for unit in units)
         ratio = self.dimension is Dimension.RATIO
-        optional = "?" if ratio else ""
         forms: list[dict[str, Any]] = [
-            {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*({pattern}){optional}\s*$"}
+            {"type": "string", "pattern": quantity_pattern(self.dimension)}
         ]
         if ratio:
             forms.append({"type": "number", "exclusiveMinimum": -1, "exclusiveMaximum": 1})

@@ -9,8 +9,8 @@ from grader.assignment.binding import BoundCheck
 from grader.assignment.document import Place
 from grader.assignment.draft import Draft
 from grader.assignment.model import Launch, Package, Scenario
-from grader.assignment.quantity import format_duration
 from grader.assignment.stimulus import Join, Publish
+from grader.assignment.unit import format_duration
 from grader.assignment.withheld import SHOWN_FROM
 from grader.checks.check import Subject
 from grader.errors import Problem

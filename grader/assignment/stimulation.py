@@ -11,10 +11,10 @@ from grader.assignment.interfaces import Interfaces
 from grader.assignment.message import Find
 from grader.assignment.messages import StimulusError, messages_of
 from grader.assignment.model import Assignment, Scenario
-from grader.assignment.quantity import format_duration
 from grader.assignment.requests import mistakes
 from grader.assignment.source import Source
 from grader.assignment.stimulus import Join, Kill, Publish, Restart
+from grader.assignment.unit import format_duration
 from grader.errors import Problem
 from grader.nearest import did_you_mean
 

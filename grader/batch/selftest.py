@@ -17,7 +17,7 @@ from pathlib import Path
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutant import Change, Mutant, Verdict, expected_statuses, verdict
 from grader.assignment.mutation import apply, load_mutants
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.batch.grading import Graded, Grading
 from grader.checks.finding import Status
 from grader.report.facts import RunFacts

@@ -7,7 +7,8 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from grader.assignment.model import InterfaceName, TopicName
-from grader.assignment.quantity import Duration, Frequency, Ratio, format_duration
+from grader.assignment.quantity import Duration, Frequency, Ratio
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.fields import TOLERANCE, difference_table, difference_words, unlike

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks.action import OfGoals, cannot, type_of
 from grader.checks.cause import Cause
 from grader.checks.check import Subject, check

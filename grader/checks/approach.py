@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.contact import why_touched
 from grader.checks.finding import Evidence, Moment, Plot

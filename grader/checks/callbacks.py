@@ -9,7 +9,8 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks.callback_run import Reports, read_reports, spans
 from grader.checks.check import Subject, check
 from grader.checks.death import cause_of_death, dead

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks.finding import Table
 from grader.recording.model import Qos
 

@@ -8,12 +8,8 @@ from statistics import median
 
 from pydantic import Field
 
-from grader.assignment.quantity import (
-    PositiveLength,
-    Ratio,
-    Speed,
-    format_duration,
-)
+from grader.assignment.quantity import PositiveLength, Ratio, Speed
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.contact import why_touched

@@ -7,7 +7,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, field_validator
 
-from grader.assignment.quantity import Duration, Ratio, format_duration
+from grader.assignment.quantity import Duration, Ratio
+from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check

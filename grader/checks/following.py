@@ -8,7 +8,8 @@ from collections.abc import Mapping, Sequence
 from pydantic import Field
 
 from grader.assignment.name import TopicName
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table

@@ -7,7 +7,8 @@ from itertools import pairwise
 
 from pydantic import Field, model_validator
 
-from grader.assignment.quantity import Angle, Duration, PositiveLength, Ratio, format_duration
+from grader.assignment.quantity import Angle, Duration, PositiveLength, Ratio
+from grader.assignment.unit import format_duration
 from grader.checks.approach import Approach, approach, why_not_aligned, why_not_there
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.fields import has_fields

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.command import Command, command_topic, commands, is_zero
 from grader.checks.compatibility import compatibility_table, refusals

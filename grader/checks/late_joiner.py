@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from grader.assignment.name import Id, TopicName
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import compatibility_table, refusals

@@ -10,7 +10,8 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.assignment.name import TopicName
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.silence import why_silent

@@ -7,7 +7,8 @@ from typing import Literal
 from pydantic import Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.echo import Echo, echoes, wanted_values
 from grader.checks.field import FieldPath

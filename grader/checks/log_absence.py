@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks.blockage import HINT, first_unanswered, where_blocked, why_never_spun
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead

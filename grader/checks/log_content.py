@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from grader.assignment.quantity import Frequency, Ratio, format_duration
+from grader.assignment.quantity import Frequency, Ratio
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead

@@ -7,7 +7,8 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import NoParameters, Parameters, Subject, check

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks import concurrency
 from grader.checks.callback_run import Overlap, Reports, Run, overlaps, read_reports, spans
 from grader.checks.check import Subject, check

@@ -9,7 +9,8 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration, Ratio, format_duration
+from grader.assignment.quantity import Duration, Ratio
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Subject, check
 from grader.checks.death import cause_of_death, dead

@@ -7,7 +7,8 @@ from itertools import pairwise
 from pydantic import Field, model_validator
 
 from grader.assignment.name import TopicName
-from grader.assignment.quantity import Frequency, format_duration
+from grader.assignment.quantity import Frequency
+from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.sighting import first_seen

@@ -11,13 +11,8 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from grader.assignment.name import ID
-from grader.assignment.quantity import (
-    Dimension,
-    parse_quantity,
-    refusal,
-    write_quantity,
-    written_as_read,
-)
+from grader.assignment.quantity import refusal, written_as_read
+from grader.assignment.unit import Dimension, parse_quantity, write_quantity
 from grader.nearest import did_you_mean
 from sim.coordinates import metres
 from sim.motion import Pose, wrap_angle

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from statistics import mean
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.period import Interval, Limits, Verdict
 from grader.recording.model import Kind, Recording

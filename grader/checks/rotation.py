@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Dimension, QuantityOf
+from grader.assignment.quantity import QuantityOf
+from grader.assignment.unit import Dimension
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.conversion import (

@@ -8,7 +8,8 @@ from typing import Any, Literal
 from pydantic import Field
 
 from grader.assignment.model import InterfaceName, TopicName
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks import compatibility, testimony
 from grader.checks.blockage import HINT, first_unanswered, where_blocked, why_never_spun
 from grader.checks.cause import Cause

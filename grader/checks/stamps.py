@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.finding import Evidence, Moment
 from grader.recording.model import NS, Message, Recording

@@ -6,7 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.assignment.quantity import Length, PositiveLength, Speed, format_duration
+from grader.assignment.quantity import Length, PositiveLength, Speed
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.command import scans

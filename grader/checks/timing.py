@@ -5,7 +5,8 @@ from __future__ import annotations
 from pydantic import Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration, Ratio, format_duration
+from grader.assignment.quantity import Duration, Ratio
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead

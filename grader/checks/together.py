@@ -7,7 +7,8 @@ from functools import reduce
 
 from pydantic import Field
 
-from grader.assignment.quantity import Duration, format_duration
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
 from grader.checks import concurrency
 from grader.checks.callback_run import Reports, Run, read_reports, spans
 from grader.checks.check import Subject, check

@@ -8,13 +8,8 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from grader.assignment.quantity import (
-    UNITS,
-    Dimension,
-    format_duration,
-    parse_quantity,
-    refusal,
-)
+from grader.assignment.quantity import refusal
+from grader.assignment.unit import UNITS, Dimension, format_duration, parse_quantity
 from grader.checks.wording import percent
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.blockage import why_never_spun
 from grader.checks.cause import Cause

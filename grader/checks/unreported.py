@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pydantic import Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import format_duration
+from grader.assignment.unit import format_duration
 from grader.checks.callback_run import Reports, spans
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters

@@ -6,6 +6,8 @@ the machine's), 130 interrupted.
 
 from __future__ import annotations
 
+import atexit
+import gc
 import sys
 
 import typer
@@ -32,6 +34,8 @@ from grader.errors import GraderFault, RosgradeError
 
 USAGE = 2
 NOT_GRADED = 3
+_COLLECT_EACH = 50_000
+"""New containers from which on Python looks for garbage; 700 by default."""
 
 app = typer.Typer(
     name="rosgrade",
@@ -81,6 +85,10 @@ app.command("doctor")(doctor.doctor)
 
 def main() -> None:
     """Entry point; a mistake of the user's ends with one message and no traceback."""
+    # Imports make many objects and hardly any garbage: to look for some among them again and
+    # again, and once more at the end, takes a tenth of a short command.
+    gc.set_threshold(_COLLECT_EACH)
+    atexit.register(gc.freeze)
     try:
         app()
     except RosgradeError as error:

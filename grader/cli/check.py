@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from grader.cli.ahead import while_it_starts
 from grader.cli.console import output_console
 from grader.cli.formats import (
     Classroom50,
@@ -84,7 +85,7 @@ def check(
         installation = ros.find()
         runner = Runner(
             installation,
-            progress=progress.narrate,
+            progress=while_it_starts(progress.narrate),
             sandbox=chosen_sandbox(sandbox, progress),
             verbose=verbose,
         )
@@ -93,9 +94,7 @@ def check(
             # Imported while the cell gets ready.
             from grader.assignment.load import load_assignment
             from grader.assignment.selection import select, visible_part
-            from grader.batch.files import keep_install, write_graded
             from grader.batch.grading import RECORDINGS_FOLDER, Grading
-            from grader.report.terminal import print_grade
             from grader.submission.locate import check_path
 
             whole = load_assignment(assignment)
@@ -110,6 +109,9 @@ def check(
                     progress.say,
                     on_output=partial(progress.output, "build"),
                 )
+            from grader.batch.files import keep_install, write_graded
+            from grader.report.terminal import print_grade
+
         finally:
             runner.close()
         written = write_graded(graded, report, clock, json_file)

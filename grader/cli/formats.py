@@ -82,16 +82,21 @@ class Formats:
         Raises:
             UsageError: A file cannot be written, or Classroom 50 did not start this.
         """
-        from grader.report import classroom50, github, gradescope
-        from grader.report.files import write_whole
-
+        # Each is imported only where it is asked for: together they take 0.2 s.
         if self.classroom50:
+            from grader.report import classroom50
+
             classroom50.identity(os.environ)
         if self.gradescope is not None:
+            from grader.report import gradescope
+            from grader.report.files import write_whole
+
             write_whole(self.gradescope, gradescope.unfinished())
         if not self.github:
             yield
             return
+        from grader.report import github
+
         token = secrets.token_hex(16)
         print(github.stop_commands(token), flush=True)
         try:
@@ -110,17 +115,20 @@ class Formats:
             UsageError: A file cannot be read or written.
         """
         from grader.report.files import write_whole
-        from grader.report.gradescope import render_gradescope
-        from grader.report.junit import render_junit
-        from grader.report.markdown import render_markdown
-        from grader.report.student import for_student
 
         if self.junit is not None:
+            from grader.report.junit import render_junit
+
             xunit1 = self.junit_family is JunitFamily.XUNIT1
             write_whole(self.junit, render_junit(result, xunit1=xunit1))
         if self.markdown is not None:
+            from grader.report.markdown import render_markdown
+            from grader.report.student import for_student
+
             write_whole(self.markdown, render_markdown(for_student(result)))
         if self.gradescope is not None:
+            from grader.report.gradescope import render_gradescope
+
             metadata = _metadata(self.gradescope_metadata)
             write_whole(self.gradescope, render_gradescope(result, metadata))
         if self.github:

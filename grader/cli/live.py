@@ -128,10 +128,10 @@ class GradingProgress(Progress):
     def shown(self) -> Iterator[GradingProgress]:
         """Show what happens while the block runs; it begins with nothing."""
         self._activity = Activity()
-        console = _console()
         if self._quiet:
             yield self
             return
+        console = _console()
         if not console.is_terminal or console.is_dumb_terminal:
             with self._reminding():
                 yield self

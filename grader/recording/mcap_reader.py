@@ -61,6 +61,12 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
+def get_ready() -> None:
+    """Make what validates the facts; otherwise the first recording waits for it."""
+    for kind in (*_FACTS.values(), Recording):
+        _adapter(kind)
+
+
 def read_recording(file: Path) -> Recording:
     """Read a recording.
 

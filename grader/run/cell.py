@@ -304,22 +304,24 @@ class Cell:
             self._waits.append(Wait(what, limit_s, began_ns, met_ns))
 
     def _ticks(self) -> Iterator[Stopwatch]:
-        """Handle events; yields the time since the first tick."""
+        """Handle events; yields the time since the first tick, first for what is known already."""
         watch = Stopwatch(self._meter)
         while True:
-            # A message ends the wait at once; only the graph has to be polled.
+            yield watch
+            # A message ends the wait at once, and so does a publisher that comes; for all else
+            # the graph has to be polled.
             tick_s = _TICK_S if self._matched_ns is None else _CALM_TICK_S
             self._probe.spin_once(self._player.pause_s(tick_s))
             now = time.monotonic()
-            if now >= self._next_graph or self._leave.is_asked:
-                settled = self._matched_ns is not None
+            settled = self._matched_ns is not None
+            news = self._probe.has_met() and not settled
+            if now >= self._next_graph or news or self._leave.is_asked:
                 self._next_graph = now + (_SETTLED_GRAPH_PERIOD_S if settled else _GRAPH_PERIOD_S)
                 self._graph.poll()
                 self._find_foreign()
                 _raise_if_abandoned()
             self._leave.give()
             self._player.tick()
-            yield watch
 
     def _find_foreign(self) -> None:
         names = sorted({n.name for n in self._graph.nodes if n.owner is Owner.FOREIGN})

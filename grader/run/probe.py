@@ -13,6 +13,7 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -90,6 +91,7 @@ class Probe:
         self._kept: dict[str, int] = {}
         self.last_message_ns: int | None = None
         self.recording = True
+        self._has_met = False
 
     def listen(self, topics: tuple[Topic, ...], limits: Limits) -> None:
         """Record topics from now on.
@@ -102,7 +104,7 @@ class Probe:
             ImportError: An interface of a topic does not exist.
         """
         self._limits = limits
-        self.rosout.listen(self.node, limits.output_bytes)
+        self.rosout.listen(self.node, limits.output_bytes, self._meet)
         for topic in topics:
             self._topics[topic.name] = topic
             if not topic.ours:
@@ -112,6 +114,14 @@ class Probe:
     def spin_once(self, limit_s: float) -> None:
         """Handle what has arrived, waiting at most so long for something to arrive."""
         self._executor.spin_once(timeout_sec=limit_s)
+
+    def has_met(self) -> bool:
+        """Whether a publisher came or went since this was last asked.
+
+        The middleware tells it at once: nobody has to look at the graph again and again.
+        """
+        met, self._has_met = self._has_met, False
+        return met
 
     def close(self) -> None:
         """Leave the graph."""
@@ -226,8 +236,12 @@ class Probe:
             topic.name,
             receive,  # type: ignore[arg-type]  # with raw=True the info comes too
             profile,
+            event_callbacks=SubscriptionEventCallbacks(matched=self._meet),
             raw=True,
         )
+
+    def _meet(self, _: Any) -> None:
+        self._has_met = True
 
     def _receive(self, topic: Topic, data: bytes, info: Any) -> None:
         if not self.recording or self._limits is None:

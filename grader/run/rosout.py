@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rcl_interfaces.msg import Log
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -24,12 +26,13 @@ class RosoutLog:
         """Nothing is heard yet."""
         self._kept = KeptLines(0)
 
-    def listen(self, node: Node, limit_bytes: int) -> None:
+    def listen(self, node: Node, limit_bytes: int, on_match: Callable[[Any], None]) -> None:
         """Keep what comes from now on, and what was published before a logger was matched.
 
         Args:
             node: To subscribe with.
             limit_bytes: How much text is kept, half of it from the end.
+            on_match: Told when a logger comes or goes, which nearly every node has.
         """
         self._kept = KeptLines(limit_bytes)
         profile = QoSProfile(
@@ -37,7 +40,8 @@ class RosoutLog:
             reliability=ReliabilityPolicy.RELIABLE,
             durability=DurabilityPolicy.TRANSIENT_LOCAL,
         )
-        node.create_subscription(Log, _TOPIC, self._take, profile)
+        events = SubscriptionEventCallbacks(matched=on_match)
+        node.create_subscription(Log, _TOPIC, self._take, profile, event_callbacks=events)
 
     @property
     def lines(self) -> tuple[LogLine, ...]:
