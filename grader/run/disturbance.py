@@ -2,8 +2,7 @@
 
 Two instruments: a metronome, a thread that asks to be woken every 20 ms and notes how late
 it was; and the kernel's run delay of each thread of the student, the time it was ready to
-run but had no CPU (second number of /proc/PID/task/TID/schedstat, see "sched-stats" in the
-kernel's documentation). A verdict that this could explain is not held against anybody.
+run but had no CPU. A verdict that this could explain is not held against anybody.
 
 Of both only what others than the student's processes can explain is counted (see
 :mod:`grader.run.cpu_use`): who keeps the CPUs from himself was not disturbed.
@@ -11,7 +10,6 @@ Of both only what others than the student's processes can explain is counted (se
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections import deque
@@ -19,6 +17,7 @@ from collections.abc import Callable, Iterable
 
 from grader.recording.model import NS, Disturbance
 from grader.run.cpu_use import CpuMeter, CpuTimes, Interval, interval, others_share
+from grader.run.run_delay import RunDelays
 
 _TICK_S = 0.02
 _TICKS_PER_SAMPLE = 5
@@ -34,13 +33,20 @@ _KEPT = 100
 class DisturbanceMeter:
     """Samples the disturbance every 100 ms from a thread of its own."""
 
-    def __init__(self, pids: Callable[[], Iterable[int]], cpu: CpuMeter | None = None) -> None:
+    def __init__(
+        self,
+        pids: Callable[[], Iterable[int]],
+        cpu: CpuMeter | None = None,
+        delays: RunDelays | None = None,
+    ) -> None:
         """Prepare the meter.
 
         Args:
             pids: The student's processes at the moment.
             cpu: Of this machine.
+            delays: Of threads of this machine.
         """
+        self._run_delays = delays or RunDelays()
         self._pids = pids
         self._known: tuple[int, ...] = ()
         self._number = 0
@@ -62,6 +68,7 @@ class DisturbanceMeter:
         """End the measurement and return all samples, oldest first."""
         self._stop.set()
         self._thread.join()
+        self._run_delays.close()
         return tuple(self._samples)
 
     @property
@@ -93,7 +100,7 @@ class DisturbanceMeter:
             self._known = tuple(self._pids())
         waited_ns = 0
         for pid in self._known:
-            for thread, delay_ns in run_delays(pid).items():
+            for thread, delay_ns in self._run_delays.read(pid).items():
                 before_ns = self._delays.get(thread, 0)
                 self._delays[thread] = delay_ns
                 waited_ns = max(waited_ns, delay_ns - before_ns)
@@ -109,19 +116,3 @@ class DisturbanceMeter:
         if self._times is not None:
             self._intervals.append(interval(self._times, times, self._cpu.cpus))
         self._times = times
-
-
-def run_delays(pid: int) -> dict[int, int]:
-    """Run delay of each thread of a process so far, in nanoseconds; empty where unknown."""
-    found: dict[int, int] = {}
-    try:
-        threads = os.listdir(f"/proc/{pid}/task")  # noqa: PTH208  names only, and often
-    except OSError:
-        return found
-    for thread in threads:
-        try:
-            with open(f"/proc/{pid}/task/{thread}/schedstat", "rb") as file:  # noqa: PTH123
-                found[int(thread)] = int(file.read().split()[1])
-        except (OSError, IndexError, ValueError):
-            continue
-    return found

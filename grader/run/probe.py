@@ -13,7 +13,6 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -21,7 +20,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Call, Endpoint, Kind, Owner
 from grader.run.order import Limits, Topic
-from grader.run.rosout import RosoutLog
+from grader.run.rosout import RosoutLog, told_of_matches
 
 NAME = "rosgrade_probe"
 # One lost answer must not end the observation, and a blocked node must not be flooded.
@@ -236,7 +235,7 @@ class Probe:
             topic.name,
             receive,  # type: ignore[arg-type]  # with raw=True the info comes too
             profile,
-            event_callbacks=SubscriptionEventCallbacks(matched=self._meet),
+            event_callbacks=told_of_matches(self._meet),
             raw=True,
         )
 

@@ -19,6 +19,15 @@ _LONGEST = 8192
 _LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
 
 
+def told_of_matches(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
+    """Events of a subscription of the probe's.
+
+    Without rclpy's own, which only print a warning that nobody reads, and which each turn of the
+    executor would ask for.
+    """
+    return SubscriptionEventCallbacks(matched=on_match, use_default_callbacks=False)
+
+
 class RosoutLog:
     """Subscribes to /rosout; the probe itself publishes nothing there."""
 
@@ -40,7 +49,7 @@ class RosoutLog:
             reliability=ReliabilityPolicy.RELIABLE,
             durability=DurabilityPolicy.TRANSIENT_LOCAL,
         )
-        events = SubscriptionEventCallbacks(matched=on_match)
+        events = told_of_matches(on_match)
         node.create_subscription(Log, _TOPIC, self._take, profile, event_callbacks=events)
 
     @property

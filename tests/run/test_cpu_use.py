@@ -13,9 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.run import disturbance
 from grader.run.cpu_use import CpuMeter, CpuTimes, Interval, idle_ticks, interval, others_share
 from grader.run.descendants import Family, descendants
+from grader.run.disturbance import DisturbanceMeter
+from grader.run.run_delay import RunDelays
 
 MS = 1_000_000
 
@@ -101,18 +102,18 @@ class PretendedCpus(CpuMeter):
 
 @pytest.mark.parametrize(("student", "counted_ms"), [(1.0, 0), (0.0, 75), (0.95, 20)])
 def test_a_wait_is_a_disturbance_only_as_far_as_others_had_the_cpus(
-    monkeypatch: pytest.MonkeyPatch, student: float, counted_ms: int
+    student: float, counted_ms: int
 ) -> None:
     waits, enough = count(step=75 * MS), threading.Event()
 
-    def delays(_: int) -> dict[int, int]:
-        waited_ns = next(waits)
-        if waited_ns > 5 * 75 * MS:
-            enough.set()
-        return {1: waited_ns}
+    class PretendedDelays(RunDelays):
+        def read(self, pid: int) -> dict[int, int]:
+            waited_ns = next(waits)
+            if waited_ns > 5 * 75 * MS:
+                enough.set()
+            return {pid: waited_ns}
 
-    monkeypatch.setattr(disturbance, "run_delays", delays)
-    meter = disturbance.DisturbanceMeter(lambda: (1,), PretendedCpus(student))
+    meter = DisturbanceMeter(lambda: (1,), PretendedCpus(student), PretendedDelays())
     meter.start()
     assert enough.wait(30)
     third = meter.stop()[3]
