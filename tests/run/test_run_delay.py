@@ -13,7 +13,13 @@ import pytest
 from grader.run import run_delay
 from grader.run.run_delay import RunDelays
 
-BURN = "import os, sys, time\nos.sched_setaffinity(0, {int(sys.argv[1])})\nwhile time.process_time() < 0.2: pass\nprint(flush=True)\ninput()"
+BURN = """\
+import os, sys, time
+os.sched_setaffinity(0, {int(sys.argv[1])})
+while time.process_time() < 0.2: pass
+print(flush=True)
+input()
+"""
 
 
 def open_files() -> int:
