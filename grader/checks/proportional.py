@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Literal
 
 from pydantic import Field
 
 from grader.assignment.quantity import Frequency, PositiveLength, Ratio
-from grader.checks.approach import NO_SPEED_M_S, Approach, approach, why_not_there
+from grader.checks.approach import Approach, approach, why_not_there
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.command import command_topic, commands, number, odometry
+from grader.checks.command import command_topic
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.immobility import why_cut_short
 from grader.checks.law import Law, Sample, Verdict, examine
 from grader.checks.measure import metres
 from grader.checks.reference import GoalPose
 from grader.checks.silence import why_silent
-from grader.checks.track import pose_at
+from grader.checks.steering import LEAST_SAMPLES, answers, at_the_goal, on_the_way
 from grader.checks.wording import counted, percent
-from grader.recording.model import NS, Message, Recording
+from grader.recording.model import Recording
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 _MOST_POINTS = 400
-_LEAST_SAMPLES = 8
 _MOST_BEHIND = 2
-# A command is in force from the step after it.
-_STEP_NS = 12_000_000
 _WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
 _FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
 
@@ -85,7 +81,7 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     scene = recording.scene
     limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
     # Odometry that is on its way, or waits for a busy callback, is not yet known.
-    tried = [_samples(run, parameters, behind) for behind in range(_MOST_BEHIND + 1)]
+    tried = [_samples(run, parameters, behind, limit_rad_s) for behind in range(_MOST_BEHIND + 1)]
     verdicts = [examine(samples, limit_rad_s, parameters.r2) for samples in tried]
     good = [index for index, item in enumerate(verdicts) if _is_good(item, parameters)]
     index = max(good, key=lambda i: verdicts[i].r2, default=0)
@@ -96,7 +92,7 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     if good:
         return _judge_gain(verdict, parameters, expected, evidence)
     deeper = why_cut_short(recording)
-    if deeper is not None and len(samples) < _LEAST_SAMPLES:
+    if deeper is not None and len(samples) < LEAST_SAMPLES:
         return deeper.finding(expected)
     if verdict.law is Law.NOTHING_TO_DO:
         return Finding.passed(
@@ -122,54 +118,13 @@ def _is_good(verdict: Verdict, parameters: Proportional) -> bool:
     return verdict.law is Law.PROPORTIONAL and verdict.r2 >= parameters.r2 and verdict.gain > 0.0
 
 
-def _samples(run: Approach, parameters: Proportional, behind: int) -> list[Sample]:
-    """Commands of the phase, each with the error that it can have known.
-
-    Args:
-        run: The run.
-        parameters: Say which phase.
-        behind: By how many messages the student was behind the newest odometry.
-    """
-    recording, truth = run.recording, run.truth
-    arrival = run.arrival(parameters.position)
-    arrival_ns = math.inf if arrival is None else truth[arrival].time_ns
-    driven = run.driven(parameters.position)
-    # One that drives on while it turns is judged by what it does since it arrived.
-    aligns_ns = arrival_ns if driven is None else truth[driven].time_ns - _STEP_NS
-    told = odometry(recording)
-    found: list[Sample] = []
-    driving: list[Sample] = []
-    for item in commands(recording):
-        # What was sent before the first odometry, or after the end, knows no error.
-        seen_ns = _seen_ns(told, item.time_ns, behind)
-        if seen_ns is None or item.time_ns > truth[-1].time_ns or not item.twist.is_finite:
-            continue
-        pose = pose_at(truth, seen_ns)
-        if parameters.phase == "position":
-            if seen_ns < arrival_ns:
-                error = run.bearing_error_rad(pose)
-                found.append(Sample(error, item.twist.angular_rad_s))
-        elif item.time_ns >= aligns_ns:
-            sample = Sample(run.heading_error_rad(pose), item.twist.angular_rad_s)
-            drives = abs(item.twist.linear_m_s) > NO_SPEED_M_S
-            (driving if drives else found).append(sample)
-    return found if len(found) >= _LEAST_SAMPLES else [*driving, *found]
-
-
-def _seen_ns(told: Sequence[Message], time_ns: int, behind: int) -> int | None:
-    """Time at which the newest odometry that was known was measured, or None before the first."""
-    if not told:
-        return time_ns
-    index = bisect_right(told, time_ns, key=_stamp_ns)
-    if index <= behind:
-        return None
-    message = told[index - 1 - behind]
-    sec, nanosec = (number(message.value, "header", "stamp", key) for key in ("sec", "nanosec"))
-    return message.stamp_ns if sec is None or nanosec is None else int(sec) * NS + int(nanosec)
-
-
-def _stamp_ns(message: Message) -> int:
-    return message.stamp_ns
+def _samples(
+    run: Approach, parameters: Proportional, behind: int, limit_rad_s: float
+) -> list[Sample]:
+    known = answers(run, behind)
+    if parameters.phase == "position":
+        return on_the_way(run, known, parameters.position)
+    return at_the_goal(run, known, parameters.position, limit_rad_s)
 
 
 def _judge_gain(

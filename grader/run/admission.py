@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from grader.run.load import Load, cpu_count
 
 _CELLS_PER_CPU = 16
-_BUSY_PER_CPU = 1.25
+_BUSY_PER_CPU = 2.5
 """Runnable threads of the machine for each CPU from which on nobody more is let in."""
 _LONGEST_START_S = 2.0
 """What has not matched by then waits for something, and costs no CPU any more."""

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
@@ -123,6 +123,8 @@ GOALS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), ANGLES)
     constant=st.sampled_from([None, 0.1, 0.2]),
     period_s=st.sampled_from([None, 0.02, 0.05, 0.1]),
 )
+# Before it has arrived it stops once more to turn to the goal's direction.
+@example((0.4375, 0.375, 1.0), 0.0, 1.0, 0.8125, 1.0, None, 0.2, None)
 def test_a_good_controller_passes_every_check(
     goal, heading, linear, angular, spin, turn_first, constant, period_s
 ):
