@@ -11,7 +11,10 @@ from grader.errors import GraderFault
 from grader.submission.toolchain import check_toolchain, has_headers, headers_package
 
 # How long an example takes says something about the machine, not about the code.
-settings.register_profile("no_deadline", deadline=None)
+# The same examples in every run: a test that fails now and then says nothing of a change. To look
+# for new ones: pytest --hypothesis-profile=explore.
+settings.register_profile("no_deadline", deadline=None, derandomize=True)
+settings.register_profile("explore", deadline=None)
 settings.load_profile("no_deadline")
 
 
