@@ -20,6 +20,7 @@ from grader.errors import GraderFault
 DOMAINS = range(1, 102)
 _BASE_PORT = 32768
 _FIRST_PORT, _PORTS = 7400, 250
+_OWN_PORTS = range(10, _PORTS, 2)
 
 
 class DomainLock:
@@ -74,11 +75,29 @@ def lock_domain(avoid: Collection[int] = ()) -> DomainLock:
 
 
 def joined_domains() -> tuple[int, ...]:
-    """Domains that somebody in this network listens on, by the UDP ports that are bound.
+    """Domains that somebody in this network takes part in, by the UDP ports that are bound.
 
-    A participant binds port 7400 + 250 * domain for discovery by multicast (the mapping of ports
-    of the DDSI-RTPS standard; see About-Domain-ID). It tells only in a network of one's own.
+    It tells only in a network of one's own.
     """
-    lines = Path("/proc/net/udp").read_text(encoding="ascii").splitlines()[1:]
+    return domains_of_ports(Path("/proc/net/udp").read_text(encoding="ascii"))
+
+
+def domains_of_ports(table: str) -> tuple[int, ...]:
+    """Domains of which the ports of a participant are bound.
+
+    A participant binds 7400 + 250 * domain for discovery by multicast, and two of its own,
+    10 + 2 * participant and 11 + 2 * participant above that (the mapping of ports of the DDSI-RTPS
+    standard; see About-Domain-ID). One of these alone may be any socket's, whose port the system
+    chose.
+
+    Args:
+        table: Content of /proc/net/udp (proc(5)).
+    """
+    lines = table.splitlines()[1:]
     ports = {int(line.split()[1].rpartition(":")[2], 16) - _FIRST_PORT for line in lines}
-    return tuple(sorted(port // _PORTS for port in ports if port >= 0 and port % _PORTS == 0))
+    domains = (port for port in sorted(ports) if port >= 0 and port % _PORTS == 0)
+    return tuple(
+        first // _PORTS
+        for first in domains
+        if any({first + own, first + own + 1} <= ports for own in _OWN_PORTS)
+    )

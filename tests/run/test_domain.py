@@ -7,7 +7,7 @@ import contextlib
 import pytest
 
 from grader.errors import GraderFault
-from grader.run.domain import DOMAINS, lock_domain
+from grader.run.domain import DOMAINS, domains_of_ports, lock_domain
 
 
 def test_two_holders_never_have_the_same_domain() -> None:
@@ -36,3 +36,27 @@ def test_avoided_domains_are_not_used() -> None:
 def test_no_domain_left_is_our_fault() -> None:
     with pytest.raises(GraderFault, match="all ROS domains from 1 to 101 are in use"):
         lock_domain(DOMAINS)
+
+
+def table(*ports: int) -> str:
+    rows = [f" {n}: 0100007F:{port:04X} 00000000:0000 07 0 0 0" for n, port in enumerate(ports)]
+    return "\n".join(("  sl  local_address rem_address   st", *rows))
+
+
+@pytest.mark.parametrize(
+    ("ports", "domains"),
+    [
+        pytest.param((), (), id="nobody"),
+        pytest.param((7400, 7410, 7411, 45_123), (0,), id="a participant with a socket to send"),
+        pytest.param((7400, 7412, 7413), (0,), id="the second one on this machine"),
+        pytest.param((7400, 7410, 7411, 18_150, 18_160, 18_161), (0, 43), id="two domains"),
+        pytest.param((44_900, 44_910, 44_911), (150,), id="one among the ephemeral ports"),
+        # 34900 is 7400 + 250 * 110, and any socket may get it.
+        pytest.param((7400, 7410, 7411, 34_900), (0,), id="a port that the system chose"),
+        pytest.param((34_900, 34_911, 34_912), (), id="ports of nobody in particular"),
+    ],
+)
+def test_a_domain_is_joined_by_a_participant_and_not_by_any_socket(
+    ports: tuple[int, ...], domains: tuple[int, ...]
+) -> None:
+    assert domains_of_ports(table(*ports)) == domains
