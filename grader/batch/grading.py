@@ -24,7 +24,7 @@ from grader.run.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.submission.bounded import OutputLimits
-from grader.submission.build import BuildLimits
+from grader.submission.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
 
 RECORDINGS_FOLDER = "recordings"

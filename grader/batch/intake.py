@@ -215,7 +215,10 @@ def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> _Entry
             shutil.copyfile(file, path / _AGAIN.sub("", named["file"]), follow_symlinks=False)
     late = any(named["late"] for _, named in files)
     return _Entry(
-        f"{match['name']}_{match['user']}", path, (match["user"], match["name"]), late=late
+        shown(f"{match['name']}_{match['user']}"),
+        path,
+        (match["user"], match["name"]),
+        late=late,
     )
 
 

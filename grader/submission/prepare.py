@@ -14,8 +14,9 @@ from grader.errors import SubmissionError
 from grader.ros import RosInstallation
 from grader.submission.apart import built_apart
 from grader.submission.archive import SUFFIXES
-from grader.submission.build import BuildLimits, build
+from grader.submission.build import build
 from grader.submission.build_cache import BuildCache, CacheLimits
+from grader.submission.build_limits import BuildLimits
 from grader.submission.culprit import Sources
 from grader.submission.installed import inspect
 from grader.submission.listing import MANIFEST

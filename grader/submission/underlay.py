@@ -15,8 +15,9 @@ from pathlib import Path
 from grader.errors import GraderFault
 from grader.resources import carried_interfaces
 from grader.ros import RosInstallation
-from grader.submission.build import BuildLimits, build
+from grader.submission.build import build
 from grader.submission.build_cache import BuildCache
+from grader.submission.build_limits import BuildLimits
 from grader.submission.culprit import Sources
 from grader.submission.locate import opened
 

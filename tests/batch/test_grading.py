@@ -24,7 +24,7 @@ from grader.errors import GraderFault, UsageError
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Disturbance, Ending, Endpoint, Kind, Node, Owner, Qos, Recording
 from grader.run.runner import Runner
-from grader.submission.build import BuildLimits
+from grader.submission.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 

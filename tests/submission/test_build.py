@@ -12,8 +12,8 @@ import pytest
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.submission.build import BuildLimits
 from grader.submission.build_key import build_key
+from grader.submission.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
 from grader.submission.record import BuildRecord, PackageRecord
 
