@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from grader.checks.finding import Finding
 from grader.checks.wording import code, codes, listing
 from grader.recording.model import Recording
 
@@ -48,8 +49,31 @@ def single(recording: Recording) -> bool:
     return bool(found) and all(number == 1 for _, number in found)
 
 
-def one_thread_for_one_cpu(recording: Recording) -> bool:
-    """Whether a multi-threaded executor has one thread because the machine has one CPU."""
+def not_judged(
+    recording: Recording, expected: str, observed: str, *, prevented: bool
+) -> Finding | None:
+    """The finding where it is not the student's fault that callbacks did not run together.
+
+    Args:
+        recording: The run.
+        expected: Of the finding.
+        observed: How they ran instead.
+        prevented: Whether the machine may have kept them from running together often enough.
+    """
+    if _has_one_thread_for_one_cpu(recording):
+        return Finding.error(
+            expected,
+            f"{observed}: this machine has one CPU, so MultiThreadedExecutor() has one thread; "
+            "grade on a machine with two CPUs or more",
+        )
+    if prevented:
+        return Finding.error(
+            expected, f"{observed}, but the machine took the time from the process", disturbed=True
+        )
+    return None
+
+
+def _has_one_thread_for_one_cpu(recording: Recording) -> bool:
     return recording.environment.get("cpus") == "1" and any(
         name == "MultiThreadedExecutor" and number == 1 for name, number in executors(recording)
     )

@@ -169,16 +169,12 @@ def _serial(
     """The finding of a callback that does not overlap often enough."""
     seen = f"only {counted(number, 'time')}" if number else "never"
     observed = f"{code(callback)} {seen} ran at the same time as {codes(parameters.others, 'or')}"
-    if concurrency.one_thread_for_one_cpu(recording):
-        return Finding.error(
-            expected,
-            f"{observed}: this machine has one CPU, so MultiThreadedExecutor() has one thread; "
-            "grade on a machine with two CPUs or more",
-        )
-    if number + _prevented(recording, parameters, reports, callback) >= parameters.at_least:
-        return Finding.error(
-            expected, f"{observed}, but the machine took the time from the process", disturbed=True
-        )
+    most = number + _prevented(recording, parameters, reports, callback)
+    excused = concurrency.not_judged(
+        recording, expected, observed, prevented=most >= parameters.at_least
+    )
+    if excused is not None:
+        return excused
     declared = concurrency.declared_words(recording)
     ended = reports.ended({callback, *parameters.others})
     return Finding.failed(

@@ -65,16 +65,12 @@ def together(recording: Recording, parameters: Together) -> Finding:
         )
     seen = f"only {counted(len(found), 'time')}" if found else "never"
     observed = f"{codes(names)} {seen} ran all at the same time"
-    if concurrency.one_thread_for_one_cpu(recording):
-        return Finding.error(
-            expected,
-            f"{observed}: this machine has one CPU, so MultiThreadedExecutor() has one thread; "
-            "grade on a machine with two CPUs or more",
-        )
-    if len(found) + _prevented(recording, reports, parameters) >= parameters.at_least:
-        return Finding.error(
-            expected, f"{observed}, but the machine took the time from the process", disturbed=True
-        )
+    most = len(found) + _prevented(recording, reports, parameters)
+    excused = concurrency.not_judged(
+        recording, expected, observed, prevented=most >= parameters.at_least
+    )
+    if excused is not None:
+        return excused
     declared = concurrency.declared_words(recording)
     return Finding.failed(
         expected,
