@@ -16,13 +16,17 @@ import pytest
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch import grading as grading_module
+from grader.batch.class_regrading import regrade_class
+from grader.batch.files import write_graded
 from grader.batch.grading import Graded, Grading
+from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import compare, find, regrade
 from grader.batch.selftest import Role, Trial, run_trial
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Disturbance, Ending, Endpoint, Kind, Node, Owner, Qos, Recording
+from grader.report.facts import Clock
 from grader.run.runner import Runner
 from grader.submission.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits
@@ -169,10 +173,10 @@ def test_a_failure_of_a_robot_that_the_host_held_up_counts_if_it_happens_again(
     wrong = recording(stop_s=2.5)
     graded, runner = grade(wrong, recording())
     assert graded.grade.full_points
-    assert runner.alone == [False, True]
+    assert runner.alone == [False, False]
     graded, runner = grade(wrong, wrong)
     assert graded.grade.result("ends").status is Status.FAILED
-    assert runner.alone == [False, True]
+    assert runner.alone == [False, False]
 
 
 def test_after_three_disturbed_runs_it_is_not_graded_and_costs_nothing(grade: Grade) -> None:
@@ -288,9 +292,6 @@ def test_a_library_that_is_not_installed_is_told_before_anything_is_graded(
 def test_a_regrade_says_who_gains_what_and_why(
     grade: Grade, lesson: LoadedAssignment, tmp_path: Path
 ) -> None:
-    from grader.batch.files import write_graded
-    from grader.report.facts import Clock
-
     first, _ = grade(recording(stop_s=2.5))
     write_graded(first, tmp_path, Clock())
     (lesson.folder / "assignment.yaml").write_text(
@@ -302,6 +303,23 @@ def test_a_regrade_says_who_gains_what_and_why(
     lines = compare(found.result, regrade(load_assignment(lesson.folder), found).grade)
     assert lines[0].startswith("ends: failed -> passed, 0 -> 1 points: ")
     assert lines[1] == "score: 1 -> 2 of 2"
+
+
+def test_what_cannot_be_judged_again_is_no_loss_of_points(
+    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    first, _ = grade(recording())
+    with Ledger(tmp_path / "out").opened() as ledger:
+        partial = ledger.partial("ada")
+        (tmp_path / "recordings").rename(partial / "recordings")
+        write_graded(first, partial, Clock())
+        ledger.put("ada", partial)
+        ledger.write([Entry("ada")], "lesson", lesson.sha256)
+        (ledger.folder("ada") / "recordings" / "run.mcap").unlink()
+        (row,) = regrade_class(lesson, ledger)
+    assert row.changes[0].startswith("alive: passed -> error: ")
+    assert row.changes[-1] == "score: 2 -> not graded"
+    assert row.in_doubt and row.gained == 0.0
 
 
 def test_a_folder_without_recordings_is_a_wrong_use(tmp_path: Path) -> None:
