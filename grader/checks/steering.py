@@ -108,12 +108,14 @@ def _of_the_way(
     Near the goal its direction changes fast; one that drives only where it looks there then
     stops and turns once more, before it has arrived by its own tolerance.
     """
-    law = examine(on_the_way(run, known, position_m), limit_rad_s, _GOOD_R2)
+    way = on_the_way(run, known, position_m)
+    law = examine(way, limit_rad_s, _GOOD_R2)
     if law.law is not Law.PROPORTIONAL or law.r2 < _GOOD_R2:
         return 0
+    fastest = max(abs(sample.command_rad_s) for sample in way)
     for index, item in enumerate(still):
         sample = _to_goal(run, item)
-        wanted = law.gain * sample.error_rad
+        wanted = max(-fastest, min(fastest, law.gain * sample.error_rad))
         if abs(sample.command_rad_s - wanted) > _SAME * abs(wanted):
             return index
     return 0

@@ -68,7 +68,7 @@ class DisturbanceMeter:
         """End the measurement and return all samples, oldest first."""
         self._stop.set()
         self._thread.join()
-        self._run_delays.close()
+        self._run_delays.forget()
         return tuple(self._samples)
 
     @property
@@ -98,6 +98,7 @@ class DisturbanceMeter:
         self._number += 1
         if looks:
             self._known = tuple(self._pids())
+            self._run_delays.forget(but=self._known)
         waited_ns = 0
         for pid in self._known:
             for thread, delay_ns in self._run_delays.read(pid).items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 
 _LONGEST = 128
 _MOST_OPEN = 128
@@ -38,10 +39,10 @@ class RunDelays:
         found = {thread: self._delay_ns(pid, thread) for thread in threads}
         return {thread: delay for thread, delay in found.items() if delay is not None}
 
-    def close(self) -> None:
-        """Close every file."""
-        while self._files:
-            os.close(self._files.popitem()[1])
+    def forget(self, but: Collection[int] = ()) -> None:
+        """Close the files of all processes but these."""
+        for key in [key for key in self._files if key[0] not in but]:
+            os.close(self._files.pop(key))
 
     def _delay_ns(self, pid: int, thread: int) -> int | None:
         file = self._files.get((pid, thread))
@@ -57,7 +58,9 @@ class RunDelays:
             finally:
                 os.close(file)
         except (OSError, IndexError, ValueError):
-            # It has ended.
+            # It has ended; another thread may get its number.
+            if (pid, thread) in self._files:
+                os.close(self._files.pop((pid, thread)))
             return None
 
 
