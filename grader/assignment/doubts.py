@@ -30,16 +30,20 @@ def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterat
 
 def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
     for bound in loaded.checks:
-        topic = getattr(bound.parameters, "topic", None)
-        if not isinstance(topic, str):
-            continue
+        named = [getattr(bound.parameters, key, None) for key in ("topic", "publishes")]
+        # Topics that nobody may publish on need not be there, but one that nearly is, is misspelt.
+        stated = "topics" in bound.parameters.model_fields_set
+        kept_off = getattr(bound.parameters, "topics", ()) if stated else ()
         for scenario in loaded.scenarios_of(bound):
             known = _topics(scenario)
-            if topic not in known:
-                yield (
-                    f"the check {bound.spec.id!r} is about {topic!r}, which the scenario "
-                    f"{scenario.id!r} neither records nor sends.{did_you_mean(topic, known)}"
-                )
+            suspects = [name for name in named if isinstance(name, str)]
+            suspects += [name for name in kept_off if did_you_mean(name, known)]
+            for topic in suspects:
+                if topic not in known:
+                    yield (
+                        f"the check {bound.spec.id!r} is about {topic!r}, which the scenario "
+                        f"{scenario.id!r} neither records nor sends.{did_you_mean(topic, known)}"
+                    )
 
 
 def _topics(scenario: Scenario) -> set[str]:

@@ -207,25 +207,28 @@ def _check(draft: Draft, index: int, bound: BoundCheck) -> Iterator[Problem]:
 
 
 def _topic(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
-    """A check of messages needs its topic recorded, by each of its scenarios, as its type."""
+    """A check of messages needs its topics recorded, by each of its scenarios, as their type."""
     family = bound.check.name.partition(".")[0]
-    topic = getattr(bound.parameters, "topic", None)
     interface = getattr(bound.parameters, "type", None)
-    if topic is None or (family not in _MESSAGE_FAMILIES and interface is None):
+    if family not in _MESSAGE_FAMILIES and interface is None:
         return
     if getattr(bound.parameters, "kind", None) == "subscription":
         # What a student subscribes to is there to be sent by us, not to be recorded.
         return
-    for scenario in draft.scenarios_of(bound.spec) or ():
-        recorded = scenario.recorded_types
-        if topic not in recorded:
-            advice = did_you_mean(topic, recorded)
-            listed = f" It records: {', '.join(recorded) or 'nothing'}."
-            text = f"the scenario {scenario.id!r} does not record {topic!r}."
-            yield draft.source.problem((*place, "with", "topic"), text + (advice or listed))
-        elif interface is not None and interface != recorded[topic]:
-            text = f"the scenario {scenario.id!r} records {topic!r} as {recorded[topic]!r}"
-            yield draft.source.problem((*place, "with", "type"), text)
+    for key in ("topic", "source"):
+        topic = getattr(bound.parameters, key, None)
+        if not isinstance(topic, str):
+            continue
+        for scenario in draft.scenarios_of(bound.spec) or ():
+            recorded = scenario.recorded_types
+            if topic not in recorded:
+                advice = did_you_mean(topic, recorded)
+                listed = f" It records: {', '.join(recorded) or 'nothing'}."
+                text = f"the scenario {scenario.id!r} does not record {topic!r}."
+                yield draft.source.problem((*place, "with", key), text + (advice or listed))
+            elif key == "topic" and interface not in (None, recorded[topic]):
+                text = f"the scenario {scenario.id!r} records {topic!r} as {recorded[topic]!r}"
+                yield draft.source.problem((*place, "with", "type"), text)
 
 
 def _stimulus(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:

@@ -37,11 +37,12 @@ def problems(source: Source, assignment: Assignment) -> Iterator[Problem]:
         source: The document.
         assignment: What was read from it.
     """
+    told: set[str] = set()
     for index, scenario in enumerate(assignment.scenarios):
         place: Place = ("scenarios", index)
         yield from _parameters(source, place, scenario)
         if scenario.world is not None:
-            yield from _world(source, place, scenario)
+            yield from _world(source, place, scenario, told)
 
 
 def _parameters(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem]:
@@ -54,7 +55,8 @@ def _parameters(source: Source, place: Place, scenario: Scenario) -> Iterator[Pr
                 yield source.problem((*place, "launch", number, "parameters", name), str(error))
 
 
-def _world(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem]:
+def _world(source: Source, place: Place, scenario: Scenario, told: set[str]) -> Iterator[Problem]:
+    """Try the world of a scenario; a mistake that another scenario told is told once."""
     file = source.file.parent / str(scenario.world)
     for seed in _TRIED_SEEDS if scenario.random else (0,):
         values = draw_values(scenario, seed)
@@ -63,6 +65,9 @@ def _world(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem
             start = scenario.robot.pose if scenario.robot.pose is not None else world.start
             world.check_start(start, _radius_m(scenario))
         except (AssignmentError, UsageError) as error:
+            if str(error) in told:
+                return
+            told.add(str(error))
             drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
             yield source.problem((*place, "world"), f"{error}{f' (with {drawn})' if drawn else ''}")
             return

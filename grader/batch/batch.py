@@ -23,6 +23,7 @@ from grader.report.facts import Clock
 from grader.report.files import write_whole
 from grader.report.grade_part import grade_json
 from grader.report.result_model import Result
+from grader.submission.paths import shown
 from grader.submission.prepare import fingerprint
 
 FAULTS_FILE = "faults.log"
@@ -81,7 +82,7 @@ class Batch:
         first: dict[str, str] = {}
         for row in rows:
             on_read(row.key)
-            entry = Entry(row.key, row.name, row.late, problem=row.problem)
+            entry = Entry(row.key, row.name, row.late, problem=row.problem, fault=row.fault)
             if row.path is not None:
                 entry = self._identified(entry, row.path)
                 original = first.setdefault(entry.sha256, row.key) if entry.sha256 else row.key
@@ -126,8 +127,8 @@ class Batch:
     def _identified(self, entry: Entry, path: Path) -> Entry:
         try:
             return replace(entry, sha256=fingerprint(path))
-        except RosgradeError as error:
-            return replace(entry, fault=str(error))
+        except Exception as error:
+            return self._with_fault(entry, error)
 
     def _is_done(self, key: str) -> bool:
         result = self.ledger.result(key)
@@ -150,10 +151,17 @@ class Batch:
             future.result()
             self.ledger.put(key, partial)
         except Exception as error:
-            told = str(error) if isinstance(error, RosgradeError) else f"{type(error).__name__}"
-            with (self.ledger.out / FAULTS_FILE).open("a", encoding="utf-8") as log:
-                log.write(f"{key}\n{''.join(traceback.format_exception(error))}\n")
-            self._entries[key] = replace(self._entries[key], fault=told.partition("\n")[0])
+            self._entries[key] = self._with_fault(self._entries[key], error)
+
+    def _with_fault(self, entry: Entry, error: Exception) -> Entry:
+        """Tell on its row why it could not be graded; the others go on."""
+        told = str(error).partition("\n")[0]
+        if not isinstance(error, RosgradeError):
+            told = f"a fault of rosgrade, see {FAULTS_FILE}: {type(error).__name__}"
+        log = self.ledger.out / FAULTS_FILE
+        with log.open("a", encoding="utf-8", errors="backslashreplace") as stream:
+            stream.write(f"{entry.key}\n{''.join(traceback.format_exception(error))}\n")
+        return replace(entry, fault=shown(told))
 
     def _finished(self, key: str, *, fresh: bool) -> Iterable[Done]:
         entry = self._entries[key]

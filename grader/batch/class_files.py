@@ -19,12 +19,29 @@ GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
 
 
-def note(done: Done) -> str:
-    """What an instructor should know of a row, in a few words; empty for an ordinary one."""
-    entry = done.entry
-    parts = [entry.fault or entry.problem]
-    if entry.same_as:
-        parts.append(f"the same submission as {entry.same_as}")
+def notes(done: Sequence[Done]) -> dict[str, str]:
+    """What an instructor should know of each row, in a few words; empty for an ordinary one.
+
+    Args:
+        done: Every row.
+
+    Returns:
+        By key.
+    """
+    twins: dict[str, list[str]] = {}
+    for item in done:
+        if item.entry.same_as:
+            twins.setdefault(item.entry.same_as, []).append(item.entry.key)
+            twins.setdefault(item.entry.key, []).append(item.entry.same_as)
+    return {item.entry.key: _note(item, twins.get(item.entry.key, ())) for item in done}
+
+
+def _note(done: Done, twins: Sequence[str]) -> str:
+    parts = [done.entry.fault or done.entry.problem]
+    if twins:
+        parts.append(f"the same submission as {' and '.join(twins)}")
+    if done.result is not None and done.result.submission.problem:
+        parts.append(done.result.submission.problem)
     if done.result is not None and not done.result.graded:
         parts.append("not graded: see the report")
     return "; ".join(part for part in parts if part)
@@ -40,6 +57,7 @@ def grades_csv(done: Sequence[Done]) -> str:
     rows = list(csv.reader(io.StringIO(plain_csv(results)))) if results else [["submission"]]
     header, *graded = rows
     by_key = {row[0]: row for row in graded}
+    said = notes(done)
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([header[0], "name", "late", *header[1:], "note"])
@@ -48,7 +66,7 @@ def grades_csv(done: Sequence[Done]) -> str:
         row = by_key.get(cell(entry.key)) if item.result is not None else None
         rest = row[1:] if row else [""] * (len(header) - 1)
         late = "yes" if entry.late else ""
-        writer.writerow([cell(entry.key), cell(entry.name), late, *rest, cell(note(item))])
+        writer.writerow([cell(entry.key), cell(entry.name), late, *rest, cell(said[entry.key])])
     return stream.getvalue()
 
 
@@ -65,11 +83,12 @@ def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
     rows = sorted(done, key=lambda item: item.entry.key)
     write_whole(ledger.out / GRADES_FILE, grades_csv(rows))
     overview = ledger.out / OVERVIEW_FILE
+    said = notes(rows)
     shown = [
         OverviewRow(
             id=item.entry.key,
             name=item.entry.name,
-            note=note(item),
+            note=said[item.entry.key],
             late=item.entry.late,
             report=os.path.relpath(ledger.folder(item.entry.key) / REPORT_FILE, ledger.out)
             if item.result is not None

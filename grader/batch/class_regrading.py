@@ -31,11 +31,18 @@ class Regraded:
 
     @property
     def gained(self) -> float:
-        """Points more than before, or fewer."""
-        after = self.done.result
-        if self.before is None or after is None:
+        """Points more than before, or fewer; none where one of the two is no grade."""
+        before, after = self.before, self.done.result
+        if before is None or before.score is None or after is None or after.score is None:
             return 0.0
-        return (after.score or 0.0) - (self.before.score or 0.0)
+        return after.score - before.score
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether there was a grade and now is none."""
+        after = self.done.result
+        graded = self.before is not None and self.before.graded
+        return graded and (after is None or not after.graded)
 
 
 def regrade_class(loaded: LoadedAssignment, ledger: Ledger) -> Iterator[Regraded]:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from grader.batch.grading import Grading
 from grader.batch.worker import Order, Parcel, grade_into, grade_remotely, unpack
-from grader.errors import GraderFault, UsageError
+from grader.errors import GraderFault, RosgradeError, UsageError
 
 _CONNECT_S = "15s"
 _EACH_WORKER = 2
@@ -96,10 +96,13 @@ class DaskCrew:
 
     def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
         """See :class:`Crew`."""
-        task = self._client.submit(
-            grade_remotely, self._order, Parcel.of(key, path), pure=False, retries=2
-        )
         done: Future[None] = Future()
+        try:
+            parcel = Parcel.of(key, path)
+        except RosgradeError as error:
+            done.set_exception(error)
+            return done
+        task = self._client.submit(grade_remotely, self._order, parcel, pure=False, retries=2)
 
         def finish(finished: Any) -> None:
             try:

@@ -44,6 +44,7 @@ class HandedIn:
         name: The student's, as people write it, or empty.
         late: Whether the learning platform says so.
         problem: Why there is nothing to grade, or what the instructor should look at.
+        fault: Why what was handed in could not be fetched or read.
     """
 
     key: str
@@ -51,17 +52,23 @@ class HandedIn:
     name: str = ""
     late: bool = False
     problem: str = ""
+    fault: str = ""
 
 
 @dataclass(frozen=True)
 class _Entry:
-    """Something in the folder, with the names that it has for its author."""
+    """Something in the folder, with the names that it has for its author.
+
+    Attributes:
+        fault: Why it cannot be read.
+    """
 
     key: str
     path: Path
     names: tuple[str, ...]
     name: str = ""
     late: bool = False
+    fault: str = ""
 
 
 def take_in(source: Path, staging: Path, roster: Roster | None = None) -> list[HandedIn]:
@@ -108,16 +115,16 @@ def take_in_roster(roster: Roster, base: Path, staging: Path) -> list[HandedIn]:
 
 
 def _from_roster(student: Student, base: Path, staging: Path) -> HandedIn:
-    row = HandedIn(student.key, None, student.name)
+    row = HandedIn(student.key, None, student.name, problem=student.problem)
     if not student.submission:
-        return replace(row, problem="handed in nothing")
+        return _with_problem(row, "handed in nothing")
     if _REPOSITORY.match(student.submission):
         target = staging / f"clone-{student.row}"
         problem = _clone(student.submission, target)
-        return replace(row, problem=problem) if problem else replace(row, path=target)
+        return replace(row, fault=problem) if problem else replace(row, path=target)
     path = base / student.submission
     if not path.exists():
-        return replace(row, problem=f"{shown(student.submission)} does not exist")
+        return _with_problem(row, f"{shown(student.submission)} does not exist")
     return replace(row, path=path)
 
 
@@ -207,19 +214,32 @@ def _stem(item: Path) -> str:
 def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> _Entry:
     """One student's files: the only one, or all of them in a folder."""
     first, match = files[0]
-    path = first
+    path, fault = first, ""
     if len(files) > 1 or not first.name.lower().endswith(SUFFIXES):
         path = staging / f"canvas-{match['user']}"
-        path.mkdir()
-        for file, named in files:
-            shutil.copyfile(file, path / _AGAIN.sub("", named["file"]), follow_symlinks=False)
+        fault = _gather({_AGAIN.sub("", named["file"]): file for file, named in files}, path)
     late = any(named["late"] for _, named in files)
     return _Entry(
         shown(f"{match['name']}_{match['user']}"),
         path,
         (match["user"], match["name"]),
         late=late,
+        fault=fault,
     )
+
+
+def _gather(files: Mapping[str, Path], folder: Path) -> str:
+    """Copy files together into a new folder; says what went wrong, or nothing."""
+    most = ArchiveLimits().total_bytes
+    try:
+        if sum(file.lstat().st_size for file in files.values()) > most:
+            return f"the files hold more than {most // MIB} MiB"
+        folder.mkdir()
+        for name, file in files.items():
+            shutil.copyfile(file, folder / name, follow_symlinks=False)
+    except OSError as error:
+        return f"the files cannot be read: {error.strerror or error}"
+    return ""
 
 
 def _gradescope(file: Path) -> Mapping[str, Any]:
@@ -245,11 +265,16 @@ def _of_gradescope(item: Path, about: Any) -> _Entry:
     )
     name = ", ".join(str(person[":name"]) for person in people if person.get(":name"))
     key = str(people[0].get(":sid") or people[0].get(":email")) if people else item.name
-    return _Entry(shown(key), item, names or (item.name,), name)
+    return _Entry(shown(key), item, names or (item.name,), shown(name))
 
 
 def _row(entry: _Entry) -> HandedIn:
-    return HandedIn(entry.key, entry.path, entry.name, entry.late)
+    path = None if entry.fault else entry.path
+    return HandedIn(entry.key, path, entry.name, entry.late, fault=entry.fault)
+
+
+def _with_problem(row: HandedIn, problem: str) -> HandedIn:
+    return replace(row, problem="; ".join(part for part in (problem, row.problem) if part))
 
 
 def _matched(entries: list[_Entry], roster: Roster) -> list[HandedIn]:
@@ -268,13 +293,17 @@ def _matched(entries: list[_Entry], roster: Roster) -> list[HandedIn]:
             rows.append(replace(_row(entry), problem=why))
             continue
         (key,) = keys
-        row = HandedIn(key, entry.path, students[key].name, entry.late)
+        student = students[key]
+        row = replace(_row(entry), key=key, name=student.name, problem=student.problem)
         if key in handed:
-            row = replace(row, problem=f"handed in twice: {handed[key]} too")
-        handed.setdefault(key, entry.path.name)
+            row = _with_problem(row, f"handed in twice: {handed[key]} too")
+        handed.setdefault(key, shown(entry.path.name))
         rows.append(row)
     missing = [student for student in roster.students if student.key not in handed]
-    rows += [HandedIn(s.key, None, s.name, problem="handed in nothing") for s in missing]
+    rows += [
+        _with_problem(HandedIn(s.key, None, s.name, problem=s.problem), "handed in nothing")
+        for s in missing
+    ]
     return rows
 
 

@@ -107,6 +107,10 @@ class Ledger:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.exists():
             _carry_over(target, partial)
+        # Else a power cut could leave a folder in its place with nothing in its files.
+        for item in (*partial.rglob("*"), partial):
+            _sync(item)
+        if target.exists():
             old = partial.with_name(partial.name + ".old")
             target.rename(old)
             partial.rename(target)
@@ -173,9 +177,9 @@ def _carry_over(old: Path, new: Path) -> None:
         shutil.copytree(old / _EARLIER, new / _EARLIER, dirs_exist_ok=True)
 
 
-def _sync(folder: Path) -> None:
-    """Let a rename survive a power cut."""
-    descriptor = os.open(folder, os.O_RDONLY)
+def _sync(path: Path) -> None:
+    """Let what was written, or the renames in a folder, survive a power cut."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:

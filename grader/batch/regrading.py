@@ -11,6 +11,7 @@ from grader.assignment.selection import visible_part
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.batch.reference_run import read_references
+from grader.checks.finding import Status
 from grader.errors import UsageError
 from grader.grade import Grade, grade
 from grader.recording.mcap_reader import read_recording
@@ -115,11 +116,15 @@ def compare(before: Result, after: Grade) -> list[str]:
             lines.append(f"{result.id}: new, {result.status.value}, {result.points:g} points")
         elif (was.status, was.points) != (result.status, result.points):
             why = result.decisive.finding.observed.partition("\n")[0]
-            lines.append(
-                f"{result.id}: {was.status.value} -> {result.status.value}, "
-                f"{was.points:g} -> {result.points:g} points: {why}"
-            )
+            judged = Status.ERROR not in (was.status, result.status)
+            points = f", {was.points:g} -> {result.points:g} points" if judged else ""
+            lines.append(f"{result.id}: {was.status.value} -> {result.status.value}{points}: {why}")
     lines += [f"{name}: no longer in the assignment" for name in old]
-    if before.score is not None and before.score != after.score:
-        lines.append(f"score: {before.score:g} -> {after.score:g} of {after.max_score:g}")
+    score = after.score if after.graded else None
+    if before.score != score:
+        earlier, now = (
+            "not graded" if points is None else f"{points:g}" for points in (before.score, score)
+        )
+        most = f" of {after.max_score:g}" if score is not None else ""
+        lines.append(f"score: {earlier} -> {now}{most}")
     return lines

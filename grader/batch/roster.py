@@ -6,10 +6,11 @@ import csv
 import io
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import UsageError
+from grader.submission.paths import shown
 
 _MOST_BYTES = 16 * 2**20
 # Column headers, as Canvas, Gradescope, GitHub Classroom and people write them.
@@ -34,6 +35,7 @@ class Student:
         email: Address.
         name: As people write it.
         submission: Path or URL of what was handed in.
+        problem: What is wrong with the row, where it can be used all the same.
     """
 
     row: int
@@ -42,11 +44,12 @@ class Student:
     email: str = ""
     name: str = ""
     submission: str = ""
+    problem: str = ""
 
     @property
     def key(self) -> str:
         """What the student is called in results."""
-        return self.login or self.id or self.email or self.name
+        return shown(self.login or self.id or self.email or self.name)
 
     @property
     def identifiers(self) -> frozenset[str]:
@@ -144,9 +147,8 @@ def _columns(header: Sequence[str]) -> dict[str, int]:
 
 
 def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) -> Roster:
-    students: list[Student] = []
+    students: dict[str, Student] = {}
     problems: list[str] = []
-    seen: dict[str, int] = {}
     for number, row in rows:
         cells = [cell.strip() for cell in row]
         if not any(cells) or cells[0].casefold().startswith(_POINTS_POSSIBLE):
@@ -156,9 +158,11 @@ def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) 
         if not student.key:
             problems.append(f"row {number}: names nobody")
             continue
-        known = seen.setdefault(normal(student.key) or student.key, number)
-        if known != number:
-            problems.append(f"row {number}: {student.key} is in row {known} already")
-            continue
-        students.append(student)
-    return Roster(tuple(students), tuple(problems))
+        name = normal(student.key) or student.key
+        known = students.setdefault(name, student)
+        if known is not student:
+            problems.append(f"row {number}: {student.key} is in row {known.row} already")
+            told = f"in the roster again in row {number}"
+            told = f"{known.problem}; {told}" if known.problem else told
+            students[name] = replace(known, problem=told)
+    return Roster(tuple(students.values()), tuple(problems))

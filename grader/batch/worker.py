@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import io
 import os
+import stat
 import tarfile
 import tempfile
 import threading
@@ -15,7 +16,7 @@ from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
-from grader.errors import GraderFault
+from grader.errors import GraderFault, SubmissionError
 from grader.report.facts import Clock
 from grader.resources import cache_folder
 from grader.run.admission import Admission
@@ -24,6 +25,7 @@ from grader.sandbox.choice import Choice
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import choose
 from grader.submission.locate import opened
+from grader.submission.prepare import Prepared, refused
 
 
 @dataclass(frozen=True)
@@ -71,18 +73,27 @@ def pack(folder: Path) -> bytes:
 
 
 def unpack(packed: bytes, folder: Path) -> None:
-    """Write the files of a tar that :func:`pack` made; it comes from a worker of ours."""
+    """Write the files of a tar that :func:`pack` made; it comes from a worker of ours.
+
+    Links and executable bits are kept: they belong to what a submission's hash is of.
+    """
     with tarfile.open(fileobj=io.BytesIO(packed)) as tar:
         for member in tar:
             target = folder / member.name
-            if not target.resolve().is_relative_to(folder.resolve()):
+            end = target.parent / member.linkname if member.issym() else target
+            if not end.resolve().is_relative_to(folder.resolve()):
                 raise GraderFault(f"a worker sent a file that leads out: {member.name}")
             if member.isdir():
                 target.mkdir(parents=True, exist_ok=True)
+                continue
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if member.issym():
+                target.symlink_to(member.linkname)
             elif member.isfile():
-                target.parent.mkdir(parents=True, exist_ok=True)
                 stream = tar.extractfile(member)
                 target.write_bytes(stream.read() if stream is not None else b"")
+                if member.mode & stat.S_IXUSR:
+                    target.chmod(target.stat().st_mode | stat.S_IXUSR)
 
 
 @dataclass(frozen=True)
@@ -94,20 +105,42 @@ class Parcel:
         name: Of the folder or archive that was handed in.
         content: The archive, or the folder as :func:`pack` makes it.
         is_folder: Which of the two.
+        refused: What there is instead where it cannot be read as a submission, or None.
     """
 
     key: str
     name: str
     content: bytes
     is_folder: bool
+    refused: Prepared | None = None
 
     @classmethod
     def of(cls, key: str, path: Path) -> Parcel:
-        """Pack what was handed in."""
-        if not path.is_dir():
-            return cls(key, path.name, path.read_bytes(), False)
-        with opened(path) as located:
-            return cls(key, path.name, pack(located.root), True)
+        """Pack what was handed in.
+
+        Raises:
+            UsageError: Nothing is there.
+            GraderFault: It cannot be read here, for no fault of the student.
+        """
+        try:
+            with opened(path) as located:
+                if not path.is_dir():
+                    return cls(key, path.name, path.read_bytes(), False)
+                # That there were some is told to who handed in nothing else.
+                for skipped in located.skipped:
+                    (located.root / skipped).mkdir(parents=True, exist_ok=True)
+                return cls(key, path.name, pack(located.root), True)
+        except SubmissionError as error:
+            # It may be of any size, and there is nothing to run.
+            return cls(key, path.name, b"", path.is_dir(), refused(path, error))
+
+    def open(self, path: Path) -> None:
+        """Write what was handed in."""
+        if self.is_folder:
+            path.mkdir()
+            unpack(self.content, path)
+        else:
+            path.write_bytes(self.content)
 
 
 def grade_remotely(order: Order, parcel: Parcel) -> bytes:
@@ -129,12 +162,15 @@ def grade_remotely(order: Order, parcel: Parcel) -> bytes:
         folder = Path(temporary, "out")
         folder.mkdir()
         path.parent.mkdir()
-        if parcel.is_folder:
-            path.mkdir()
-            unpack(parcel.content, path)
+        if parcel.refused is not None:
+            clock = Clock()
+            prepared = parcel.refused.named(parcel.key)
+            write_graded(
+                grading.grade_prepared(prepared, folder / RECORDINGS_FOLDER), folder, clock
+            )
         else:
-            path.write_bytes(parcel.content)
-        grade_into(grading, parcel.key, path, folder)
+            parcel.open(path)
+            grade_into(grading, parcel.key, path, folder)
         return pack(folder)
 
 

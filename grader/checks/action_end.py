@@ -12,7 +12,14 @@ from grader.checks.check import Subject, check
 from grader.checks.death import cause_of_death, dead
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Finding
-from grader.checks.goals import evidence, judged_goals, why_no_result, why_raised_in, why_rejected
+from grader.checks.goals import (
+    evidence,
+    judged_goals,
+    why_no_result,
+    why_raised_in,
+    why_rejected,
+    why_server_gone,
+)
 from grader.checks.unanswered import why_taken
 from grader.checks.value import NoSuchField
 from grader.recording.interaction import Goal
@@ -134,6 +141,9 @@ def _why_other_end(recording: Recording, goal: Goal, within_s: float) -> Cause:
     asked_ns = goal.canceled_ns or 0
     if goal.result_ns is None:
         seen = "the goal was asked to cancel, but neither canceled nor ended"
+        gone = why_server_gone(recording, goal, seen)
+        if gone is not None:
+            return gone
         taken = why_taken(recording, seen, asked_ns, recording.stop_ns, within_s)
         late = why_no_result(recording, goal, (recording.stop_ns - goal.sent_ns) / NS)
         if taken or (goal.cancel_accepted is None and late):
@@ -228,8 +238,9 @@ def _why_goes_on(
     which = f"the old goal ({fields_words(before.goal)})"
     if before.result_ns is None:
         seen = f"{which} was still worked on at the end"
+        gone = why_server_gone(recording, before, seen)
         taken = why_taken(recording, seen, goal.sent_ns, recording.stop_ns, parameters.within)
-        return taken or Cause(seen, hint, shown)
+        return gone or taken or Cause(seen, hint, shown)
     took_s = (before.result_ns - goal.sent_ns) / NS
     if before.status == "succeeded":
         return Cause(f"{which} was worked on to its end, and succeeded", hint, shown)

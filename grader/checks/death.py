@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import signal
+from collections.abc import Sequence
 
 from grader.checks import testimony
 from grader.checks.cause import Cause
@@ -59,6 +61,10 @@ _HINTS = {
     "RecursionError": "A function calls itself without end.",
     "MemoryError": "Look for a list or an image that grows without end.",
 }
+
+
+# A converter of rclpy met an object of another class; the name is that of the wanted one.
+_OTHER_CLASS = re.compile(r'convert_from_py: Assertion .strncmp\("[\w.]*\.(\w+)"')
 
 
 def ended_early(recording: Recording, process: Process) -> bool:
@@ -130,9 +136,17 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
         return Cause(f"{ended}: {breach}", _BREACH_HINTS[breach.what], evidence)
     failure = None if killed else fatal_failure(recording, process.name)
     if failure is None:
-        hint = _SIGNAL_HINTS.get(killed, "") if killed else ""
+        hint = _wrong_class(evidence.log) if killed is signal.SIGABRT else ""
+        hint = hint or (_SIGNAL_HINTS.get(killed, "") if killed else "")
         hint = hint or "Run it by hand with `ros2 run` and look at its last lines of output."
         return Cause(f"{ended} with {exit_words(process.exit_code)}", hint, evidence)
+    if failure.type == "TypeError" and failure.frames[-1].where == "send_response":
+        # The deepest line of the student's is that of spin(), which is right.
+        return Cause(
+            f"{ended} with {failure}: a service's callback did not return a response",
+            "A service's callback ends with `return response`, the object that it was called with.",
+            evidence,
+        )
     place = student_place(failure, recording.submission)
     where = f" ({place.file}:{place.line})" if place else ""
     return Cause(
@@ -197,6 +211,19 @@ def _exception_hint(failure: Failure, recording: Recording) -> str:
     if student_place(failure, recording.submission):
         return "Mend the line that is named here."
     return "Read the traceback from its last line upwards."
+
+
+def _wrong_class(lines: Sequence[str]) -> str:
+    """What to try where ROS was given an object of another class, or nothing."""
+    found = next((match for line in lines if (match := _OTHER_CLASS.search(line))), None)
+    if found is None:
+        return ""
+    # A part of a service or an action: Fibonacci_Result is Fibonacci.Result in Python.
+    name = re.sub(r"_(?=(Request|Response|Goal|Result|Feedback)$)", ".", found[1])
+    return (
+        f"ROS was given something that is no {code(name)}: return or publish one. A callback "
+        "without `return` returns None."
+    )
 
 
 def _last_lines(recording: Recording, process: Process) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from grader.checks.finding import Table
 from grader.checks.value import Difference, differences, expected_leaves
 from grader.checks.wording import value_text
 
+_MOST_FIELDS = 6
 TOLERANCE = 1e-9
 """Largest difference of two numbers that are meant to be the same."""
 
@@ -37,6 +38,21 @@ def unlike(
 def words(value: Mapping[str, Any]) -> str:
     """Write fields as ``a = 2, b = 3``; ``nothing`` for none."""
     return ", ".join(f"{path} = {value_text(item)}" for path, item in _plain(value)) or "nothing"
+
+
+def brief(value: Mapping[str, Any]) -> str:
+    """Write a whole request or goal; of a long one only the fields that are not zero or empty."""
+    fields = list(_plain(value))
+    if len(fields) <= _MOST_FIELDS:
+        return words(value)
+    said = [f"{path} = {value_text(item)}" for path, item in fields if not _is_default(item)]
+    return ", ".join(said) or "every field zero or empty"
+
+
+def _is_default(value: Any) -> bool:
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray):
+        return all(_is_default(item) for item in value)
+    return not value
 
 
 def difference_words(found: Sequence[Difference]) -> str:

@@ -12,7 +12,7 @@ from grader.checks.fields import has_fields
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.offered import ACTION, actions, why_not_offered
-from grader.checks.unanswered import why_raised, why_unanswered
+from grader.checks.unanswered import why_gone, why_raised, why_unanswered
 from grader.checks.wording import code
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
@@ -112,9 +112,18 @@ def why_raised_in(recording: Recording, goal: Goal, what: str) -> Cause | None:
     return None
 
 
+def why_server_gone(recording: Recording, goal: Goal, what: str) -> Cause | None:
+    """Why the process that worked on a goal ended early, or None if it did not."""
+    return why_gone(recording, what, _server(recording, goal))
+
+
 def _unanswered(recording: Recording, goal: Goal, what: str, within_s: float) -> Cause:
-    node = next(item.node for item in actions(recording) if item.name == goal.action)
-    return why_unanswered(recording, what, node, goal.sent_ns, within_s)
+    return why_unanswered(recording, what, _server(recording, goal), goal.sent_ns, within_s)
+
+
+def _server(recording: Recording, goal: Goal) -> str:
+    """The node that offers the action of a goal."""
+    return next(item.node for item in actions(recording) if item.name == goal.action)
 
 
 def evidence(recording: Recording, goal: Goal) -> Evidence:

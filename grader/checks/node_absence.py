@@ -134,7 +134,8 @@ def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
                 "unless the assignment asks for it.",
                 evidence,
             )
-    if nearest(wanted, names) is None:
+    # Without the namespaces, which make any two names alike.
+    if nearest(base, [name.rpartition("/")[2] for name in names]) is None:
         ended = [process for process in dead(recording) if process.exit_code != 0]
         if ended:
             return cause_of_death(recording, ended[0])

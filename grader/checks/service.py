@@ -14,7 +14,14 @@ from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead
-from grader.checks.fields import TOLERANCE, difference_table, difference_words, has_fields, unlike
+from grader.checks.fields import (
+    TOLERANCE,
+    brief,
+    difference_table,
+    difference_words,
+    has_fields,
+    unlike,
+)
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.offered import SERVICE, is_offered, services, why_not_offered
@@ -199,7 +206,7 @@ def _until_stop_s(recording: Recording, call: Call) -> float:
 
 def _which(calls: tuple[Call, ...], call: Call) -> str:
     number = f"call {calls.index(call) + 1} of {len(calls)}" if len(calls) > 1 else "the call"
-    return f"{number} ({fields_words(call.request)})" if call.request else number
+    return f"{number} ({brief(call.request)})" if call.request else number
 
 
 def _took_s(call: Call) -> float:
@@ -224,7 +231,7 @@ def _first_wrong(
             f"{path} = {_text_at(response, path)!r} without “{parameters.contains[path]}”"
             for path in lacking
         ]
-        asked = fields_words(call.request or {})
+        asked = brief(call.request or {})
         when_s = recording.since_launch_s(call.requested_ns)
         return Cause(
             f"{_which(calls, call)} was answered with {' and '.join(told)}",
@@ -251,7 +258,7 @@ def _evidence(recording: Recording, calls: tuple[Call, ...]) -> Evidence:
     rows = tuple(
         (
             f"{recording.since_launch_s(call.requested_ns):.2f} s",
-            fields_words(call.request or {}),
+            brief(call.request or {}),
             fields_words(call.response) if call.response is not None else "no answer",
             format_duration(_took_s(call)) if call.answered_ns is not None else "",
         )

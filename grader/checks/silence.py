@@ -11,6 +11,7 @@ from grader.checks.delivery import why_not_delivered
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment
 from grader.checks.sighting import endpoints_seen, until_the_end
+from grader.checks.standing_clock import why_time_stands_still
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.unanswered import why_raised
 from grader.checks.wording import code, codes, counted, listing
@@ -58,6 +59,7 @@ def why_silent(recording: Recording, topic: str) -> Cause:
         or (_slow(recording, topic) if not asked else None)
         or _starved(recording, topic)
         or why_never_spun(recording, f"no message on {code(topic)}")
+        or why_time_stands_still(recording, f"no message on {code(topic)}")
         or _blocked(recording, topic)
         or _prints(recording, topic)
         or _unanswered(recording, topic, asked)
@@ -316,7 +318,12 @@ def _tells_of_publishing(recording: Recording, line: LogLine, words: list[str]) 
 
 
 def _idle(recording: Recording, topic: str) -> Cause:
-    complaints = [line.text for line in recording.log if line.stream == "stderr"]
+    # What it prints after Ctrl+C tells of its end, which any right node may word as a traceback.
+    complaints = [
+        line.text
+        for line in recording.log
+        if line.stream == "stderr" and line.time_ns <= recording.stop_ns
+    ]
     publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
     evidence = Evidence(
         moments=(

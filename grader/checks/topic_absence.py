@@ -43,16 +43,22 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
         moments=endpoints_seen(recording, own) or nodes_seen(recording),
         tables=_endpoints_table(recording),
     )
+    ended = [process for process in dead(recording) if process.exit_code != 0]
+    # What a process that lives has is no misspelling of what a dead one never came to create.
+    suspects = [
+        item
+        for item in own
+        if not ended or testimony.process_of(recording, item.node) in (None, *ended)
+    ]
     near = why_misnamed(
         topic,
-        [Named(item.topic, item.node) for item in own],
+        [Named(item.topic, item.node) for item in suspects],
         f"the node {_DOES[kind]}",
         f"Write the topic's name as '{topic.rpartition('/')[2]}' in self.{_CREATE[kind]}(...).",
         evidence,
     )
     if near is not None:
         return near
-    ended = [process for process in dead(recording) if process.exit_code != 0]
     if ended:
         return cause_of_death(recording, ended[0])
     if testimony.declares(recording, kind.value, "topic", topic):

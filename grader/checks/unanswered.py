@@ -29,9 +29,9 @@ def why_unanswered(
     """
     process = testimony.process_of(recording, node)
     moment = Moment("asked, not answered in time", recording.since_launch_s(asked_ns))
-    ended = dead(recording) if process is None else (process,)
-    if ended and ended_early(recording, ended[0]):
-        return cause_of_death(recording, ended[0]).after(what)
+    gone = why_gone(recording, what, node)
+    if gone is not None:
+        return gone
     taken = why_taken(recording, what, asked_ns, recording.stop_ns, within_s)
     if taken is not None:
         return taken
@@ -58,6 +58,21 @@ def why_unanswered(
         "another one of the same callback group waits for ever.",
         evidence,
     )
+
+
+def why_gone(recording: Recording, what: str, node: str) -> Cause | None:
+    """Why the process of a node ended early, or None if it did not.
+
+    Args:
+        recording: The run.
+        what: What came of it, in words.
+        node: Fully qualified name.
+    """
+    process = testimony.process_of(recording, node)
+    ended = dead(recording) if process is None else (process,)
+    if ended and ended_early(recording, ended[0]):
+        return cause_of_death(recording, ended[0]).after(what)
+    return None
 
 
 def why_taken(

@@ -28,7 +28,10 @@ def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
     if submission.problem is not None:
         return Cause(
             submission.problem,
-            "Hand in the workspace, its src folder or the package itself: a folder with a "
+            "Hand in the packages that are asked for, each of them once; colcon leaves out a "
+            "folder with a file COLCON_IGNORE in it."
+            if submission.packages
+            else "Hand in the workspace, its src folder or the package itself: a folder with a "
             "package.xml must be in it.",
         )
     if submission.package(name) is not None:

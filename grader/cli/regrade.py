@@ -85,6 +85,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
             console.print(f"{row.done.entry.key}: {change}", soft_wrap=True)
     gain = [row for row in rows if row.gained > 0]
     lose = [row for row in rows if row.gained < 0]
+    doubtful = sum(row.in_doubt for row in rows)
     console.print(
         f"{len(rows)} judged again in {time.monotonic() - began_s:.1f} s: {len(gain)} gain "
         f"{sum(row.gained for row in gain):g} points, {len(lose)} lose "
@@ -92,6 +93,12 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
         f"{sum(bool(row.changes) for row in rows)} with a change",
         soft_wrap=True,
     )
+    if doubtful:
+        console.print(
+            f"{doubtful} cannot be judged from what was recorded and are not graded any more; "
+            "run them again with `rosgrade batch ... --retry errors`",
+            soft_wrap=True,
+        )
     console.print(f"Overview: {overview}", soft_wrap=True)
     console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
     graded = all(row.done.result is None or row.done.result.graded for row in rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from grader.assignment.withheld import Withheld
@@ -10,6 +10,11 @@ from grader.checks.finding import Status
 from grader.report import words
 from grader.report.clean import clean, one_line
 from grader.report.result_model import CheckPart, FindingPart, PlacePart, Result
+
+MOST_NOTES = 20
+"""Notes of the runs under one title; a submission can cause any number of them."""
+MOST_CHARACTERS = 500
+"""Of a note; names in it are the student's."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +29,43 @@ class Row:
 
     name: str
     text: str
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What is worth knowing of the runs, beside the checks.
+
+    Attributes:
+        title: What the notes are.
+        notes: Scenario and text of each, in one line each; between backticks stands code.
+        left_out: Number of notes beyond these.
+    """
+
+    title: str
+    notes: tuple[tuple[str, str], ...]
+    left_out: int
+
+    @property
+    def rest(self) -> str:
+        """What to say of the notes that are left out; nothing where there are none."""
+        return f"{self.left_out} more: see the report" if self.left_out else ""
+
+
+def notes_of_runs(result: Result) -> tuple[Notes, ...]:
+    """Limits of the sandbox that were reached, and what else is worth knowing."""
+    reached = [(run.id, breach) for run in result.scenarios for breach in run.breaches]
+    remarked = [(run.id, remark) for run in result.scenarios for remark in run.remarks]
+    kinds = ((words.LIMITS_REACHED, reached), (words.WORTH_KNOWING, remarked))
+    return tuple(_notes(title, told) for title, told in kinds if told)
+
+
+def _notes(title: str, told: Sequence[tuple[str, str]]) -> Notes:
+    kept = tuple((one_line(run), _cut(one_line(text))) for run, text in told[:MOST_NOTES])
+    return Notes(title, kept, len(told) - len(kept))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MOST_CHARACTERS else f"{text[: MOST_CHARACTERS - 1]}…"
 
 
 def explain(check: CheckPart) -> tuple[Row, ...]:

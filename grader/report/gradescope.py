@@ -9,7 +9,7 @@ Source: https://gradescope-autograders.readthedocs.io/en/latest/specs/
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -139,12 +139,17 @@ def _mapping(value: Any) -> Mapping[str, Any]:
 def _output(result: Result) -> str:
     copy = for_student(result)
     if not result.graded:
-        return _NOT_GRADED
+        return "\n".join([_NOT_GRADED, *_notes(copy)])
     lines = [f"**{explanation.score(copy)}.** {explanation.headline(copy)}"]
     first = next((check for check in copy.checks if check.id == copy.first_to_fix), None)
     if first is not None:
         lines += ["", f"**Fix this first:** {markdown.prose(first.title)}"]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_notes(copy)])
+
+
+def _notes(result: Result) -> Iterator[str]:
+    for block in markdown.notes(result):
+        yield f"\n{block.rstrip()}"
 
 
 def _test(number: int, check: CheckPart, graded: bool) -> dict[str, Any]:

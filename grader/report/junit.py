@@ -9,6 +9,7 @@ Source: https://github.com/jenkinsci/xunit-plugin, ``junit-10.xsd``.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
 from grader.checks.finding import Status
@@ -48,6 +49,8 @@ def render_junit(result: Result, *, xunit1: bool = False) -> str:
     _properties(suite, _of_suite(result))
     for check in result.checks:
         _case(suite, result, check, xunit1=xunit1)
+    if lines := list(_notes(result)):
+        ET.SubElement(suite, "system-out").text = "\n".join(lines)
     ET.indent(root)
     text: str = ET.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'
@@ -70,6 +73,15 @@ def _of_suite(result: Result) -> dict[str, str]:
     found |= {f"points.{check.id}": explanation.points(check) for check in result.checks}
     found |= {f"environment.{name}": value for name, value in result.environment.items()}
     return found
+
+
+def _notes(result: Result) -> Iterator[str]:
+    """What is worth knowing of the runs; it belongs to no check."""
+    for kind in explanation.notes_of_runs(result):
+        yield f"{kind.title}:"
+        yield from (f"scenario {run}: {text}" for run, text in kind.notes)
+        if kind.rest:
+            yield kind.rest
 
 
 def _properties(parent: ET.Element, values: dict[str, str]) -> None:

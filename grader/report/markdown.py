@@ -33,7 +33,7 @@ def render_markdown(result: Result, most_bytes: int | None = None) -> str:
     Returns:
         Markdown; the same input gives the same text.
     """
-    blocks = [_head(result), _table(result), *_runs(result), *_explanations(result)]
+    blocks = [_head(result), _table(result), *notes(result), *_explanations(result)]
     whole = "\n".join(blocks)
     if most_bytes is None or len(whole.encode()) <= most_bytes:
         return whole
@@ -112,14 +112,13 @@ def _table(result: Result) -> str:
     return "\n".join([*lines, ""])
 
 
-def _runs(result: Result) -> Iterator[str]:
-    """Limits of the sandbox that were reached and what else is worth knowing, by scenario."""
-    reached = [(run.id, literal(breach)) for run in result.scenarios for breach in run.breaches]
-    remarked = [(run.id, prose(remark)) for run in result.scenarios for remark in run.remarks]
-    for title, told in ((words.LIMITS_REACHED, reached), (words.WORTH_KNOWING, remarked)):
-        if told:
-            lines = [f"- scenario {literal(scenario)}: {text}" for scenario, text in told]
-            yield "\n".join([f"**{title}**", "", *lines, ""])
+def notes(result: Result) -> Iterator[str]:
+    """Limits of the sandbox that were reached and what else is worth knowing, a block for each."""
+    for kind in explanation.notes_of_runs(result):
+        lines = [f"- scenario {literal(run)}: {prose(text)}" for run, text in kind.notes]
+        if kind.rest:
+            lines.append(f"- {kind.rest}")
+        yield "\n".join([f"**{kind.title}**", "", *lines, ""])
 
 
 def _explanations(result: Result) -> Iterator[str]:

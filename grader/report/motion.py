@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -25,7 +25,9 @@ from grader.report.svg import (
     element,
     label,
     line,
+    outline,
     ticks,
+    unit_of,
 )
 
 LEFT, RIGHT = 54, 12
@@ -33,6 +35,8 @@ STRIP, PANEL, BETWEEN = 18, 110, 34
 STRIDE = 4
 """Steps of 10 ms from one drawn point to the next."""
 MOST_POINTS = 400
+MOST = 1e6
+"""Speeds beyond it are not drawn to scale."""
 SHORTEST_S = 0.25
 """A phase shorter than this belongs to the one before."""
 PHASES = {
@@ -54,21 +58,21 @@ class Phase:
 
 @dataclass(frozen=True)
 class _Panel:
-    """One of the two speeds.
+    """One of the two speeds, drawn as high in every width.
 
     Attributes:
         title: What it is.
-        unit: Its unit.
-        commands: What was commanded and in force, over time.
-        true: What it was, as many.
-        limit: Of the robot.
+        y: Scale of its values.
+        limits: Of the robot, where it came near, each with its label.
+        command: What was commanded and in force: times (s since launch) and vertical pixels.
+        true: What it was, in the same units.
     """
 
     title: str
-    unit: str
-    commands: Sequence[float]
-    true: Sequence[float]
-    limit: float
+    y: Scale
+    limits: Sequence[tuple[float, str]]
+    command: Sequence[Point]
+    true: Sequence[Point]
 
 
 def draw_motion(recording: Recording, name: str) -> Figure | None:
@@ -96,7 +100,7 @@ def draw_motion(recording: Recording, name: str) -> Figure | None:
     stride = max(STRIDE, len(recording.truth) // MOST_POINTS)
     truth = (*recording.truth[::stride], recording.truth[-1])
     times_s = [recording.since_launch_s(step.time_ns) for step in truth]
-    panels = _panels(truth, scene)
+    panels = _panels(truth, scene, times_s)
     title = f"Commands and true speeds in the scenario {recording.scenario}"
     wide, narrow = (
         drawing(f"{name}-{kind}", title, description, *_draw(panels, times_s, found, width))
@@ -130,37 +134,67 @@ def _what(step: Truth) -> str:
     return "drives" if drives else "turns" if turns else "rests"
 
 
-def _panels(truth: Sequence[Truth], scene: Scene) -> tuple[_Panel, ...]:
-    return (
-        _Panel(
-            "speed ahead",
-            "m/s",
+def _panels(truth: Sequence[Truth], scene: Scene, times_s: Sequence[float]) -> list[_Panel]:
+    speeds = (
+        (
+            "speed ahead (m/s)",
             [0.0 if math.isnan(step.command_m_s) else step.command_m_s for step in truth],
             [step.linear_m_s for step in truth],
             scene.max_linear_m_s,
         ),
-        _Panel(
-            "turn",
-            "rad/s",
+        (
+            "turn (rad/s)",
             [0.0 if math.isnan(step.command_rad_s) else step.command_rad_s for step in truth],
             [step.angular_rad_s for step in truth],
             scene.max_angular_rad_s,
         ),
     )
+    panels: list[_Panel] = []
+    for title, commands, true, limit in speeds:
+        top = STRIP + BETWEEN + len(panels) * (PANEL + BETWEEN)
+        near = _near(limit, (*commands, *true))
+        y = _scale((*commands, *true), near, limit, top)
+        told = [(value, f"limit {value:.3g}{unit_of(title)}") for value in near]
+        held = _steps(times_s, y.all_clipped(commands))
+        driven = list(zip(times_s, y.all_clipped(true), strict=True))
+        panels.append(_Panel(title, y, told, _seen(held, times_s), _seen(driven, times_s)))
+    return panels
+
+
+def _near(limit: float, values: Iterable[float]) -> list[float]:
+    """The limits, ahead and back, that the values reach half of."""
+    finite = [value for value in values if abs(value) < MOST]
+    low, high = min(0.0, *finite), max(0.0, *finite)
+    return [sign * limit for sign, reach in ((1.0, high), (-1.0, -low)) if reach > 0.5 * limit]
+
+
+def _scale(values: Iterable[float], limits: Iterable[float], limit: float, top: float) -> Scale:
+    finite = [value for value in values if abs(value) < MOST]
+    low, high = min(0.0, *finite, *limits), max(0.0, *finite, *limits)
+    room = 0.08 * (high - low) or 0.05 * limit or 0.05
+    return Scale(low - room, high + room, top + PANEL, top)
+
+
+def _seen(points: Sequence[Point], times_s: Sequence[float]) -> list[Point]:
+    """Of times and vertical pixels, those that can be seen in the wide drawing."""
+    x = _time_scale(times_s, WIDE)
+    placed = zip(x.all_clipped([time_s for time_s, _ in points]), points, strict=True)
+    return [points[index] for index in outline([(x, y) for x, (_, y) in placed])]
+
+
+def _time_scale(times_s: Sequence[float], width: float) -> Scale:
+    return Scale(0.0, max(times_s[-1], 0.1), LEFT, width - RIGHT)
 
 
 def _draw(
     panels: Sequence[_Panel], times_s: Sequence[float], found: Sequence[Phase], width: float
 ) -> tuple[tuple[float, float], list[Markup]]:
     """Size and content of the drawing."""
-    x = Scale(0.0, max(times_s[-1], 0.1), LEFT, width - RIGHT)
-    places = [x(time_s) for time_s in times_s]
+    x = _time_scale(times_s, width)
     content = _strip(found, x)
-    top: float = STRIP + BETWEEN
     for panel in panels:
-        content += _panel(panel, places, x, top)
-        top += PANEL + BETWEEN
-    bottom = top - BETWEEN
+        content += _panel(panel, x)
+    bottom = panels[-1].y.begin
     content += time_axis(x, bottom, width)
     return (width, bottom + axis.HEIGHT), content
 
@@ -178,23 +212,17 @@ def _strip(found: Sequence[Phase], x: Scale) -> list[Markup]:
     return drawn
 
 
-def _panel(panel: _Panel, places: Sequence[float], x: Scale, top: float) -> list[Markup]:
-    finite = [value for value in (*panel.commands, *panel.true) if abs(value) < 1e6]
-    low, high = min(0.0, *finite), max(0.0, *finite)
-    near = 0.5 * panel.limit
-    limits = [sign * panel.limit for sign, reach in ((1.0, high), (-1.0, -low)) if reach > near]
-    low, high = min(low, *limits, 0.0), max(high, *limits, 0.0)
-    room = 0.08 * (high - low) or 0.05 * panel.limit or 0.05
-    y = Scale(low - room, high + room, top + PANEL, top)
-    drawn = [label(f"{panel.title} ({panel.unit})", 0, top - 8)]
+def _panel(panel: _Panel, x: Scale) -> list[Markup]:
+    y = panel.y
+    drawn = [label(panel.title, 0, y.end - 8)]
     for value, text in ticks(y.low, y.high, 3):
         drawn.append(line(LEFT, y(value), x.end, y(value), "grid"))
         drawn.append(label(text, LEFT - 8, y(value) + 4, anchor="end"))
-    for limit in limits:
+    for limit, text in panel.limits:
         drawn.append(line(LEFT, y(limit), x.end, y(limit), "limit"))
-        drawn.append(label(f"limit {limit:.3g} {panel.unit}", x.end, y(limit) - 4, anchor="end"))
-    drawn.append(curve(_steps(places, y.all_clipped(panel.commands)), "command"))
-    drawn.append(curve(list(zip(places, y.all_clipped(panel.true), strict=True)), "true"))
+        drawn.append(label(text, x.end, y(limit) - 4, anchor="end"))
+    drawn.append(curve([(x(time_s), at) for time_s, at in panel.command], "command"))
+    drawn.append(curve([(x(time_s), at) for time_s, at in panel.true], "true"))
     return drawn
 
 

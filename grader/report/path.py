@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left as _first
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate
 
 from markupsafe import Markup
 
 from grader.checks.ground import ahead
 from grader.checks.measure import metres
-from grader.checks.track import first_rest, has_moved, way_m
+from grader.checks.track import first_rest, has_moved
 from grader.checks.wording import counted, listing
 from grader.recording.model import NS, Recording, Scene, Truth
 from grader.report import ground_plan
@@ -74,7 +75,7 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Fig
         outline=simplified(
             [(step.x_m, step.y_m) for step in (*truth[::stride], truth[-1])], TOLERANCE_M
         ),
-        way_m=way_m(truth),
+        gone_m=tuple(accumulate(map(_step_m, truth, truth[1:]), initial=0.0)),
         moved=has_moved(truth),
         stopped=_stopped(truth, scene),
         touched=_contacts(truth),
@@ -97,7 +98,7 @@ class _Course:
         truth: Of the robot.
         targets: Where it should end.
         outline: Positions along the path, in metres; those on straight lines are left out.
-        way_m: Length of the path.
+        gone_m: Length of the path up to each step.
         moved: Whether the robot has left its place or its heading.
         stopped: Where it first came to rest with something near ahead, and how far that was.
         touched: The first step of every contact.
@@ -107,10 +108,19 @@ class _Course:
     truth: Sequence[Truth]
     targets: Sequence[Target]
     outline: Sequence[Point]
-    way_m: float
+    gone_m: Sequence[float]
     moved: bool
     stopped: tuple[Truth, float] | None
     touched: Sequence[Truth]
+
+    @property
+    def way_m(self) -> float:
+        """Length of the path."""
+        return self.gone_m[-1]
+
+
+def _step_m(before: Truth, step: Truth) -> float:
+    return math.hypot(step.x_m - before.x_m, step.y_m - before.y_m)
 
 
 def _draw(course: _Course, title: str, caption: str, name: str, width: float) -> Markup:
@@ -184,18 +194,17 @@ def _goal(view: View, target: Target) -> list[Markup]:
 def _arrows(course: _Course, view: View) -> str:
     """Small arrow heads along the path, evenly in length: which way the robot looked."""
     every_m = max(course.way_m / MOST_ARROWS, 30.0 / view.scale)
-    path, gone_m = [], 0.0
-    for before, step in pairwise(course.truth):
-        gone_m += math.hypot(step.x_m - before.x_m, step.y_m - before.y_m)
-        if gone_m >= every_m:
-            gone_m = 0.0
-            x, y = view.pixel(step.x_m, step.y_m)
-            cos, sin = math.cos(step.yaw_rad), -math.sin(step.yaw_rad)
-            # A head of 8 by 8 pixels around the point.
-            left = (x - 4.0 * cos - 4.0 * sin, y - 4.0 * sin + 4.0 * cos)
-            right = (x - 4.0 * cos + 4.0 * sin, y - 4.0 * sin - 4.0 * cos)
-            tip = (x + 4.0 * cos, y + 4.0 * sin)
-            path.append("M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in (left, tip, right)))
+    path: list[str] = []
+    at = 0
+    while (at := _first(course.gone_m, course.gone_m[at] + every_m, at + 1)) < len(course.truth):
+        step = course.truth[at]
+        x, y = view.pixel(step.x_m, step.y_m)
+        cos, sin = math.cos(step.yaw_rad), -math.sin(step.yaw_rad)
+        # A head of 8 by 8 pixels around the point.
+        left = (x - 4.0 * cos - 4.0 * sin, y - 4.0 * sin + 4.0 * cos)
+        right = (x - 4.0 * cos + 4.0 * sin, y - 4.0 * sin - 4.0 * cos)
+        tip = (x + 4.0 * cos, y + 4.0 * sin)
+        path.append("M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in (left, tip, right)))
     return "".join(path)
 
 

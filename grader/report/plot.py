@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import compress
+from operator import not_
 
 from markupsafe import Markup
 
@@ -24,6 +27,7 @@ from grader.report.svg import (
     element,
     label,
     line,
+    outline,
     ticks,
     unit_of,
 )
@@ -56,26 +60,71 @@ def draw_plot(plot: Plot, name: str) -> Figure:
     ]
     lost = max(len(plot.x), len(plot.y)) - len(points)
     band = plot.band if plot.band and not any(math.isnan(edge) for edge in plot.band) else None
-    caption = _caption(plot, points, band, lost)
+    edges = [edge for edge in band or () if abs(edge) < DRAWABLE]
+    ordinates = [y for _, y in points]
+    low, high = band or (-math.inf, math.inf)
+    inside = [low <= y <= high for y in ordinates]
+    wide = _abscissae(plot, points, WIDE)
+    kept = _thinned(points, wide) if len(points) > MANY else [*range(len(points))]
+    shown = [points[index] for index in kept]
+    y = Scale(*_span(ordinates + edges, 0.1), HEIGHT - BOTTOM, TOP)
+    values = _Values(
+        points=points,
+        shown=shown,
+        inside=[inside[index] for index in kept],
+        outside=inside.count(False),
+        y=y,
+        edges=edges,
+        course=[shown[index] for index in outline(_placed(shown, wide, y))] if shown else [],
+    )
+    caption = _caption(plot, values, band, lost)
     return Figure(
         caption,
-        _draw(plot, points, band, caption, f"{name}-wide", WIDE),
-        _draw(plot, points, band, caption, f"{name}-narrow", NARROW),
+        _draw(plot, values, band, caption, f"{name}-wide", WIDE),
+        _draw(plot, values, band, caption, f"{name}-narrow", NARROW),
     )
 
 
-def _draw(
-    plot: Plot,
-    points: Sequence[Point],
-    band: Point | None,
-    caption: str,
-    name: str,
-    width: float,
-) -> Markup:
-    edges = [edge for edge in band or () if abs(edge) < DRAWABLE]
+@dataclass(frozen=True)
+class _Values:
+    """What is to be drawn, whatever the width.
+
+    Attributes:
+        points: Those that can be drawn.
+        shown: Of these, those that can be told apart in the wide drawing.
+        inside: Whether each of those is within the band.
+        outside: How many of all points are not.
+        y: Scale of the ordinates.
+        edges: Of the band, those that can be drawn.
+        course: Of the shown points, those that a line through them needs in the wide drawing.
+    """
+
+    points: Sequence[Point]
+    shown: Sequence[Point]
+    inside: Sequence[bool]
+    outside: int
+    y: Scale
+    edges: Sequence[float]
+    course: Sequence[Point]
+
+
+def _abscissae(plot: Plot, points: Sequence[Point], width: float) -> Scale:
+    """The scale along a drawing, which leaves room for a histogram."""
     aside = width * ASIDE if plot.histogram and points else 0.0
-    x = Scale(*_span([x for x, _ in points], 0.0), LEFT, width - RIGHT - aside)
-    y = Scale(*_span([y for _, y in points] + edges, 0.1), HEIGHT - BOTTOM, TOP)
+    return Scale(*_span([x for x, _ in points], 0.0), LEFT, width - RIGHT - aside)
+
+
+def _placed(points: Sequence[Point], x: Scale, y: Scale) -> list[Point]:
+    """Points in pixels."""
+    across, down = x.all_clipped([a for a, _ in points]), y.all_clipped([b for _, b in points])
+    return list(zip(across, down, strict=True))
+
+
+def _draw(
+    plot: Plot, values: _Values, band: Point | None, caption: str, name: str, width: float
+) -> Markup:
+    y = values.y
+    x = _abscissae(plot, values.points, width)
     end = width - RIGHT
     content = [
         label(plot.y_label, 0, 12),
@@ -87,7 +136,7 @@ def _draw(
         content.append(
             element("rect", x=LEFT, y=top, width=end - LEFT, height=height, class_="band")
         )
-        content += [line(LEFT, y(edge), end, y(edge), "band-edge") for edge in edges]
+        content += [line(LEFT, y(edge), end, y(edge), "band-edge") for edge in values.edges]
     for value, text in ticks(y.low, y.high, 4):
         content.append(line(LEFT, y(value), end, y(value), "grid"))
         content.append(label(text, LEFT - 8, y(value) + 4, anchor="end"))
@@ -95,27 +144,24 @@ def _draw(
     for value, text in ticks(x.low, x.high, 8 if width > NARROW else 3):
         content.append(line(x(value), y.begin, x(value), y.begin + 5, "axis"))
         content.append(label(text, x(value), y.begin + 18, anchor="middle"))
-    content += _series(points, band, x, y)
-    if aside:
-        content += bars([y for _, y in points], y, x.end + GAP, end)
+    content += _series(values, x)
+    if plot.histogram and values.points:
+        content += bars([y for _, y in values.points], y, x.end + GAP, end)
         content.append(label("how many", end, HEIGHT - 4, anchor="end"))
     return drawing(name, plot.title, caption, (width, HEIGHT), content)
 
 
-def _series(points: Sequence[Point], band: Point | None, x: Scale, y: Scale) -> list[Markup]:
-    shown = _thinned(points, x)
-    dense = len(shown) > DOTS
+def _series(values: _Values, x: Scale) -> list[Markup]:
+    dense = len(values.shown) > DOTS
     drawn = []
-    placed = [(x(a), y(b)) for a, b in shown]
-    if len(shown) > 1:
-        drawn.append(curve(placed, "series dense" if dense else "series"))
-    within = [_inside(b, band) for _, b in shown]
-    inside = [point for point, good in zip(placed, within, strict=True) if good]
-    outside = [point for point, good in zip(placed, within, strict=True) if not good]
-    if inside and not dense:
-        drawn.append(dots(inside, "dots"))
-    if outside:
-        drawn.append(crosses(_apart(outside), "out"))
+    placed = _placed(values.shown, x, values.y)
+    if len(placed) > 1:
+        course = _placed(values.course, x, values.y)
+        drawn.append(curve(course, "series dense" if dense else "series"))
+    if any(values.inside) and not dense:
+        drawn.append(dots(compress(placed, values.inside), "dots"))
+    if not all(values.inside):
+        drawn.append(crosses(_apart([*compress(placed, map(not_, values.inside))]), "out"))
     return drawn
 
 
@@ -129,17 +175,18 @@ def _apart(points: Sequence[Point]) -> list[Point]:
     return kept
 
 
-def _thinned(points: Sequence[Point], x: Scale) -> list[Point]:
-    """The lowest and the highest point of every pixel column, where there are too many."""
-    if len(points) <= MANY:
-        return list(points)
-    lowest: dict[int, Point] = {}
-    highest: dict[int, Point] = {}
-    for point in points:
-        column = round(x(point[0]))
-        lowest[column] = min(lowest.get(column, point), point, key=lambda item: item[1])
-        highest[column] = max(highest.get(column, point), point, key=lambda item: item[1])
-    return sorted({*lowest.values(), *highest.values()})
+def _thinned(points: Sequence[Point], x: Scale) -> list[int]:
+    """Indices of the lowest and the highest point of every pixel column, by abscissa."""
+    lowest: dict[int, int] = {}
+    highest: dict[int, int] = {}
+    for index, (column, (_, y)) in enumerate(
+        zip(map(round, x.all_clipped([a for a, _ in points])), points, strict=True)
+    ):
+        if y < points[lowest.setdefault(column, index)][1]:
+            lowest[column] = index
+        if y > points[highest.setdefault(column, index)][1]:
+            highest[column] = index
+    return sorted({*lowest.values(), *highest.values()}, key=lambda index: points[index])
 
 
 def _span(values: Sequence[float], margin: float) -> tuple[float, float]:
@@ -153,24 +200,19 @@ def _span(values: Sequence[float], margin: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _inside(value: float, band: Point | None) -> bool:
-    return band is None or band[0] <= value <= band[1]
-
-
-def _caption(plot: Plot, points: Sequence[Point], band: Point | None, lost: int) -> str:
+def _caption(plot: Plot, values: _Values, band: Point | None, lost: int) -> str:
     parts = [one_line(plot.title)]
-    if not points:
+    count = len(values.points)
+    if not count:
         parts.append("no values")
     elif band:
-        outside = sum(not _inside(y, band) for _, y in points)
+        outside = values.outside
         parts.append(f"{_allowed(band)}{unit_of(plot.y_label)} (shaded)")
         parts.append(
-            f"{outside} of {len(points)} outside (marked ×)"
-            if outside
-            else f"all {len(points)} inside"
+            f"{outside} of {count} outside (marked ×)" if outside else f"all {count} inside"
         )
     else:
-        parts.append(counted(len(points), "value"))
+        parts.append(counted(count, "value"))
     if lost:
         parts.append(f"{lost} without a finite value not drawn")
     return f"{parts[0]}: {', '.join(parts[1:])}."

@@ -24,6 +24,7 @@ def remarks(recording: Recording) -> tuple[str, ...]:
         *_elsewhere(recording),
         *_flooding(recording),
         *_talking(recording),
+        *_forging(recording),
     )
 
 
@@ -78,3 +79,11 @@ def _talking(recording: Recording) -> Iterator[str]:
         if process.dropped_bytes:
             left_out = counted(process.dropped_bytes, "byte")
             yield f"{code(process.name)} printed more than is kept, by {left_out}"
+
+
+def _forging(recording: Recording) -> Iterator[str]:
+    for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
+        yield (
+            f"{code(process)} wrote into the channel through which rosgrade reports from inside a "
+            "process; what is said there is never proof"
+        )

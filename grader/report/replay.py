@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from operator import sub
 from typing import Any
 
 from markupsafe import Markup
@@ -26,6 +27,8 @@ Replay = Mapping[str, Any]
 
 STEP = 10
 """Steps of 10 ms from one sample to the next."""
+MOST = 1e6
+"""Metres, or the like, beyond which nothing is told apart."""
 MOST_BEAMS = 90
 MOST_SCANS = 200
 MOST_LINES = 120
@@ -113,15 +116,12 @@ def embedded(data: Any) -> Markup:
 
 
 def _milli(value: float) -> int:
-    return round(min(max(value, -1e6), 1e6) * 1e3) if not math.isnan(value) else 0
+    return round(min(max(value, -MOST), MOST) * 1e3) if not math.isnan(value) else 0
 
 
 def _differences(values: Iterable[float]) -> list[int]:
-    found, before = [], 0
-    for value in map(_milli, values):
-        found.append(value - before)
-        before = value
-    return found
+    found = [round(value * 1e3) if -MOST < value < MOST else _milli(value) for value in values]
+    return list(map(sub, found, [0, *found]))
 
 
 def _turns(truth: Sequence[Truth]) -> Iterable[float]:

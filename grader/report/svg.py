@@ -117,12 +117,19 @@ def drawing(
 
 def line(x1: float, y1: float, x2: float, y2: float, class_: str) -> Markup:
     """A straight line."""
-    return element("line", x1=x1, y1=y1, x2=x2, y2=y2, class_=class_)
+    # Most elements are lines and labels: these two are written as they are.
+    return Markup(
+        f'<line x1="{_pixel(x1)}" y1="{_pixel(y1)}" x2="{_pixel(x2)}" y2="{_pixel(y2)}" '
+        f'class="{_escaped(class_)}"></line>'
+    )
 
 
 def label(text: str, x: float, y: float, class_: str = "label", anchor: str = "start") -> Markup:
     """A line of text; ``anchor`` is ``start``, ``middle`` or ``end``."""
-    return element("text", one_line(text), x=x, y=y, class_=class_, text_anchor=anchor)
+    return Markup(
+        f'<text x="{_pixel(x)}" y="{_pixel(y)}" class="{_escaped(class_)}" '
+        f'text-anchor="{_escaped(anchor)}">{_escaped(one_line(text))}</text>'
+    )
 
 
 def curve(points: Sequence[Point], class_: str) -> Markup:
@@ -143,7 +150,12 @@ def crosses(points: Iterable[Point], class_: str, size: float = 3.5) -> Markup:
 
 
 def simplified(points: Sequence[Point], tolerance: float = 0.3) -> list[Point]:
-    """Leave out what lies on the line between its neighbours.
+    """Leave out what lies on the line between its neighbours; see :func:`outline`."""
+    return [points[index] for index in outline(points, tolerance)]
+
+
+def outline(points: Sequence[Point], tolerance: float = 0.3) -> list[int]:
+    """Find the points that a line cannot do without.
 
     The algorithm of Douglas and Peucker (1973, doi:10.3138/FM57-6770-U75U-7727), without
     recursion.
@@ -151,9 +163,12 @@ def simplified(points: Sequence[Point], tolerance: float = 0.3) -> list[Point]:
     Args:
         points: At least one.
         tolerance: How far a point that is left out may lie from the line, in the points' unit.
+
+    Returns:
+        Their indices, in order.
     """
     kept = {0, len(points) - 1}
-    parts = [(0, len(points) - 1)]
+    parts = [(0, len(points) - 1)] if len(points) > 2 else []
     while parts:
         first, last = parts.pop()
         (x1, y1), (x2, y2) = points[first], points[last]
@@ -167,12 +182,16 @@ def simplified(points: Sequence[Point], tolerance: float = 0.3) -> list[Point]:
         else:
             offs = [math.hypot(x - x1, y - y1) for x, y in between]
             limit = tolerance
-        worst = max(offs, default=0.0)
+        worst = max(offs)
         if worst > limit:
             index = first + 1 + offs.index(worst)
             kept.add(index)
-            parts += [(first, index), (index, last)]
-    return [points[index] for index in sorted(kept)]
+            # Half of all parts have no point in between.
+            if index - first > 1:
+                parts.append((first, index))
+            if last - index > 1:
+                parts.append((index, last))
+    return sorted(kept)
 
 
 def fitted(text: str, width: float) -> str:
@@ -220,7 +239,11 @@ def _name(name: str) -> str:
 
 
 def _attribute(value: str | float) -> str:
-    return _escaped(value) if isinstance(value, str) else f"{value:.1f}".removesuffix(".0")
+    return _escaped(value) if isinstance(value, str) else _pixel(value)
+
+
+def _pixel(value: float) -> str:
+    return f"{value:.1f}".removesuffix(".0")
 
 
 def _escaped(text: str) -> str:

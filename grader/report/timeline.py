@@ -248,7 +248,8 @@ def _lane(lane: Lane, scale: Scale, top: float, width: float) -> list[Markup]:
         )
     if lane.ticks:
         places = columns(scale.all_clipped(lane.ticks))
-        path = "".join(f"M{x:g} {y + 1:g}v{TRACK - 2}" for x in places)
+        stroke = f" {y + 1:g}v{TRACK - 2}"
+        path = "".join([f"M{x:g}{stroke}" for x in places])
         drawn.append(element("path", d=path, class_="tick"))
     if lane.crosses:
         places = columns(scale.all_clipped(lane.crosses))

@@ -127,6 +127,7 @@ class OutputReader:
         self._selector = selectors.DefaultSelector()
         self._streams: list[_Stream] = []
         self._declarations: list[Declaration] = []
+        self._foreign: set[str] = set()
         self._lock = threading.Lock()
         self._wake_read, self._wake_write = os.pipe()
         self._selector.register(self._wake_read, selectors.EVENT_READ, None)
@@ -212,34 +213,45 @@ class OutputReader:
             self._take_declarations(stream)
 
     def _take_declarations(self, stream: _Stream) -> None:
-        """Turn lines of a tracer into declarations; what is not one is dropped."""
+        """Turn lines of a tracer into declarations; what is not one is dropped, and that told."""
         lines = [*stream.kept.head, *stream.kept.tail]
         stream.kept = KeptLines(self._limit)
         for line in lines:
-            data = _declared(line.text)
-            if data is None:
-                continue
-            kind = data.pop("kind")
-            if len(self._declarations) < _MOST_DECLARATIONS:
-                self._declarations.append(Declaration(line.time_ns, line.process, kind, data))
+            data = _parsed(line.text)
+            if not isinstance(data.get("kind"), str) or not isinstance(data.get("pid"), int):
+                self._tell_foreign(line)
+            if isinstance(data.get("kind"), str) and _is_fit(data):
+                self._declare(line, data.pop("kind"), data)
+
+    def _tell_foreign(self, line: LogLine) -> None:
+        """Say once of a process that another than its tracer wrote to the tracer's pipe."""
+        if line.process not in self._foreign:
+            self._foreign.add(line.process)
+            self._declare(line, "foreign", {})
+
+    def _declare(self, line: LogLine, kind: str, data: dict[str, Any]) -> None:
+        if len(self._declarations) < _MOST_DECLARATIONS:
+            self._declarations.append(Declaration(line.time_ns, line.process, kind, data))
 
 
-def _declared(text: str) -> dict[str, Any] | None:
-    """What a line of a tracer says, or None if a tracer cannot have written it.
-
-    The student's process can write to the pipe too, so nothing in it may be large, deep or
-    unfit to be written down again.
-    """
+def _parsed(text: str) -> dict[str, Any]:
+    """What a line of a tracer says; empty if a tracer cannot have written it."""
     try:
         data = json.loads(text, parse_constant=lambda _: None)
     except (ValueError, RecursionError):
-        return None
-    if not isinstance(data, dict) or not isinstance(data.get("kind"), str):
-        return None
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def _is_fit(data: dict[str, Any]) -> bool:
+    """Whether it can be written down again.
+
+    The student's process can write to the pipe too, so nothing in it may be large or deep.
+    """
     inner = [value for value in data.values() if isinstance(value, dict)]
     values = [value for item in (data, *inner) for value in item.values() if value not in inner]
     keys = [key for item in (data, *inner) for key in item]
-    return data if all(map(_is_plain, (*values, *keys))) else None
+    return all(map(_is_plain, (*values, *keys)))
 
 
 def _is_plain(value: Any) -> bool:

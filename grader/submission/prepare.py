@@ -6,7 +6,7 @@ import hashlib
 import os
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,6 +49,10 @@ class Prepared:
     record: SubmissionRecord
     install: Path | None
     underlays: tuple[Path, ...] = ()
+
+    def named(self, name: str) -> Prepared:
+        """The same under another name."""
+        return replace(self, record=replace(self.record, id=name))
 
 
 @dataclass(frozen=True)
@@ -99,8 +103,13 @@ def prepare(
             builds = BuildCache(cache, limits.cache)
             return _prepare(located, ros, builds, limits, on_progress, sandbox, stop, on_output)
     except SubmissionError as error:
-        record = SubmissionRecord(submission_id(source), _hash(source), problem=str(error))
-        return Prepared(record, None)
+        return refused(source, error)
+
+
+def refused(source: Path, error: SubmissionError) -> Prepared:
+    """What there is of something that cannot be read as a submission."""
+    record = SubmissionRecord(submission_id(source), _hash(source), problem=str(error))
+    return Prepared(record, None)
 
 
 def fingerprint(path: Path | str, limits: ArchiveLimits | None = None) -> str:

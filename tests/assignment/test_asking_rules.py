@@ -91,6 +91,11 @@ def test_what_fits(mistakes: Callable[..., list[str]], uses: str, parameters: st
             "node: bot, name: speed, value: 0.5, topic: /sped, fields: {data: 0.5}",
             "does not record '/sped'",
         ),
+        (
+            "messages.follows",
+            "topic: /speed, source: /sped, fields: {data: data}, tolerance: 0.1",
+            r"does not record '/sped'\. Did you mean '/speed'\?",
+        ),
         ("action.result", "action: /fab, within: 1 s", "asks '/fab'"),
         ("action.cancels", "action: /fib", "no goal of the scenario 'run' has 'cancel_after'"),
         ("action.preempts", "action: /fib", "no goal of the scenario 'run' has 'preempt'"),
@@ -141,3 +146,27 @@ def test_doubts(mistakes: Callable[..., list[str]], tmp_path: Path) -> None:
         "no mutant loses the check 'it': nothing shows that it can fail",
     ]
     assert any("there is no mutants.yaml" in doubt for doubt in doubts(loaded, None))
+
+
+@pytest.mark.parametrize(
+    ("uses", "parameters", "doubtful"),
+    [
+        ("node.exists", "name: bot, publishes: /sped", ["/sped"]),
+        ("node.exists", "name: bot, publishes: /speed", []),
+        ("topic.untouched", "topics: [/sped, /tf, /speed]", ["/sped"]),
+        ("topic.untouched", "", []),
+    ],
+)
+def test_a_topic_that_a_check_names_on_the_way_may_be_misspelt_too(
+    mistakes: Callable[..., list[str]],
+    tmp_path: Path,
+    uses: str,
+    parameters: str,
+    doubtful: list[str],
+) -> None:
+    assert mistakes(uses, parameters) == []
+    mutant = Mutant.model_validate({"id": "dies", "title": "Dies", "loses": ["alive", "it"]})
+    told = list(doubts(load_assignment(tmp_path / "lesson"), [mutant]))
+    assert [one.partition(" is about ")[2].partition(",")[0] for one in told] == [
+        repr(topic) for topic in doubtful
+    ]

@@ -78,7 +78,8 @@ context = rclpy.context.Context(); rclpy.init(context=context)
 other = rclpy.create_node('rosgrade_probe', context=context)
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-node.fakes = [other.create_publisher(Odometry, '/odom', 10), other.create_publisher(Clock, '/clock', 10)]
+faked = [(Odometry, '/odom'), (Clock, '/clock')]
+node.fakes = [other.create_publisher(kind, topic, 10) for kind, topic in faked]
 for fake in node.fakes:
     for _ in range(50):
         fake.publish(fake.msg_type())
@@ -145,7 +146,9 @@ class Attack:
 
 ALIVE = frozenset({"alive", "messages"})
 ATTACKS = {
-    "kills_everything": Attack("os.kill(-1, signal.SIGKILL)\nos.kill(os.getpid(), 9)", lost=ALIVE, named=("SIGKILL",)),
+    "kills_everything": Attack(
+        "os.kill(-1, signal.SIGKILL)\nos.kill(os.getpid(), 9)", lost=ALIVE, named=("SIGKILL",)
+    ),
     "kills_the_probe": Attack(KILL_PROBE),
     "kills_its_group": Attack("os.killpg(0, signal.SIGKILL)", lost=ALIVE, named=("SIGKILL",)),
     "fork_bomb": Attack(BOMB, lost=ALIVE, named=("sessions",)),
@@ -169,7 +172,8 @@ ATTACKS = {
         named=("No space left on device", "all space in /tmp and home"),
     ),
     "one_huge_file": Attack(
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\nos.truncate(os.open('/tmp/x', os.O_CREAT | os.O_RDWR), 2**40)",
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "os.truncate(os.open('/tmp/x', os.O_CREAT | os.O_RDWR), 2**40)",
         lost=ALIVE,
         named=("File too large",),
     ),
@@ -188,11 +192,14 @@ ATTACKS = {
     ),
     "daemon": Attack(DAEMON, lost=frozenset({"ends"}), named=("86397",)),
     "ignores_signals": Attack(
-        "for n in (2, 15, 1):\n    signal.signal(n, signal.SIG_IGN)\nwhile True:\n    node.tick() or time.sleep(.1)",
+        "for n in (2, 15, 1):\n    signal.signal(n, signal.SIG_IGN)\n"
+        "while True:\n    node.tick() or time.sleep(.1)",
         lost=frozenset({"ends"}),
         named=("SIGKILL",),
     ),
-    "stops_itself": Attack("os.kill(os.getpid(), signal.SIGSTOP)", lost=frozenset({"messages", "ends"})),
+    "stops_itself": Attack(
+        "os.kill(os.getpid(), signal.SIGSTOP)", lost=frozenset({"messages", "ends"})
+    ),
     "sleeps": Attack(at_import="time.sleep(1000)", lost=frozenset({"starts"})),
     "leaves_at_once": Attack(at_import="os._exit(0)", lost=frozenset({"starts"})),
     "another_domain": Attack(
@@ -200,7 +207,7 @@ ATTACKS = {
         lost=frozenset({"starts"}),
         named=("joined ROS domain 5",),
     ),
-    "forged_tracer": Attack(FORGED),
+    "forged_tracer": Attack(FORGED, named=("wrote into the channel",)),
     "squats_the_probe_s_name": Attack(
         SQUAT,
         named=("is called `/rosgrade_probe`, as the node", "publishes on `/clock` and `/odom`"),
@@ -214,7 +221,10 @@ ATTACKS = {
     "burns_the_cpus": Attack(HOGS, maybe=frozenset({"ends", "messages"})),
     "injection": Attack(INJECTION, lost=ALIVE, named=("RuntimeError",)),
     "shadows_modules": Attack(
-        files={"numpy/__init__.py": "raise SystemExit('trojan')", "yaml/__init__.py": "raise SystemExit('trojan')"},
+        files={
+            "numpy/__init__.py": "raise SystemExit('trojan')",
+            "yaml/__init__.py": "raise SystemExit('trojan')",
+        },
         lost=frozenset({"starts"}),
     ),
     "build_fork_bomb": Attack(
@@ -223,18 +233,21 @@ ATTACKS = {
     "build_plants_links": Attack(
         at_build="import os\nos.makedirs('../install', exist_ok=True)\n"
         "open('bot_publisher/own.py', 'w').write('')\n"
-        "os.path.islink('bot_publisher/passwd') or os.symlink('/etc/passwd', 'bot_publisher/passwd')",
+        "os.path.islink('bot_publisher/passwd') or "
+        "os.symlink('/etc/passwd', 'bot_publisher/passwd')",
     ),
     "build_installs_outside": Attack(
         at_build="import setuptools\n_s = setuptools.setup\ndef setup(**k):\n"
-        "    k['data_files'].append(('/etc/cron.d', ['package.xml']))\n    _s(**k)\nsetuptools.setup = setup",
+        "    k['data_files'].append(('/etc/cron.d', ['package.xml']))\n    _s(**k)\n"
+        "setuptools.setup = setup",
         lost=frozenset({"builds"}),
     ),
     "build_memory": Attack(
         at_build="x = bytearray(2**32)", lost=frozenset({"builds"}), named=("MemoryError",)
     ),
     "build_disk": Attack(
-        at_build="import os\nfor i in range(40):\n    open(f'{os.environ[\"HOME\"]}/{i}', 'wb').write(bytes(2**26))",
+        at_build="import os\nfor i in range(40):\n"
+        "    open(f'{os.environ[\"HOME\"]}/{i}', 'wb').write(bytes(2**26))",
         lost=frozenset({"builds"}),
         named=("it wrote more than 128 MiB",),
     ),
@@ -263,7 +276,6 @@ HONEST = {
 UNSEEN = frozenset(
     {
         "kills_the_probe",
-        "forged_tracer",
         "garbage_on_dds_ports",
         "burns_the_cpus",
         "build_plants_links",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import zipfile
 from pathlib import Path
@@ -127,6 +128,42 @@ def test_any_file_name_is_a_row(course: Path, staging: Path, name: str) -> None:
     assert "\n" not in row.key and "\u202e" not in row.key
 
 
+@pytest.mark.parametrize("name", [b"a\nb", b"\x1b[31mred", b"latin\xe9", "\u202eevil".encode()])
+def test_any_name_that_canvas_gives_is_a_row(course: Path, staging: Path, name: bytes) -> None:
+    file = archive(course / os.fsdecode(name + b"_12_34_ws.zip"))
+    (row,) = take_in(course, staging)
+    assert row.path == file
+    assert row.key.isprintable() and row.key.endswith("_12")
+
+
+def test_files_of_canvas_that_cannot_be_read_are_told_on_their_row(
+    course: Path, staging: Path
+) -> None:
+    (course / "ana_1_10_node.py").write_text("pass")
+    with (course / "ana_1_11_recording.bag").open("wb") as huge:
+        huge.truncate(2**40)
+    (course / "ben_2_20_node.py").write_text("pass")
+    (course / "ben_2_21_..").write_text("pass")
+    archive(course / "cai_3_30_ws.zip")
+    rows = {row.key: row for row in take_in(course, staging)}
+    assert rows["ana_1"].path is None
+    assert rows["ana_1"].fault == "the files hold more than 256 MiB"
+    assert rows["ben_2"].path is None
+    assert rows["ben_2"].fault == "the files cannot be read: Is a directory"
+    assert rows["cai_3"].path is not None and not rows["cai_3"].fault
+
+
+def test_who_is_in_the_roster_twice_is_told_on_the_row(course: Path, staging: Path) -> None:
+    folder(course / "ana")
+    roster = parse_roster("login,name\nana,Ana\nben,Ben\nana,Ana\nben,Ben\nben,Ben\n", "r.csv")
+    rows = {row.key: row for row in take_in(course, staging, roster)}
+    assert rows["ana"].problem == "in the roster again in row 4"
+    assert rows["ben"].problem == (
+        "handed in nothing; in the roster again in row 5; in the roster again in row 6"
+    )
+    assert len(rows) == 2
+
+
 def test_one_submission_is_not_taken_for_a_class(course: Path, staging: Path) -> None:
     (course / "src" / "pkg").mkdir(parents=True)
     (course / "src" / "pkg" / "package.xml").write_text("<package/>")
@@ -154,7 +191,7 @@ def test_a_roster_may_name_paths_and_repositories(tmp_path: Path, staging: Path)
     rows = {row.key: row for row in take_in_roster(roster, tmp_path, staging)}
     assert rows["ana"].path == tmp_path / "here"
     assert rows["ben"].path is not None and (rows["ben"].path / "pkg" / "package.xml").is_file()
-    assert rows["cai"].path is None and "git clone failed" in rows["cai"].problem
+    assert rows["cai"].path is None and "git clone failed" in rows["cai"].fault
     assert rows["dee"].problem == "nowhere does not exist"
     assert rows["eli"].problem == "handed in nothing"
 

@@ -159,6 +159,19 @@ class TestCancels:
         run = acting(canceled(end_s=None))
         assert "it goes on" in failing("action.cancels", run, **FIB)
 
+    def test_a_server_that_dies_instead(self):
+        # Nobody can say that the machine was too slow: nothing was left that could be late.
+        run = acting(
+            canceled(end_s=None, cancel_accepted=None, cancel_answered_ns=None),
+            processes=(died(-6, 1.25),),
+            ending=Ending.EXITED,
+            stop_s=1.25,
+            disturbance=taken(1.2, 1.25, waited_s=0.02),
+        )
+        found = failing("action.cancels", run, **FIB)
+        assert "neither canceled nor ended: the process" in found
+        assert "ended 1.25 s after launch with SIGABRT (abort)" in found
+
     def test_the_executor_could_not_take_it_in(self):
         run = acting(
             canceled(cancel_answered_ns=at(2.0), cancel_accepted=False, status="succeeded"),
@@ -214,6 +227,19 @@ class TestPreempts:
     def test_the_old_goal_never_ends(self):
         run = self.runs(end_s=None)
         assert "was still worked on at the end" in failing("action.preempts", run, **FIB)
+
+    def test_a_server_that_dies_instead(self):
+        run = replace(
+            self.runs(end_s=None),
+            processes=(died(1, 1.6),),
+            ending=Ending.EXITED,
+            stop_ns=at(1.6),
+            disturbance=taken(1.5, 1.6, waited_s=0.02),
+            log=output(traceback("KeyError: 1"), time_s=1.6),
+        )
+        found = failing("action.preempts", run, **FIB)
+        assert "was still worked on at the end: the process" in found
+        assert "KeyError: 1" in found
 
     def test_the_new_goal_is_rejected(self):
         run = acting(goal(20, 1.0, preempted=True), goal(5, 1.5, preempts=True, accepted=False))

@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
-from grader.recording.model import Ending, Kind
+from grader.recording.model import Ending, Kind, Owner
 from tests.checks.builder import (
     RELIABLE,
     SOURCE,
+    STOP_S,
     TWIST,
     declarations,
     declared,
@@ -210,6 +211,23 @@ class TestSilence:
         found = self.found(log=output("something went wrong"))
         assert "there but silent, although the process declared a timer of 300 ms" in found
         assert "except: pass" in found
+
+    def test_simulated_time_that_nobody_publishes(self):
+        clock = endpoint("/clock", kind=Kind.SUBSCRIPTION, type="rosgraph_msgs/msg/Clock")
+        found = self.found(endpoints=(endpoint(), reader(), clock))
+        assert "takes its time from `/clock` (`use_sim_time` is true)" in found
+        assert "its timer of 300 ms never fires" in found
+
+    def test_simulated_time_that_the_robot_publishes(self):
+        clock = endpoint("/clock", kind=Kind.SUBSCRIPTION, type="rosgraph_msgs/msg/Clock")
+        told = endpoint("/clock", type="rosgraph_msgs/msg/Clock", owner=Owner.PROBE)
+        assert "use_sim_time" not in self.found(endpoints=(endpoint(), reader(), clock, told))
+
+    def test_what_it_printed_is_shown_but_not_how_it_ended(self):
+        complained = output("no front beam", time_s=STOP_S - 1.0)
+        ended = output(traceback("rcl_shutdown already called"), time_s=STOP_S + 0.1)
+        finding = count(silent(log=(*complained, *ended)), at_least=1)
+        assert finding.evidence.log == ("no front beam",)
 
     def test_a_publisher_that_our_tracer_could_not_match_is_our_fault(self):
         held = declared("held", topic="/cmd_vel", waited_s=2.0, matched=False)

@@ -9,6 +9,7 @@ from grader.recording.model import Ending, Intervention, Owner, Wait
 from grader.submission.record import BuildRecord, SourceError
 from tests.checks.builder import (
     BOT,
+    INSTALLED,
     NODE,
     SOURCE,
     at,
@@ -128,6 +129,46 @@ class TestExists:
     def test_frequent_exceptions_come_with_what_to_do(self, raised, hint):
         run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=output(traceback(raised)))
         assert hint in judge("node.exists", run, name=NODE).hint
+
+    def test_another_process_s_node_in_the_same_namespace_is_no_misspelling(self):
+        run = recording(
+            nodes=(node("/robot1/speed_limiter"),),
+            processes=(process(), died(1, name="bot/driver")),
+            log=output(traceback("ValueError: no speed"), name="bot/driver"),
+        )
+        found = failing("node.exists", run, name="/robot1/driver")
+        assert "the process `bot/driver` ended 1.20 s after launch with ValueError" in found
+        misspelt = replace(run, nodes=(node("/robot1/drivr"),))
+        assert "found the node" in failing("node.exists", misspelt, name="/robot1/driver")
+
+    def test_a_callback_of_a_service_that_returns_nothing_is_not_blamed_on_spin(self):
+        printed = (
+            "Traceback (most recent call last):\n"
+            f'  File "{INSTALLED}", line 14, in main\n'
+            "    rclpy.spin(node)\n"
+            '  File "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/service.py", line 75, in '
+            "send_response\n"
+            "    raise TypeError()\n"
+            "TypeError"
+        )
+        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=output(printed))
+        finding = judge("node.exists", run, name=NODE)
+        assert "with TypeError: a service's callback did not return a response" in finding.observed
+        assert "`return response`" in finding.hint
+        assert finding.evidence.places == ()
+
+    def test_an_object_of_another_class_that_stops_rclpy_is_named(self):
+        # As rclpy's converter printed it when an execute callback had returned None.
+        printed = (
+            "python: /build/rosidl_generator_py/example_interfaces/action/_fibonacci_s.c:148: "
+            "example_interfaces__action__fibonacci__result__convert_from_py: Assertion "
+            '`strncmp("example_interfaces.action._fibonacci.Fibonacci_Result", '
+            "full_classname_dest, 53) == 0' failed."
+        )
+        run = nodeless(processes=(died(-6),), ending=Ending.EXITED, log=output(printed))
+        finding = judge("node.exists", run, name=NODE)
+        assert "SIGABRT (abort)" in finding.observed
+        assert "something that is no `Fibonacci.Result`" in finding.hint
 
     @pytest.mark.parametrize(
         ("exit_code", "words"),

@@ -41,7 +41,9 @@ class TestFound:
 
     def test_a_submission_that_cannot_be_read_says_why(self):
         problem = "two packages are called bot_publisher: src/a and src/b"
-        assert problem in self.found(submission(problem=problem))
+        found = self.found(submission(problem=problem))
+        assert problem in found
+        assert "each of them once" in found
 
     def test_no_package_at_all(self):
         empty = submission()

@@ -87,6 +87,15 @@ class TestResponds:
         found = failing("service.responds", run, **TRUE)
         assert "the call (data = true) was answered with success = false instead of true" in found
 
+    def test_of_a_long_request_only_what_is_not_zero_is_told(self):
+        zeros = {"header": {"stamp": {"sec": 0}, "frame_id": ""}, "d": [], "k": [0.0] * 9}
+        request = {**zeros, "width": 640, "rectify": False, "height": 480}
+        run = serving(asked(request=request, response={"success": False}))
+        found = failing("service.responds", run, **TRUE)
+        assert found.startswith("the call (width = 640, height = 480) was answered")
+        run = serving(asked(request={**zeros, "a": 0, "b": 0, "c": 0}, response={"success": False}))
+        assert "(every field zero or empty)" in failing("service.responds", run, **TRUE)
+
     def test_a_text_without_the_word(self):
         found = failing("service.responds", serving(asked()), **TRUE, contains={"message": "range"})
         assert "message = 'enabled' without “range”" in found

@@ -119,6 +119,16 @@ class TestPublished:
         run = with_endpoints(endpoint("/cmdvel"), processes=(died(1),), ending=Ending.EXITED)
         assert "`/cmdvel` instead" in failing("topic.published", run, topic="/cmd_vel")
 
+    def test_a_topic_of_a_process_that_lives_is_no_misspelling_of_the_dead_one_s(self):
+        run = with_endpoints(
+            endpoint("/cmd_vel_raw"),
+            processes=(process(), died(1, name="bot/driver")),
+            declarations=declarations(),
+            log=output(traceback("ValueError: no speed"), name="bot/driver"),
+        )
+        found = failing("topic.published", run, topic="/cmd_vel")
+        assert "the process `bot/driver` ended 1.20 s after launch with ValueError" in found
+
     def test_without_a_node_the_reason_for_that_is_given(self):
         run = nodeless(processes=(died(-11),), ending=Ending.EXITED)
         assert "SIGSEGV" in failing("topic.published", run, topic="/cmd_vel")

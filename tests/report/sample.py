@@ -139,6 +139,17 @@ def full_points() -> Sample:
     return Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
 
 
+def reached_limits() -> Sample:
+    """Full points, with a limit of the sandbox reached and thirty remarks on the run."""
+    posing = tuple(
+        Node(f"/bot_\x1bx{number}/rosgrade_probe", Owner.STUDENT, at(0.4)) for number in range(30)
+    )
+    reached = Breach(at(0.9), "memory", "1056 MiB of memory", "1024 MiB")
+    recordings = {"listen": make_run(nodes=posing, breaches=(reached,))}
+    loaded = make_loaded([Told("node"), Told("topic", points=2)])
+    return Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+
+
 def not_built() -> Sample:
     """A build that failed, with its log."""
     culprit = SourceError("src/bot_publisher/setup.py", 24, "SyntaxError: invalid syntax")

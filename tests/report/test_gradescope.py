@@ -9,6 +9,7 @@ import pytest
 from grader.checks.finding import Finding
 from grader.errors import UsageError
 from grader.grade import grade
+from grader.recording.model import Breach
 from grader.report.gradescope import late_s, read_metadata, render_gradescope, unfinished
 from grader.report.result import make_result
 from tests.assignment.validator import valid
@@ -22,6 +23,7 @@ from tests.report.sample import (
     make_run,
     not_built,
     not_graded,
+    reached_limits,
 )
 
 # Written from https://gradescope-autograders.readthedocs.io/en/latest/specs/
@@ -74,7 +76,14 @@ def rendered(make, metadata=None):
 
 @pytest.mark.parametrize(
     "make",
-    [full_points, lost_points, not_built, not_graded, lambda: everywhere("\udcff<b>\x1b[0m`|")],
+    [
+        full_points,
+        lost_points,
+        not_built,
+        not_graded,
+        reached_limits,
+        lambda: everywhere("\udcff<b>\x1b[0m`|"),
+    ],
 )
 def test_it_follows_the_specification(make):
     assert valid(rendered(make), SCHEMA, SCHEMA)
@@ -119,6 +128,34 @@ def test_gradescope_hides_what_the_author_hides(visibility):
             in (data["output"])
         )
     assert data["stdout_visibility"] == "hidden"
+
+
+def test_limits_and_remarks_are_told_in_the_output():
+    data = rendered(reached_limits)
+    assert (
+        "**Limits of the sandbox that were reached**\n\n"
+        "- scenario listen: its processes took 1056 MiB of memory, 1024 MiB are allowed\n"
+    ) in data["output"]
+    assert "**Worth knowing**" in data["output"]
+    assert data["output"].endswith("- 10 more: see the report")
+    assert len(data["output"]) < 20 * 600
+    assert data["score"] == sum(test["max_score"] for test in data["tests"])
+
+
+def test_limits_of_a_run_that_only_hidden_checks_judge_are_not_told():
+    checks = [
+        Told("seen", scenarios=("listen",)),
+        Told("other", scenarios=("secret",), visibility="hidden"),
+    ]
+    recordings = {
+        "listen": make_run(),
+        "secret": make_run(scenario="secret", breaches=(Breach(1, "disk", "zq", "1 MiB"),)),
+    }
+    loaded = make_loaded(checks, ("listen", "secret"))
+    sample = Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+    result = make_result(sample.grade, sample.recordings, sample.facts)
+    assert "zq" in result.scenarios[1].breaches[0]
+    assert "zq" not in render_gradescope(result)
 
 
 def test_what_is_not_graded_is_no_silent_zero():

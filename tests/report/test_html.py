@@ -140,6 +140,13 @@ class TestContent:
         assert "failed It publishes every 300 ms" in text
         assert "skipped The period is steady waits for “It publishes every 300 ms”" in text
 
+    def test_a_check_that_waits_for_several_names_each(self):
+        checks = [Told("a", FAIL), Told("b", FAIL), Told("c", requires=("a", "b"))]
+        recordings = {"listen": make_run()}
+        judged = grade(make_loaded(checks), make_submission(), recordings)
+        text = squeezed(page(Sample(judged, recordings, make_facts())).text)
+        assert "skipped Title of c waits for “Title of a” and “Title of b”" in text
+
     def test_the_check_to_fix_first_is_linked(self):
         found = page(lost_points())
         assert found.all("a", href="#check-period")

@@ -13,7 +13,14 @@ import xmlschema
 
 from grader.report.junit import render_junit
 from grader.report.result import make_result
-from tests.report.sample import everywhere, full_points, lost_points, not_built, not_graded
+from tests.report.sample import (
+    everywhere,
+    full_points,
+    lost_points,
+    not_built,
+    not_graded,
+    reached_limits,
+)
 
 ILLEGAL = "a\x00b\x0b\x1b[31mc\ud800\ufffe\uffff]]>\r\n<b>&amp;"
 SAMPLES = {
@@ -21,6 +28,7 @@ SAMPLES = {
     "lost points": lost_points,
     "not built": not_built,
     "not graded": not_graded,
+    "limits reached": reached_limits,
     "hostile": lambda: everywhere(ILLEGAL),
 }
 
@@ -85,6 +93,26 @@ def test_points_are_properties_of_the_suite():
     properties = {item.get("name"): item.get("value") for item in root.iter("property")}
     assert properties["points.period"] == "1.02 / 3"
     assert (properties["score"], properties["max_score"]) == ("3.02", "7")
+
+
+def test_limits_and_remarks_are_told_once_and_cost_nothing():
+    root = ET.fromstring(rendered(reached_limits))
+    (said,) = root.iter("system-out")
+    lines = said.text.splitlines()
+    assert lines[:2] == [
+        "Limits of the sandbox that were reached:",
+        "scenario listen: its processes took 1056 MiB of memory, 1024 MiB are allowed",
+    ]
+    assert lines[2] == "Worth knowing:"
+    assert lines[-1] == "10 more: see the report"
+    # The escape sequence that is part of each name is gone.
+    assert lines[3].startswith("scenario listen: a node of the submission is called `/bot_0/rosgr")
+    assert len(lines) == 24
+    assert root.get("failures") == "0"
+
+
+def test_what_is_said_of_ordinary_runs_is_nothing():
+    assert not list(ET.fromstring(rendered(full_points)).iter("system-out"))
 
 
 def test_the_time_is_without_offset():

@@ -6,7 +6,17 @@ from dataclasses import replace
 
 import pytest
 
-from grader.recording.model import Endpoint, Kind, Message, Node, Owner, Process, Qos, Recording
+from grader.recording.model import (
+    Declaration,
+    Endpoint,
+    Kind,
+    Message,
+    Node,
+    Owner,
+    Process,
+    Qos,
+    Recording,
+)
 from grader.report.remarks import remarks
 from tests.grade.sample import make_recording
 
@@ -32,6 +42,12 @@ def messages(count: int, per_s: float) -> tuple[Message, ...]:
 
 def test_an_ordinary_run_is_not_worth_a_word() -> None:
     assert remarks(run(messages={"/cmd_vel": messages(5000, 500.0)})) == ()
+
+
+def test_who_writes_to_the_tracer_s_pipe_is_named_once() -> None:
+    foreign = Declaration(0, "bot/bot", "foreign", {})
+    (said,) = remarks(run(declarations=(foreign, foreign)))
+    assert said.startswith("`bot/bot` wrote into the channel")
 
 
 def test_who_is_called_as_the_probe_is_named() -> None:

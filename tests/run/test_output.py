@@ -67,13 +67,26 @@ def test_declarations_are_read_and_nonsense_is_dropped() -> None:
     reader = OutputReader(1 << 16)
     read_end, write_end = os.pipe()
     reader.add(read_end, "p/e", "tracer")
-    good = json.dumps({"kind": "timer", "period_s": 0.3}).encode()
+    good = json.dumps({"kind": "timer", "pid": 7, "period_s": 0.3}).encode()
     for line in (b"nonsense", b"[1, 2]", b"{}", b"[" * 100_000, good, b'"text"'):
         os.write(write_end, line + b"\n")
     os.close(write_end)
     assert reader.close(10.0) == ()
-    (declaration,) = reader.declarations
-    assert (declaration.kind, declaration.data) == ("timer", {"period_s": 0.3})
+    foreign, timer = reader.declarations
+    assert (foreign.kind, foreign.process) == ("foreign", "p/e")
+    assert (timer.kind, timer.data) == ("timer", {"pid": 7, "period_s": 0.3})
+
+
+def test_a_tracer_that_reports_what_cannot_be_kept_is_no_forger() -> None:
+    reader = OutputReader(1 << 16)
+    read_end, write_end = os.pipe()
+    reader.add(read_end, "p/e", "tracer")
+    for value in (1e300, [1, 2], "\ud800"):
+        line = json.dumps({"kind": "timer", "pid": 7, "period_s": value}).encode()
+        os.write(write_end, line + b"\n")
+    os.close(write_end)
+    assert reader.close(10.0) == ()
+    assert reader.declarations == ()
 
 
 def test_a_pipe_that_stays_open_does_not_hold_us_up() -> None:
