@@ -51,9 +51,9 @@ class Check:
         return inspect.getdoc(self.judge) or ""
 
     @property
-    def of_control(self) -> bool:
-        """Whether it judges what a control loop did: where a robot went and was told to go."""
-        return self.name.startswith("motion.")
+    def family(self) -> str:
+        """First part of the name."""
+        return self.name.partition(".")[0]
 
     @property
     def title(self) -> str:

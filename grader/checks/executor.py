@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import AfterValidator, Field, field_validator
@@ -22,7 +22,6 @@ from grader.checks.wording import code, codes, counted
 from grader.recording.model import NS, Call, Kind, Process, Recording
 
 _FORGIVING_FROM = 3
-_HELD_UP_S = 0.1
 _SERVICE = "/list_parameters"
 
 
@@ -107,12 +106,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
             disturbed=True,
         )
     worst = max(bad, key=lambda group: len(group.late) / len(group.judged))
-    finding = _blocked(recording, worst, parameters).finding(expected)
-    # Where nothing was ever answered, client and service may not have found each other: what
-    # discovery loses on a busy machine comes again after seconds only. So it must happen twice.
-    unanswered = all(call.answered_ns is None for group in bad for call in group.judged)
-    held_up = recording.taken_s(recording.launched_ns, recording.stop_ns) > _HELD_UP_S
-    return replace(finding, disturbed=True) if unanswered and held_up else finding
+    return _blocked(recording, worst, parameters).finding(expected)
 
 
 def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answers:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from grader.recording.model import NS, Recording
+from grader.recording.model import Recording
 
 # Late steps are noted before they are done, at the stamp of the step before them.
 _MARGIN_NS = 20_000_000
-# As long as a timer of 10 Hz makes a command wait anyway; tolerances are made for that.
-_STALL_S = 0.1
-_STALL_WINDOW_NS = NS // 2
 
 
 def taken_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
@@ -28,19 +25,3 @@ def taken_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
         if item.kind == "late" and begin_ns - _MARGIN_NS <= item.time_ns <= end_ns
     ]
     return recording.taken_s(begin_ns, max(begin_ns, end_ns)) + max(late_s, default=0.0)
-
-
-def was_out_of_hand(recording: Recording) -> bool:
-    """Whether the machine kept the student from steering for a while at one time.
-
-    A control loop that is held up goes another way from there on, by how much nobody can tell:
-    what fails then is worth a second run. Many short waits do not add up to that.
-    """
-    if not recording.truth:
-        return False
-    begin_ns, end_ns = recording.truth[0].time_ns, recording.truth[-1].time_ns
-    return any(
-        taken_s(recording, item.time_ns, item.time_ns + _STALL_WINDOW_NS) > _STALL_S
-        for item in recording.disturbance
-        if begin_ns <= item.time_ns <= end_ns and item.waited_ns + item.late_ns
-    )

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 from grader.assignment.model import CheckSpec
 from grader.checks.check import Subject
+from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Finding, Status
-from grader.checks.lateness import was_out_of_hand
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding
 from grader.grade.order import dependency_order
 from grader.grade.points import points_for
@@ -162,8 +162,7 @@ def _judge(
             not misuse
             and finding.status is Status.FAILED
             and isinstance(subject, Recording)
-            and bound.check.of_control
-            and was_out_of_hand(subject)
+            and is_doubtful(bound.check.family, subject)
         ):
             finding = replace(finding, disturbed=True)
     except Exception as error:

@@ -1,0 +1,53 @@
+"""Failures that may be an accident of a disturbed run, and so must happen twice to count."""
+
+from __future__ import annotations
+
+from grader.checks.lateness import taken_s
+from grader.recording.model import NS, Recording
+
+# As long as a timer of 10 Hz makes a command wait anyway; tolerances are made for that.
+_STALL_S = 0.1
+_STALL_WINDOW_NS = NS // 2
+_HELD_UP_S = 0.1
+_CONTROL = ("motion",)
+_ASKING = ("executor", "service", "action", "parameter", "lifecycle")
+
+
+def is_doubtful(family: str, recording: Recording) -> bool:
+    """Whether a failure may be an accident.
+
+    Args:
+        family: Of the check that failed: the first part of its name.
+        recording: The run.
+    """
+    if family in _CONTROL:
+        return _was_out_of_hand(recording)
+    return family in _ASKING and _did_not_meet(recording)
+
+
+def _was_out_of_hand(recording: Recording) -> bool:
+    """Whether the machine kept the student from steering for a while at one time.
+
+    A control loop that is held up goes another way from there on, by how much nobody can tell.
+    Many short waits do not add up to that.
+    """
+    if not recording.truth:
+        return False
+    begin_ns, end_ns = recording.truth[0].time_ns, recording.truth[-1].time_ns
+    return any(
+        taken_s(recording, item.time_ns, item.time_ns + _STALL_WINDOW_NS) > _STALL_S
+        for item in recording.disturbance
+        if begin_ns <= item.time_ns <= end_ns and item.waited_ns + item.late_ns
+    )
+
+
+def _did_not_meet(recording: Recording) -> bool:
+    """Whether somebody never answered, on a machine that may have kept client and server apart.
+
+    What discovery loses on a busy machine comes again after seconds only.
+    """
+    answered = {call.service for call in recording.calls if call.answered_ns is not None}
+    silent = any(call.service not in answered for call in recording.calls) or any(
+        goal.answered_ns is None for goal in recording.goals
+    )
+    return silent and recording.taken_s(recording.launched_ns, recording.stop_ns) > _HELD_UP_S

@@ -1,0 +1,69 @@
+"""Which failures have to happen twice, because the machine may have had a part in the first."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.checks.doubt import is_doubtful
+from grader.recording.model import NS, Call, Disturbance, Recording, Truth
+from tests.checks.builder import LAUNCH_NS, recording, taken
+
+SERVICE = "/bot_publisher/list_parameters"
+
+
+def waits(waited_s: float, every_s: float) -> tuple[Disturbance, ...]:
+    return tuple(
+        Disturbance(LAUNCH_NS + round(k * every_s * NS), 0, round(waited_s * NS))
+        for k in range(1, round(20 / every_s))
+    )
+
+
+def driven(disturbance: tuple[Disturbance, ...]) -> Recording:
+    truth = tuple(
+        Truth(LAUNCH_NS + k * NS, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None) for k in range(20)
+    )
+    return recording(truth=truth, disturbance=disturbance)
+
+
+@pytest.mark.parametrize(
+    ("disturbance", "doubtful"),
+    [
+        pytest.param(waits(0.3, 9.0), True, id="held up once for long"),
+        pytest.param(waits(0.01, 0.2), False, id="many short waits"),
+        pytest.param((), False, id="left alone"),
+    ],
+)
+def test_where_a_held_up_robot_went_is_doubtful(
+    disturbance: tuple[Disturbance, ...], doubtful: bool
+) -> None:
+    assert is_doubtful("motion", driven(disturbance)) is doubtful
+    assert not is_doubtful("node", driven(disturbance))
+    assert not is_doubtful("motion", recording(disturbance=disturbance))
+
+
+@pytest.mark.parametrize(
+    ("answers", "waited_s", "doubtful"),
+    [
+        pytest.param((None, None, None), 0.4, True, id="client and service may not have met"),
+        pytest.param((None, None, None), 0.0, False, id="nothing kept them apart"),
+        pytest.param((0.1, None, None), 0.4, False, id="they had met"),
+        pytest.param((0.1, 0.1, 0.1), 0.4, False, id="everything was answered"),
+        pytest.param((), 0.4, False, id="nothing was asked"),
+    ],
+)
+@pytest.mark.parametrize("family", ["executor", "service", "parameter", "timing"])
+def test_silence_on_a_busy_machine_is_doubtful(
+    family: str, answers: tuple[float | None, ...], waited_s: float, doubtful: bool
+) -> None:
+    calls = tuple(
+        Call(
+            SERVICE,
+            "rcl_interfaces/srv/ListParameters",
+            LAUNCH_NS + NS + k * NS // 2,
+            None if after_s is None else LAUNCH_NS + NS + k * NS // 2 + round(after_s * NS),
+        )
+        for k, after_s in enumerate(answers)
+    )
+    noise = taken(0.5, 4.4, waited_s=waited_s) if waited_s else ()
+    run = recording(calls=calls, disturbance=noise)
+    assert is_doubtful(family, run) is (doubtful and family != "timing")
