@@ -29,6 +29,7 @@ from grader.assignment.mutation import reference_of
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
 from grader.batch.regrading import find, regrade
+from grader.batch.rendering import render_all
 from grader.grade import grade
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import NS, Recording
@@ -201,11 +202,14 @@ def _robot(samples: Samples, name: str, folder: Path) -> None:
         with Runner(ros.find()) as runner:
             grading = Grading(loaded, runner, folder / "robot-cache")
             began_s = time.monotonic()
-            graded = grading.grade_prepared(prepared, folder / name)
+            graded = grading.grade_prepared(prepared, folder / name / RECORDINGS_FOLDER)
             samples.add(f"{name}: wall, all scenarios at once", time.monotonic() - began_s)
         least_s = max(_least_s(recording) for recording in graded.recordings.values())
         samples.add(f"{name}: least time of the longest scenario", least_s)
         samples.timed(f"{name}: HTML report with replays", partial(_report, graded))
+    write_graded(graded, folder / name, Clock())
+    folders = [folder / name] * SUBMISSIONS
+    samples.timed(f"{name}: {SUBMISSIONS} HTML reports", lambda: list(render_all(folders)))
 
 
 def _class(samples: Samples, folder: Path, _: int) -> None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache, partial
 from pathlib import Path
 
 from grader.assignment.load import load_assignment
@@ -13,6 +17,11 @@ from grader.grade import Grade
 from grader.report.facts import RunFacts
 from grader.report.result import read_result
 from grader.report.result_model import Result
+from grader.run.load import cpu_count
+
+_MANY = 8
+"""Reports from which on more than one process is worth its start."""
+_load = cache(load_assignment)
 
 
 def find_reports(out: Path) -> tuple[Path, ...]:
@@ -42,6 +51,36 @@ def read_results(out: Path) -> tuple[Result, ...]:
     return tuple(read_result(folder / RESULT_FILE) for folder in find_reports(out))
 
 
+def render_all(folders: Sequence[Path], assignment: str | None = None) -> Iterator[Path]:
+    """Render the reports of a class again, on all CPUs.
+
+    Args:
+        folders: Of the reports.
+        assignment: Id or folder; by default the one that each result names.
+
+    Yields:
+        The report of each folder, in their order.
+
+    Raises:
+        UsageError: As :func:`render_again`.
+    """
+    render = partial(_render, assignment=assignment)
+    if len(folders) < _MANY or cpu_count() == 1:
+        yield from map(render, folders)
+        return
+    # What a fork of this process needs is imported and loaded before.
+    _load(assignment or read_result(folders[0] / RESULT_FILE).assignment.id)
+    pool = ProcessPoolExecutor(cpu_count(), multiprocessing.get_context("fork"))
+    try:
+        yield from pool.map(render, folders)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _render(folder: Path, assignment: str | None) -> Path:
+    return render_again(folder, assignment).report
+
+
 def render_again(folder: Path, assignment: str | None = None) -> Written:
     """Render the report of one submission again from its result and its recordings.
 
@@ -54,7 +93,7 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
             with: then only a regrade gives a report that fits.
     """
     result = read_result(folder / RESULT_FILE)
-    loaded = load_assignment(assignment or result.assignment.id)
+    loaded = _load(assignment or result.assignment.id)
     if loaded.sha256 != result.assignment.sha256:
         raise UsageError(
             f"{folder}: the assignment has changed since this was graded: `rosgrade regrade "

@@ -37,7 +37,7 @@ def report(
 
     The options of the formats are for one report; of a class every report is rendered.
     """
-    from grader.batch.rendering import find_reports, render_again
+    from grader.batch.rendering import find_reports, render_again, render_all
     from grader.errors import UsageError
 
     folders = find_reports(out)
@@ -48,7 +48,10 @@ def report(
             "name a report's own folder"
         )
     console = output_console()
-    for folder in folders:
-        written = render_again(folder, assignment)
-        console.print(f"Report: {written.report}", soft_wrap=True)
-        formats.write(written.result)
+    if len(folders) > 1:
+        for path in render_all(folders, assignment):
+            console.print(f"Report: {path}", soft_wrap=True)
+        return
+    written = render_again(folders[0], assignment)
+    console.print(f"Report: {written.report}", soft_wrap=True)
+    formats.write(written.result)

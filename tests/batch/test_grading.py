@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import gc
+import shutil
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,10 +18,11 @@ from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch import grading as grading_module
 from grader.batch.class_regrading import regrade_class
-from grader.batch.files import write_graded
-from grader.batch.grading import Graded, Grading
+from grader.batch.files import REPORT_FILE, RESULT_FILE, write_graded
+from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import compare, find, regrade
+from grader.batch.rendering import render_all
 from grader.batch.selftest import Role, Trial, run_trial
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
@@ -325,3 +327,24 @@ def test_what_cannot_be_judged_again_is_no_loss_of_points(
 def test_a_folder_without_recordings_is_a_wrong_use(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there are no recordings in it"):
         find(tmp_path)
+
+
+def test_the_reports_of_a_class_are_rendered_again_in_their_order(
+    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    folders = []
+    for number in range(9):
+        graded, _ = grade(recording(stop_s=0.1 * number))
+        folder = tmp_path / "class" / f"student {number}"
+        shutil.copytree(tmp_path / "recordings", folder / RECORDINGS_FOLDER)
+        files = {"run": folder / RECORDINGS_FOLDER / "run.mcap"}
+        write_graded(dataclasses.replace(graded, files=files), folder, Clock())
+        (folder / REPORT_FILE).unlink()
+        folders.append(folder)
+    found = list(render_all(folders, str(lesson.folder)))
+    assert found == [folder / REPORT_FILE for folder in folders]
+    pages = [path.read_text(encoding="utf-8") for path in found]
+    assert len(set(pages)) == 9
+    (folders[4] / RESULT_FILE).write_text("{}", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"student 4/result\.json"):
+        list(render_all(folders, str(lesson.folder)))
