@@ -32,12 +32,12 @@ class CellProcess:
         folder: Its own; gone after :meth:`close`.
     """
 
-    def __init__(self, nursery: Nursery, modules: Sequence[str] = ()) -> None:
+    def __init__(self, nursery: Nursery, imports: Sequence[str] = ()) -> None:
         """Start it; it joins the graph while the order is still being made.
 
         Args:
             nursery: What forks it.
-            modules: What it will import besides what every cell does.
+            imports: Modules and interfaces that it will import besides what every cell does.
 
         Raises:
             GraderFault: The nursery has ended.
@@ -50,7 +50,7 @@ class CellProcess:
         own_domain = os.environ.get("ROS_DOMAIN_ID", "")
         with self._errors.open("wb") as errors:
             self._forked = nursery.start_cell(
-                self.folder, errors, [own_domain] if own_domain.isdigit() else [], modules
+                self.folder, errors, [own_domain] if own_domain.isdigit() else [], imports
             )
 
     def run(self, order: CellOrder) -> Iterator[Mapping[str, Any]]:

@@ -45,7 +45,8 @@ _TOLD = struct.Struct("=id")
 _FORK_LIMIT_S = 10.0
 _ALWAYS = (
     "grader.run.cell_main",
-    "rcl_interfaces.srv",
+    "rcl_interfaces/msg/Log",
+    "rcl_interfaces/srv/ListParameters",
 )
 SIMULATOR_MODULE = "grader.run.simulator"
 """What a cell with a simulated robot imports besides."""
@@ -160,7 +161,7 @@ class Nursery:
         return Path(self._cells.name)
 
     def start_cell(
-        self, folder: Path, errors: IO[bytes], arguments: Sequence[str], modules: Sequence[str] = ()
+        self, folder: Path, errors: IO[bytes], arguments: Sequence[str], imports: Sequence[str] = ()
     ) -> ForkedCell:
         """Fork a cell.
 
@@ -168,7 +169,8 @@ class Nursery:
             folder: The cell's own.
             errors: Where its standard error goes.
             arguments: Further arguments of the cell.
-            modules: What it will import besides what every cell does; ours or ROS's only.
+            imports: Modules and interfaces that it will import besides what every cell does;
+                ours or ROS's only.
 
         Raises:
             GraderFault: The nursery has ended.
@@ -178,7 +180,7 @@ class Nursery:
         status_read, status_write = os.pipe()
         request = {
             "arguments": [str(folder), *arguments],
-            "modules": list(modules),
+            "imports": list(imports),
             "private": self._sandbox is not None,
         }
         self.give(folder)
@@ -250,7 +252,7 @@ def _fork(
     descriptors: list[int],
     running: dict[int, int],
 ) -> None:
-    _import(request["modules"])
+    _import(request["imports"])
     *standard, status = descriptors
     pid = os.fork()
     if pid == 0:
@@ -302,11 +304,15 @@ def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool)
         os._exit(status)
 
 
-def _import(modules: Sequence[str]) -> None:
-    for name in modules:
+def _import(names: Sequence[str]) -> None:
+    """Import modules, and interfaces such as ``std_msgs/msg/String`` with their type support."""
+    for name in names:
         # The cell imports it again and says what is wrong with it.
         with contextlib.suppress(Exception):
-            importlib.import_module(name)
+            package, *path = name.split("/")
+            module = importlib.import_module(".".join((package, *path[:-1])))
+            if path:
+                getattr(module, path[-1]).__import_type_support__()
 
 
 def main(descriptor: int) -> int:
@@ -314,24 +320,16 @@ def main(descriptor: int) -> int:
     # Python 3.12 warns of every fork beside other threads. These two are LTTng-UST's, which come
     # with rclpy's tracetools, only wait, and belong to none of the locks that a cell takes.
     warnings.filterwarnings("ignore", ".*use of fork", DeprecationWarning)
-    _import(_ALWAYS)
     # rclpy opens the middleware with its first node; to relocate it is half of that.
     with contextlib.suppress(OSError):
         ctypes.CDLL(f"lib{RMW}.so")
-    _load_type_support()
+    _import(_ALWAYS)
     # Pages that the collector touches would be copied by every fork.
     gc.collect()
     gc.freeze()
     with socket.socket(fileno=descriptor) as requests:
         _serve(requests)
     return 0
-
-
-def _load_type_support() -> None:
-    from rcl_interfaces.srv import ListParameters
-
-    with contextlib.suppress(Exception):
-        ListParameters.__import_type_support__()
 
 
 if __name__ == "__main__":

@@ -157,13 +157,10 @@ def _simulator(
     )
 
 
-def _modules(scenario: Scenario) -> list[str]:
-    """What the cell of a scenario imports."""
-    interfaces = scenario.recorded_types.values()
-    modules = {name.rsplit("/", 1)[0].replace("/", ".") for name in interfaces}
-    if scenario.world is not None:
-        modules.add(SIMULATOR_MODULE)
-    return sorted(modules)
+def _imports(scenario: Scenario) -> list[str]:
+    """What the cell of a scenario imports: interfaces and modules."""
+    simulator = {SIMULATOR_MODULE} if scenario.world is not None else set()
+    return sorted({*scenario.recorded_types.values(), *simulator})
 
 
 @dataclass
@@ -296,17 +293,17 @@ class Runner:
         with self._lock:
             if self._aborted:
                 raise GraderFault("interrupted")
-            cell = self._ready.pop() if self._ready else self._new_cell(_modules(scenario))
+            cell = self._ready.pop() if self._ready else self._new_cell(_imports(scenario))
             self._cells.add(cell)
         return cell
 
-    def _new_cell(self, modules: Sequence[str]) -> CellProcess:
+    def _new_cell(self, imports: Sequence[str]) -> CellProcess:
         if self._nursery is not None and not self._nursery.is_alive:
             self._nursery.close()
             self._nursery = None
         if self._nursery is None:
             self._nursery = Nursery(self.ros, self.sandbox)
-        return CellProcess(self._nursery, modules)
+        return CellProcess(self._nursery, imports)
 
     def _give_back(self, cell: CellProcess) -> None:
         cell.close()
