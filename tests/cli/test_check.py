@@ -144,7 +144,8 @@ def test_a_crash_is_shown_with_the_student_s_file_and_line(
     assert f"{NODE}:{line}" in ended.stdout
 
 
-def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_check_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) -> None:
     submission = copy(tmp_path, "PERIOD_S = 0.3", "PERIOD_S = 2.5")
     check = subprocess.Popen(
         [sys.executable, "-m", "grader", "check", "timed_publisher", str(submission)],
@@ -160,7 +161,7 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path: Path) -> None:
     for line in check.stderr:
         if "run: recording" in line:
             break
-    check.send_signal(signal.SIGINT)
+    check.send_signal(number)
     _, told = check.communicate(timeout=60)
     assert check.returncode == 130, told
     assert "Traceback" not in told
