@@ -1,4 +1,4 @@
-"""Python libraries that a submission imports and that it may not use where it is graded."""
+"""What a submission imports and what is not there where it is graded."""
 
 from __future__ import annotations
 
@@ -7,9 +7,29 @@ import re
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
 from grader.recording.model import Recording
+from grader.submission.record import SubmissionRecord
 from grader.submission.rosdistro import PACKAGES
 
 _MISSING = re.compile(r"No module named '([A-Za-z_]\w*)")
+_MISSING_ROOT = re.compile(r"No module named '([A-Za-z_]\w*)'$")
+_WITHOUT_PYTHON = re.compile(r"rcl|rcl_.+|rclc.*|rcutils|rcpputils|rmw.*|ament_cmake.*|rosidl_.+")
+"""ROS packages that nobody can import; who does means another one, such as rclpy."""
+
+
+def lacking_package(message: str, submission: SubmissionRecord) -> str | None:
+    """The ROS package that the installation lacks, or None.
+
+    Right code runs where the package is installed, so its absence is not the student's fault; the
+    same holds for one that the build does not find.
+
+    Args:
+        message: Of a ``ModuleNotFoundError``.
+        submission: What was handed in; its own packages are its own matter.
+    """
+    found = _MISSING_ROOT.match(message)
+    if found is None or found[1] not in PACKAGES or _WITHOUT_PYTHON.fullmatch(found[1]):
+        return None
+    return None if found[1] in {package.name for package in submission.packages} else found[1]
 
 
 def library_hint(message: str, recording: Recording) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.checks.library import library_hint
+from grader.checks.library import lacking_package, library_hint
 from grader.recording.model import Ending, Recording
 from grader.submission.record import PackageRecord, SubmissionRecord
 
@@ -47,3 +47,24 @@ def test_a_slip_in_a_name_of_the_student_s_or_of_ros_is_another_matter(message: 
 
 def test_without_a_sandbox_everything_that_is_installed_is_there() -> None:
     assert library_hint("No module named 'pandas'", run(None)) is None
+
+
+def test_a_package_of_ros_that_is_not_installed_here_is_not_the_student_s_fault() -> None:
+    submission = run().submission
+    assert lacking_package("No module named 'tf_transformations'", submission) == (
+        "tf_transformations"
+    )
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "No module named 'tf_transformation'",
+        "No module named 'geometry_msgs.msgs'",
+        "No module named 'rclcpp'",
+        "No module named 'robot_tools'",
+        "No module named 'pandas'",
+    ],
+)
+def test_a_wrong_name_of_a_package_or_module_is_the_student_s(message: str) -> None:
+    assert lacking_package(message, run().submission) is None
