@@ -22,10 +22,8 @@ _SIGNALS = {
     signal.SIGBUS: "bus error",
     signal.SIGILL: "illegal instruction",
     signal.SIGFPE: "arithmetic error in native code",
-    signal.SIGKILL: "killed: by itself, or for too much memory",
+    signal.SIGKILL: "killed, usually for too much memory",
     signal.SIGXCPU: "too much CPU time",
-    signal.SIGXFSZ: "wrote a larger file than is allowed",
-    signal.SIGSYS: "a system call that no node needs",
     signal.SIGTERM: "asked to end by another process",
     signal.SIGPIPE: "wrote to a closed pipe",
 }
@@ -33,22 +31,14 @@ _SIGNAL_HINTS = {
     signal.SIGSEGV: "Native code crashed: look at the last call before it, such as one on a node "
     "or publisher that was destroyed already.",
     signal.SIGABRT: "A C++ exception or an assertion ended it: the last lines of output name it.",
-    signal.SIGKILL: "Look for os.kill or os.killpg, or for a list or an image that grows without "
-    "end.",
+    signal.SIGKILL: "Look for a list or an image that grows without end.",
     signal.SIGTERM: "Look for os.kill, os.killpg or subprocess calls that end their own group.",
 }
 
 _BREACH_HINTS = {
     "memory": "Look for a list, a queue or an image that grows without end.",
-    "cpu time": "Look for a loop without a pause: a node waits in rclpy.spin() and costs nothing "
-    "while nothing happens.",
     "sessions": "Look for a loop that starts processes with start_new_session=True or setsid.",
     "output": "Look for a print() or a log call in a loop that nothing slows down.",
-    "call": "Look for os.kill(os.getppid(), ...), and for whatever else is aimed at the system, or "
-    "at processes that are not your own.",
-    "packets": "The UDP ports from 7400 on belong to the middleware: choose another one for a "
-    "socket of your own.",
-    "forgery": "Write to no file descriptor that you did not open.",
 }
 
 _HINTS = {
@@ -178,16 +168,6 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
             moments=evidence.moments, places=(place,) if place else (), log=evidence.log
         ),
     )
-
-
-def offence(recording: Recording) -> Cause | None:
-    """What the processes did that is never allowed, also where they ended before it was seen."""
-    for breach in recording.breaches:
-        if not breach.allowed:
-            when_s = recording.since_launch_s(breach.time_ns)
-            moment = Moment(f"{breach.what} that is never allowed", when_s)
-            return Cause(str(breach), _BREACH_HINTS[breach.what], Evidence(moments=(moment,)))
-    return None
 
 
 def _returned(recording: Recording, process: Process, ended: str, evidence: Evidence) -> Cause:
