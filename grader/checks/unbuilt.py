@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 
 from grader.checks.cause import Cause
 from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
+from grader.submission.buildlog import missing_cmake_packages
 from grader.submission.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 
@@ -109,6 +111,14 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
         )
     aborted = {found[1] for found in _ABORTED.finditer(_clean(build))}
     others = [other for other in build.failed_packages if other not in {name, *aborted}]
+    lacking = _lacking(build, [name, *others] if name in aborted else [name])
+    if lacking:
+        return Cause(
+            f"it needs {codes(lacking)} to build, which ROS 2 Jazzy has, but which is not "
+            "installed where this is graded",
+            "No point is lost by it. Tell whoever runs the grader: a full ROS 2 Jazzy builds it.",
+            ours=True,
+        )
     if name not in aborted or not others:
         return _failed(_own(submission, build, name), name)
     return Cause(
@@ -138,6 +148,16 @@ def _failed(build: BuildRecord, name: str) -> Cause:
     )
 
 
+def _lacking(build: BuildRecord, names: Iterable[str]) -> list[str]:
+    """What the builds of packages did not find because this machine does not have it."""
+    found = {
+        missing
+        for name in names
+        for missing in missing_cmake_packages("\n".join(_written(build, name)))
+    }
+    return sorted(found & set(build.lacking))
+
+
 def _evidence(build: BuildRecord, name: str) -> Evidence:
     return Evidence(places=(build.culprit,) if build.culprit else (), log=_relevant(build, name))
 
@@ -148,18 +168,23 @@ def _clean(build: BuildRecord) -> str:
 
 def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
     """What the build of the package wrote, up to what the culprit is blamed for, or its end."""
-    lines = _clean(build).splitlines()
-    begin = _last(lines, f"Starting >>> {name}")
-    if begin is not None:
-        lines = lines[begin:]
-        lines = lines[: _last(lines, f"Failed   <<< {name}", f"Aborted  <<< {name}")]
-    kept = [line for line in lines if line.strip() and not _CHATTER.match(line)]
+    kept = [line for line in _written(build, name) if line.strip() and not _CHATTER.match(line)]
     if build.culprit is not None:
         message = build.culprit.message[:_COMPARED]
         blamed = next((i for i, line in enumerate(kept) if message and message in line), None)
         # What follows is the complaint of the tools that called the student's file.
         kept = kept[: blamed + 1] if blamed is not None else kept
     return tuple(kept[-_LOG_LINES:])
+
+
+def _written(build: BuildRecord, name: str) -> list[str]:
+    """What the build of the package wrote; all of the log where it was never begun."""
+    lines = _clean(build).splitlines()
+    begin = _last(lines, f"Starting >>> {name}")
+    if begin is None:
+        return lines
+    lines = lines[begin:]
+    return lines[: _last(lines, f"Failed   <<< {name}", f"Aborted  <<< {name}")]
 
 
 def _last(lines: list[str], *beginnings: str) -> int | None:

@@ -215,6 +215,7 @@ class BuildPart(_Part):
     cached: bool
     timed_out: bool
     failed_packages: tuple[Text, ...]
+    lacking: tuple[Text, ...] = ()
     culprit: PlacePart | None
     log: Text
 

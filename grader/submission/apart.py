@@ -16,7 +16,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from grader.submission.cmake import read_commands
-from grader.submission.listing import MANIFEST, SubmissionFile
+from grader.submission.listing import SubmissionFile
+from grader.submission.manifest import MANIFEST
 from grader.submission.package import Package
 from grader.submission.paths import is_within, shown
 

@@ -10,25 +10,21 @@ import os
 import stat
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from grader.errors import SubmissionError
+from grader.submission.leftovers import COLCON_FOLDERS, is_left_out, is_leftover
+from grader.submission.manifest import MANIFEST
 from grader.submission.members import (
     MIB,
-    TOOL_FOLDERS,
     ArchiveLimits,
     LeadsOut,
-    is_left_out,
     resolve_link,
 )
 from grader.submission.paths import join, parents, shown
 
-MANIFEST = "package.xml"
 IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
-
-_COLCON_FOLDERS = ("build", "install", "log")
-_COLCON_MARKS = ("COLCON_IGNORE", ".built_by", ".colcon_install_layout", "local_setup.sh")
-_VIRTUAL_ENVIRONMENT = "pyvenv.cfg"
 
 
 @dataclass(frozen=True)
@@ -113,26 +109,17 @@ def _walk(
     for entry in entries:
         path = join(folder, entry.name)
         if not entry.is_dir(follow_symlinks=False):
-            linked_leftover = entry.is_symlink() and entry.name in _COLCON_FOLDERS
+            linked_leftover = entry.is_symlink() and entry.name in COLCON_FOLDERS
             if not (is_left_out(entry.name) or entry.name.endswith(".pyc") or linked_leftover):
                 yield path, entry
-        elif _is_leftover(root / path, entry.name, in_package):
+        elif is_leftover(entry.name, partial(_holds, root / path), in_package):
             skipped.append(path)
         else:
             yield from _walk(root, path, in_package, skipped, depth - 1)
 
 
-def _is_leftover(folder: Path, name: str, in_package: bool) -> bool:
-    if name in TOOL_FOLDERS or name.endswith(".egg-info"):
-        return True
-    if (folder / _VIRTUAL_ENVIRONMENT).exists():
-        return True
-    if name not in _COLCON_FOLDERS:
-        return False
-    if any((folder / mark).exists() for mark in _COLCON_MARKS):
-        return True
-    # A package may well have a module called "log"; a workspace has no use for another "log".
-    return not in_package and not (folder / MANIFEST).exists()
+def _holds(folder: Path, name: str) -> bool:
+    return (folder / name).exists()
 
 
 def _target(root: Path, path: str) -> str:

@@ -10,6 +10,7 @@ from xml.parsers import expat
 from grader.errors import GraderFault
 from grader.submission.record import Dependency, SourceError
 
+MANIFEST = "package.xml"
 MAX_BYTES = 256 * 1024
 DEPENDENCY_KINDS = frozenset(
     {

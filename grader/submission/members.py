@@ -15,38 +15,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 from grader.errors import SubmissionError
+from grader.submission.leftovers import is_left_out, is_within_leftover
 from grader.submission.paths import parents, shown
 
 MIB = 2**20
 
-TOOL_FOLDERS = frozenset(
-    {
-        ".git",
-        ".hg",
-        ".svn",
-        "__pycache__",
-        ".venv",
-        "node_modules",
-        ".pytest_cache",
-        ".mypy_cache",
-        ".ruff_cache",
-        ".hypothesis",
-        ".tox",
-        ".colcon",
-        "__MACOSX",
-        "rosgrade-report",
-    }
-)
-"""Folders that tools make and that are never a student's work, wherever they are."""
-
-_EDITORS = re.compile(
-    r"""
-    .*~ | .*\.sw[a-z] | 4913                                     # backups, Vim
-    | \.\#.* | \#.*\# | flycheck_.*                              # Emacs
-    | \.goutputstream-.* | .*\.kate-swp | .*___jb_(tmp|old)___   # gedit, Kate, JetBrains
-    """,
-    re.VERBOSE | re.DOTALL,
-)
 _MAX_HOPS = 40
 _DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 
@@ -58,7 +31,7 @@ class ArchiveLimits:
     Attributes:
         total_bytes: Sum of the files' sizes, and largest archive file.
         members: Number of files, folders and links. What tools left behind
-            (``TOOL_FOLDERS``) is not unpacked and may be ten times as much.
+            (``leftovers.TOOL_FOLDERS``) is not unpacked and may be ten times as much.
         ratio: Largest allowed unpacked size divided by the archive's size...
         ratio_from_bytes: ...from this unpacked size on, since small texts compress well.
         depth: Largest number of folders in a path.
@@ -193,17 +166,6 @@ def safe_path(name: str, limits: ArchiveLimits) -> str:
     return "/".join(parts)
 
 
-def is_left_out(path: str) -> bool:
-    """Whether a path is something that a tool, an editor or macOS left behind."""
-    parts = path.split("/")
-    return (
-        not TOOL_FOLDERS.isdisjoint(parts)
-        or parts[-1] == ".DS_Store"
-        or parts[-1].startswith("._")
-        or _EDITORS.fullmatch(parts[-1]) is not None
-    )
-
-
 def _check_kind(member: Member) -> None:
     if member.kind is Kind.SPECIAL:
         raise Refused("a device, pipe or other special file is refused")
@@ -236,6 +198,9 @@ def _with_safe_links(entries: list[Entry], archive: str) -> list[Entry]:
     kept = []
     for entry in entries:
         if entry.member.kind is Kind.LINK:
+            # `colcon build --symlink-install` and venv fill their folders with links out.
+            if is_within_leftover(entry.path, present):
+                continue
             try:
                 end = resolve_link(entry.path, links)
             except LeadsOut:

@@ -16,9 +16,8 @@ from grader.submission.entrypoints import EntryPoint, Setup, read_setup
 from grader.submission.imports import find_imports, is_code, ros_imports
 from grader.submission.installed import MOST_BYTES, InstallSpace, hash_of, in_folder, normalised
 from grader.submission.lint import lint
-from grader.submission.listing import MANIFEST
 from grader.submission.locate import Located
-from grader.submission.manifest import Manifest, read_manifest
+from grader.submission.manifest import MANIFEST, Manifest, read_manifest
 from grader.submission.outline import outline
 from grader.submission.paths import is_within, join, shown
 from grader.submission.record import Definition, Dependency, Import, PackageRecord, SourceError

@@ -19,8 +19,8 @@ from grader.submission.build_cache import BuildCache, CacheLimits
 from grader.submission.build_limits import BuildLimits
 from grader.submission.culprit import Sources
 from grader.submission.installed import inspect
-from grader.submission.listing import MANIFEST
 from grader.submission.locate import Located, check_path, opened, submission_id
+from grader.submission.manifest import MANIFEST
 from grader.submission.members import MIB, ArchiveLimits
 from grader.submission.package import Package, read_package, record_packages
 from grader.submission.paths import join, shown

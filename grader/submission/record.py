@@ -148,6 +148,8 @@ class BuildRecord:
         timed_out: Ended by us after the time limit.
         failed_packages: Packages that colcon did not finish: that failed, or were never begun
             since one that they need failed or colcon did not take them for packages.
+        lacking: Packages of ROS 2 Jazzy that CMake did not find, because they are not installed
+            where this was built.
         culprit: The student's file and line that the log blames first, or None.
         log: The end of colcon's output, student's paths mapped back, at most 64 KiB.
     """
@@ -157,6 +159,7 @@ class BuildRecord:
     cached: bool = False
     timed_out: bool = False
     failed_packages: tuple[str, ...] = ()
+    lacking: tuple[str, ...] = ()
     culprit: SourceError | None = None
     log: str = ""
 

@@ -24,6 +24,13 @@ Summary: 0 packages finished [0.50s]
   1 package had stderr output: bot_publisher
 """
 
+NEEDS_NAV2 = """\
+Starting >>> {}
+CMake Error at CMakeLists.txt:3 (find_package):
+  Could not find a package configuration file provided by "nav2_msgs" with
+  any of the following names:
+"""
+
 
 def failed_build(*failed, log=LOG, **changes):
     defaults = {"succeeded": False, "duration_s": 0.5, "failed_packages": failed, "log": log}
@@ -159,6 +166,26 @@ class TestBuilds:
         )
         found = failing("package.builds", subject, package=NAME)
         assert "because" not in found
+
+    @pytest.mark.parametrize("ended", ["Failed   <<< bot_publisher", "Aborted  <<< bot_publisher"])
+    def test_what_is_not_installed_here_is_not_the_student_s_fault(self, ended):
+        log = f"{NEEDS_NAV2.format('other')}Failed   <<< other [1s]\n"
+        if ended.startswith("Failed"):
+            log += f"{NEEDS_NAV2.format('bot_publisher')}"
+        build = failed_build(
+            "bot_publisher", "other", log=f"{log}{ended} [1s]\n", lacking=("nav2_msgs",)
+        )
+        finding = judge(
+            "package.builds", submission(package(), package("other"), build=build), package=NAME
+        )
+        assert finding.status is Status.ERROR
+        assert "`nav2_msgs`" in finding.observed
+
+    def test_what_another_package_lacks_excuses_nobody(self):
+        log = f"{NEEDS_NAV2.format('other')}Failed   <<< other [1s]\n{LOG}"
+        build = failed_build("bot_publisher", "other", log=log, lacking=("nav2_msgs",))
+        subject = submission(package(), package("other"), build=build)
+        assert judge("package.builds", subject, package=NAME).status is Status.FAILED
 
     def test_the_failure_of_another_package_does_not_count(self):
         subject = submission(package(), package("other"), build=failed_build("other"))

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from grader.errors import GraderFault, SubmissionError
 from grader.submission.archive import unpack
-from grader.submission.members import ArchiveLimits, is_left_out
+from grader.submission.leftovers import is_left_out
+from grader.submission.members import ArchiveLimits
 
 from .samples import tar_bytes, tar_member, zip_bytes
 

@@ -106,12 +106,30 @@ def test_an_install_space_is_tidied_before_anybody_looks_into_it(tmp_path: Path)
     (install / "lib").mkdir(parents=True)
     (install / "lib/libx.so.1").touch()
     (install / "lib/libx.so").symlink_to("libx.so.1")
-    (install / "lib/etc").symlink_to("/etc")
-    (install / "lib/up").symlink_to("../../..")
-    os.mkfifo(install / "lib/pipe")
     assert tidy(install, most_bytes=10**6, most_files=10) is None
     assert {path.name for path in (install / "lib").iterdir()} == {"libx.so.1", "libx.so"}
     assert tidy(install, most_bytes=1000, most_files=1) is not None
+    assert not install.exists()
+
+
+def test_what_leads_out_of_an_install_space_is_named_and_nothing_of_it_is_used(
+    tmp_path: Path,
+) -> None:
+    install = tmp_path / "install"
+
+    def refused() -> str | None:
+        return tidy(install, most_bytes=10**6, most_files=10)
+
+    (install / "lib").mkdir(parents=True)
+    (install / "lib/etc").symlink_to("/etc")
+    assert refused() == "the build installed 'lib/etc', a link that leads out to '/etc'"
+    assert not install.exists()
+    (install / "lib").mkdir(parents=True)
+    (install / "lib/up").symlink_to("../../..")
+    os.mkfifo(install / "lib/pipe")
+    assert refused() == (
+        "the build installed 'lib/pipe', which is no file, folder or link and 1 more of that kind"
+    )
     assert not install.exists()
 
 

@@ -136,6 +136,28 @@ def test_a_chain_of_links_that_leads_out_is_refused() -> None:
     assert "leads out" in refusal([*chain, *files("d/x")])
 
 
+@pytest.mark.parametrize(
+    "path",
+    [
+        "ws/build/bot/package.xml",
+        "ws/install/bot/lib/bot",
+        "ws/log/latest",
+        "install/x",
+        "ws/src/bot/log/x",
+        "mine/bin/python",
+    ],
+)
+def test_links_out_of_what_colcon_and_venv_left_behind_are_left_out(path: str) -> None:
+    present = files("ws/src/bot/package.xml", "ws/src/bot/log/COLCON_IGNORE", "mine/pyvenv.cfg")
+    link = Member(9, path, Kind.LINK, target="/home/student/ros2_ws/src/bot/package.xml")
+    assert link.name not in [entry.path for entry in admitted([*present, link])]
+
+
+def test_in_a_package_a_folder_called_log_is_not_colcon_s() -> None:
+    link = Member(9, "src/bot/log/x", Kind.LINK, target="/etc/passwd")
+    assert "leads out" in refusal([*files("src/bot/package.xml"), link])
+
+
 def test_a_link_to_something_inside_is_kept_and_one_to_nothing_is_not() -> None:
     links = [
         Member(0, "d/good", Kind.LINK, target="../x"),
