@@ -7,7 +7,7 @@ from pydantic import Field
 from grader.assignment.model import PackageName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Table
-from grader.checks.unbuilt import existing_package, why_no_manifest
+from grader.checks.unbuilt import existing_package, why_no_manifest, why_too_new
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
 from grader.submission.dependencies import meant
@@ -48,6 +48,9 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     if cause is not None:
         return cause.finding(expected)
     package = existing_package(submission, parameters.package)
+    newer = why_too_new(package)
+    if newer is not None:
+        return newer.finding(expected)
     unreadable = _unreadable(package)
     if unreadable is not None:
         return Finding.failed(

@@ -18,7 +18,7 @@ from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.inheritance import NODE, Family, Found, Kinship
-from grader.checks.unbuilt import existing_package, why_no_package
+from grader.checks.unbuilt import existing_package, why_no_package, why_too_new
 from grader.checks.wording import code, codes, counted, percent
 from grader.nearest import nearest
 from grader.submission.code_facts import LintFinding, SourceFile, SourceFunction
@@ -42,6 +42,9 @@ def _python_files(submission: SubmissionRecord, name: str) -> PackageRecord | Ca
     if cause is not None:
         return cause
     package = existing_package(submission, name)
+    newer = why_too_new(package)
+    if newer is not None:
+        return newer
     if package.syntax_errors:
         return Cause(
             f"Python cannot read {package.syntax_errors[0]}",

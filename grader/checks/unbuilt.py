@@ -89,11 +89,26 @@ def existing_package(submission: SubmissionRecord, name: str) -> PackageRecord:
     return package
 
 
+def why_too_new(package: PackageRecord) -> Cause | None:
+    """Code that the Python of ROS 2 Jazzy can read, but not the one that grades."""
+    if not package.newer_syntax:
+        return None
+    return Cause(
+        f"the Python here cannot read {package.newer_syntax[0]}",
+        "It is right in ROS 2 Jazzy, which has Python 3.12, and no point is lost by it. Tell "
+        "whoever runs the grader: it needs Python 3.12. Or do without this syntax.",
+        ours=True,
+    )
+
+
 def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
     """Why a package was not built, or None if it was."""
     cause = why_no_package(submission, name)
     if cause is not None:
         return cause
+    newer = why_too_new(existing_package(submission, name))
+    if newer is not None:
+        return newer
     build = submission.build
     if build is None:
         return Cause("nothing was built, so this cannot be judged", ours=True)

@@ -15,7 +15,7 @@ from grader.submission.dependencies import is_known
 from grader.submission.entrypoints import EntryPoint, Setup, read_setup
 from grader.submission.imports import find_imports, is_code, ros_imports
 from grader.submission.installed import MOST_BYTES, InstallSpace, hash_of, in_folder, normalised
-from grader.submission.lint import lint
+from grader.submission.lint import lint, newer_syntax
 from grader.submission.locate import Located
 from grader.submission.manifest import MANIFEST, Manifest, read_manifest
 from grader.submission.outline import outline
@@ -48,6 +48,7 @@ class Package:
         hashes: Hash of each Python file and script, by path in the submission.
         trees: Syntax tree of each, or what is wrong with it.
         lint: What ruff says of what runs, or None where it was not asked.
+        newer_syntax: What only the Python of ROS 2 Jazzy can parse, and not the one here.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Package:
     hashes: Mapping[str, str]
     trees: Mapping[str, ast.Module | SourceError]
     lint: Lint | None = None
+    newer_syntax: tuple[SourceError, ...] = ()
 
     @property
     def build_type(self) -> str:
@@ -85,6 +87,11 @@ class Package:
     def code(self) -> dict[str, ast.Module | SourceError]:
         """Trees of what runs: no tests, launch files, setup.py."""
         return {p: t for p, t in self.trees.items() if is_code(_below(p, self.folder))}
+
+    @property
+    def unreadable(self) -> list[SourceError]:
+        """Files that the Python here cannot parse, sorted."""
+        return [tree for _, tree in sorted(self.trees.items()) if isinstance(tree, SourceError)]
 
     def modules(self, installed: Collection[str] | None = None) -> Modules:
         """The package's Python modules."""
@@ -140,7 +147,12 @@ def read_package(located: Located, folder: str, ros: RosInstallation) -> Package
         hashes=hashes,
         trees=trees,
     )
-    return replace(package, lint=lint(located.root, package.code()))
+    broken = [path for path, tree in trees.items() if isinstance(tree, SourceError)]
+    return replace(
+        package,
+        lint=lint(located.root, package.code()),
+        newer_syntax=newer_syntax(located.root, broken),
+    )
 
 
 def record_packages(
@@ -168,6 +180,7 @@ def _record(
     submitted = {other.name for other in packages}
     declared = {dependency.name for dependency in package.manifest.dependencies}
     imports = _imports(package)
+    newer = {error.file for error in package.newer_syntax}
     record = PackageRecord(
         name=package.name,
         path=shown(package.folder),
@@ -187,9 +200,8 @@ def _record(
                 },
             )
         ),
-        syntax_errors=tuple(
-            tree for _, tree in sorted(package.trees.items()) if isinstance(tree, SourceError)
-        ),
+        syntax_errors=tuple(error for error in package.unreadable if error.file not in newer),
+        newer_syntax=package.newer_syntax,
         groups=package.manifest.groups,
         cmake=None if package.cmake is None else package.cmake[:MOST_BYTES],
         definitions=package.definitions,

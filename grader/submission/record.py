@@ -96,6 +96,7 @@ class PackageRecord:
         ros_imports: Those of ``imports`` that belong to a ROS package, with that package's
             name in ``module``; of several that provide a module the one that is declared.
         syntax_errors: Files that Python cannot parse.
+        newer_syntax: Other files, that the Python here cannot parse, but that of ROS 2 Jazzy can.
         entry_points: console_scripts of setup.py or setup.cfg: executable -> ``module:function``.
         executables: What the build installed for ``ros2 run``, in ``lib/<package>/``.
         misplaced_executables: What it installed in ``bin/`` instead, where ``ros2 run`` does
@@ -120,6 +121,7 @@ class PackageRecord:
     imports: tuple[Import, ...] = ()
     ros_imports: tuple[Import, ...] = ()
     syntax_errors: tuple[SourceError, ...] = ()
+    newer_syntax: tuple[SourceError, ...] = ()
     entry_points: tuple[tuple[str, str], ...] = ()
     executables: tuple[str, ...] = ()
     misplaced_executables: tuple[str, ...] = ()

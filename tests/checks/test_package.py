@@ -187,6 +187,13 @@ class TestBuilds:
         subject = submission(package(), package("other"), build=build)
         assert judge("package.builds", subject, package=NAME).status is Status.FAILED
 
+    @pytest.mark.parametrize("check", ["package.builds", "package.dependencies", "source.no_print"])
+    def test_syntax_of_jazzy_s_python_is_not_the_student_s_fault(self, check):
+        newer = SourceError("src/bot_publisher/node.py", 3, "`type` alias statement on Python 3.11")
+        finding = judge(check, submission(package(newer_syntax=(newer,))), package=NAME)
+        assert finding.status is Status.ERROR
+        assert "node.py:3: `type` alias" in finding.observed
+
     def test_the_failure_of_another_package_does_not_count(self):
         subject = submission(package(), package("other"), build=failed_build("other"))
         assert judge("package.builds", subject, package=NAME).status is Status.PASSED

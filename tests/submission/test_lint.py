@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.submission.lint import EXCLUDED, find_ruff, known_rules, lint
+from grader.submission.lint import EXCLUDED, find_ruff, known_rules, lint, newer_syntax
 from grader.submission.outline import outline
 
 
@@ -86,3 +86,29 @@ def test_a_deep_tree_is_outlined() -> None:
     text = "x = " + "a." * 400 + "b\n" + "".join(f"{' ' * n}class A{n}:\n" for n in range(60))
     found = outline(ast.parse(text + " " * 60 + "pass\n"), "n.py", "n")
     assert len(found.classes) == 60
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['name = {"a": 1}\nprint(f"{name["a"]}")\n', "x = 1\ntype Speed = float\n"],
+)
+def test_syntax_of_jazzy_s_python_is_told_from_a_mistake(tmp_path: Path, text: str) -> None:
+    (tmp_path / "node.py").write_text(text)
+    [error] = newer_syntax(tmp_path, ["node.py"], python=(3, 11))
+    assert (error.file, error.line) == ("node.py", 2)
+    assert "added in Python 3.12" in error.message
+    assert newer_syntax(tmp_path, ["node.py"], python=(3, 12)) == ()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def f(:\n    pass\n",
+        "type Speed = float\ndef f(:\n",
+        "print 'hello'\n",
+        "x = t'{1}'\n",
+    ],
+)
+def test_what_no_python_of_jazzy_reads_is_a_mistake(tmp_path: Path, text: str) -> None:
+    (tmp_path / "node.py").write_text(text)
+    assert newer_syntax(tmp_path, ["node.py"], python=(3, 11)) == ()
