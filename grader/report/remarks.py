@@ -25,6 +25,7 @@ def remarks(recording: Recording) -> tuple[str, ...]:
         *_flooding(recording),
         *_talking(recording),
         *_forging(recording),
+        *_borrowing(recording),
     )
 
 
@@ -82,8 +83,20 @@ def _talking(recording: Recording) -> Iterator[str]:
 
 
 def _forging(recording: Recording) -> Iterator[str]:
+    if any(breach.what == "forgery" for breach in recording.breaches):
+        return
     for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
         yield (
             f"{code(process)} wrote into the channel through which rosgrade reports from inside a "
             "process; what is said there is never proof"
+        )
+
+
+def _borrowing(recording: Recording) -> Iterator[str]:
+    """Without a sandbox there are libraries that are missing where a class is graded."""
+    modules = recording.environment.get("unlisted", "").split()
+    if modules:
+        yield (
+            f"the code imports {codes(modules)}, and no sandbox is in force here: where one is, "
+            "Python has only the standard library, ROS 2, `numpy`, and what the assignment allows"
         )

@@ -23,6 +23,7 @@ from grader.run.load import cpu_count
 from grader.run.nursery import SIMULATOR_MODULE, Nursery
 from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
 from grader.run.stimuli.ordering import stimulus_orders
+from grader.sandbox.python_tree import unlisted
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
@@ -367,7 +368,8 @@ class Runner:
             tells_output=self.verbose,
         )
         if self.sandbox is None:
-            return order
+            modules = unlisted(submission.foreign_imports, assignment.libraries)
+            return replace(order, facts={**order.facts, "unlisted": " ".join(modules)})
         limits = (scenario.limits or assignment.limits).limits()
         sandbox = self.sandbox.allowing(assignment.libraries)
         return enclose(order, folder, sandbox, ros, install, limits)

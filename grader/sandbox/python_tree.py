@@ -114,6 +114,25 @@ def check_installed(libraries: Collection[str]) -> None:
             )
 
 
+def unlisted(modules: Collection[str], libraries: Collection[str]) -> tuple[str, ...]:
+    """Find modules that can be imported here, but not in the environment of a sandbox.
+
+    Args:
+        modules: Names of top-level modules.
+        libraries: Distributions that the assignment allows.
+    """
+    foreign = set(modules) - sys.stdlib_module_names - {"numpy"}
+    if not foreign:
+        return ()
+    allowed = _closure({_normal(name) for name in libraries})
+    owners = metadata.packages_distributions()
+    return tuple(
+        module
+        for module in sorted(foreign & owners.keys())
+        if not any(_normal(owner) in allowed for owner in owners[module])
+    )
+
+
 def prune(folder: Path, kept: int = KEPT, age_s: float = AGE_S) -> None:
     """Throw away environments that nobody uses.
 

@@ -184,6 +184,16 @@ class SubmissionRecord:
     packages: tuple[PackageRecord, ...] = ()
     build: BuildRecord | None = None
 
+    @property
+    def foreign_imports(self) -> frozenset[str]:
+        """Top-level modules that its code imports and that belong to no ROS package."""
+        return frozenset(
+            item.module
+            for package in self.packages
+            for item in package.imports
+            if (item.file, item.line) not in {(ros.file, ros.line) for ros in package.ros_imports}
+        )
+
     def package(self, name: str) -> PackageRecord | None:
         """The package of that name, or None."""
         return next((package for package in self.packages if package.name == name), None)

@@ -96,3 +96,9 @@ def test_output_beyond_what_is_kept_and_another_domain_are_told() -> None:
         "the submission joined another ROS domain: 5",
         "`bot/bot` printed more than is kept, by 1 byte",
     )
+
+
+def test_a_library_that_a_sandbox_does_not_hold_is_told_where_there_is_none() -> None:
+    [remark] = remarks(run(environment={"unlisted": "pandas cv2"}))
+    assert remark.startswith("the code imports `pandas` and `cv2`")
+    assert not remarks(run(environment={"unlisted": ""}))

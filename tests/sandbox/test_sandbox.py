@@ -15,7 +15,7 @@ from grader.errors import GraderFault
 from grader.sandbox import bubblewrap, trial
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.choice import Choice
-from grader.sandbox.python_tree import check_installed, prune, student_prefix
+from grader.sandbox.python_tree import check_installed, prune, student_prefix, unlisted
 from grader.sandbox.sandbox import Sandbox, hide
 from grader.sandbox.trial import Trial, choose
 
@@ -47,6 +47,15 @@ def test_code_of_ours_is_covered_where_it_would_be_shown() -> None:
     assert str(code) not in hide([Bind(Path("/elsewhere"), code.parent)])
 
 
+def test_libraries_beside_an_environment_are_covered() -> None:
+    base = Path(sys.base_prefix).resolve()
+    name = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    beside = base / "lib" / name / "site-packages"
+    if sys.prefix == sys.base_prefix or base == Path("/usr") or not beside.is_dir():
+        pytest.skip("this Python has no environment of its own, or is the system's")
+    assert str(beside) in hide([Bind.same(base)])
+
+
 def test_auto_says_in_one_line_that_there_is_no_sandbox(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -63,6 +72,25 @@ def test_auto_says_in_one_line_that_there_is_no_sandbox(
 def test_a_missing_program_is_named_with_its_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
     assert trial.try_sandbox() == Trial("bwrap is not installed", "sudo apt install bubblewrap")
+
+
+@pytest.mark.parametrize(
+    ("settings", "wanted"),
+    [
+        ({"user/max_user_namespaces": 0}, "sudo sysctl user.max_user_namespaces=10000"),
+        (
+            {"user/max_user_namespaces": 90_000, "kernel/unprivileged_userns_clone": 0},
+            "sudo sysctl kernel.unprivileged_userns_clone=1",
+        ),
+    ],
+)
+def test_a_setting_that_forbids_user_namespaces_is_named_with_the_way_to_change_it(
+    settings: dict[str, int], wanted: str, tmp_path: Path
+) -> None:
+    for name, value in settings.items():
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).write_text(f"{value}\n")
+    assert trial._remedy(tmp_path).endswith(wanted)
 
 
 def test_the_student_s_python_holds_ros_and_nothing_of_ours(tmp_path: Path) -> None:
@@ -96,6 +124,12 @@ def trees(folder: Path, ages_s: dict[str, float]) -> None:
     for name, age_s in ages_s.items():
         (folder / name / "lib").mkdir(parents=True)
         os.utime(folder / name, (now_s - age_s, now_s - age_s))
+
+
+def test_what_only_rosgrade_needs_is_told_from_what_a_student_may_import() -> None:
+    modules = ["jinja2", "scipy", "numpy", "math", "yaml", "rclpy", "nobody_has_this"]
+    assert unlisted(modules, ()) == ("jinja2", "scipy")
+    assert unlisted(modules, ("SciPy",)) == ("jinja2",)
 
 
 def test_old_trees_are_thrown_away_and_the_last_used_stay(tmp_path: Path) -> None:
