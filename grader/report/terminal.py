@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.checks.finding import Status
+from grader.checks.wording import listing
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.recording.model import Recording
 from grader.report import words
@@ -163,10 +164,14 @@ def _explain(console: Console, result: CheckResult) -> None:
     console.print(
         Text.assemble(_status(console, result.status), "  ", (_line(console, result.title), "bold"))
     )
+    same_advice: dict[tuple[str, ...], list[ScenarioFinding]] = {}
     for item in result.findings:
         if item.finding.status is result.status:
-            for name, text in _rows(result, item):
-                console.print(_hanging(console, name, text))
+            advice = tuple(words.advice(result, item.finding))
+            same_advice.setdefault(advice, []).append(item)
+    for advice, items in same_advice.items():
+        for name, text in (*_seen(result, items), *_advised(advice), *_evidence(items)):
+            console.print(_hanging(console, name, text))
 
 
 def _hanging(console: Console, name: str, text: str) -> Text:
@@ -179,19 +184,35 @@ def _hanging(console: Console, name: str, text: str) -> Text:
     return Text.assemble((f"  {name:<8}  ", "dim"), margin.join(lines))
 
 
-def _rows(result: CheckResult, item: ScenarioFinding) -> Iterator[tuple[str, str]]:
-    finding = item.finding
-    if len(result.findings) > 1 and item.scenario:
-        yield "scenario", item.scenario
-    yield "expected", finding.expected
-    yield "observed", finding.observed
-    for number, text in enumerate(words.advice(result, finding)):
+def _seen(result: CheckResult, items: Sequence[ScenarioFinding]) -> Iterator[tuple[str, str]]:
+    """What was expected and observed in each scenario; what is the same is said once."""
+    scenarios: dict[tuple[str, str], list[str]] = {}
+    for item in items:
+        key = (item.finding.expected, item.finding.observed)
+        scenarios.setdefault(key, []).append(item.scenario or "")
+    before = ""
+    for (expected, observed), names in scenarios.items():
+        if len(result.findings) > 1 and names[0]:
+            yield "scenario", listing(names)
+        if expected != before:
+            yield "expected", expected
+        yield "observed", observed
+        before = expected
+
+
+def _advised(advice: Sequence[str]) -> Iterator[tuple[str, str]]:
+    for number, text in enumerate(advice):
         yield words.ADVICE[min(number, 1)], text
-    for place in finding.evidence.places:
-        yield "where", one_line(str(place))
-    if finding.evidence.log:
+
+
+def _evidence(items: Sequence[ScenarioFinding]) -> Iterator[tuple[str, str]]:
+    """Places of all scenarios, and what the first of them printed."""
+    for place in dict.fromkeys(str(p) for item in items for p in item.finding.evidence.places):
+        yield "where", one_line(place)
+    log = next((item.finding.evidence.log for item in items if item.finding.evidence.log), ())
+    if log:
         # Marks under a part of the line above mean nothing where that line is wrapped.
-        lines = [line for line in finding.evidence.log if line.strip(" ^~")]
+        lines = [line for line in log if line.strip(" ^~")]
         yield "printed", "\n".join(lines[-_LOG_LINES:])
 
 
@@ -203,10 +224,13 @@ def _tell_runs(console: Console, recordings: Mapping[str, Recording]) -> None:
         for run in recordings.values()
         for breach in run.breaches
     ]
+    found: dict[str, list[str]] = {}
+    for run in recordings.values():
+        for remark in remarks(run):
+            found.setdefault(remark, []).append(run.scenario)
     remarked = [
-        f"{remark} (scenario {run.scenario})"
-        for run in recordings.values()
-        for remark in remarks(run)
+        f"{remark} (scenario{'s' if len(names) > 1 else ''} {listing(names)})"
+        for remark, names in found.items()
     ]
     for title, label, texts in (
         (words.LIMITS_REACHED, "reached", reached),

@@ -131,6 +131,33 @@ Score: 3 of 3 points
     assert "Worth knowing" not in printed(sample)
 
 
+def test_what_is_the_same_in_several_scenarios_is_said_once():
+    sample = lost_points()
+    period = sample.grade.result("period")
+    [item] = period.findings
+    other = replace(item.finding, observed="a median of 310 ms")
+    findings = [
+        replace(item, scenario="near"),
+        replace(item, scenario="far", finding=other),
+        replace(item, scenario="late"),
+    ]
+    results = tuple(
+        replace(result, findings=tuple(findings)) if result is period else result
+        for result in sample.grade.results
+    )
+    text = printed(replace(sample, grade=replace(sample.grade, results=results)))
+    assert text.count("  expected  ") == text.count("  try next  ") == text.count("  where  ") == 1
+    assert text.count("  observed  ") == 2
+    assert "  scenario  near and late\n" in text and "  scenario  far\n" in text
+
+
+def test_a_remark_on_several_runs_is_told_once():
+    run = make_run(environment={"other_domains": "7"})
+    runs = {name: replace(run, scenario=name) for name in ("near", "far")}
+    text = printed(replace(full_points(), recordings=runs), 80)
+    assert "ROS domain: 7 (scenarios near and far)\n" in text
+
+
 def test_marks_below_a_line_of_a_traceback_are_left_out():
     lines = (
         "    sys.exit(load())",
