@@ -12,6 +12,7 @@ from pathlib import Path
 
 from grader import resources
 from grader.assignment.load import LoadedAssignment
+from grader.assignment.mutation import MUTANTS_FILE, REFERENCE_FOLDER
 from grader.assignment.selection import visible_part
 from grader.errors import UsageError
 from grader.report.files import write_whole
@@ -85,7 +86,7 @@ def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
 def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
     """Write the workflow that goes into a template repository.
 
-    An assignment that is not one of rosgrade's own is copied beside it.
+    An assignment that is not one of rosgrade's own is copied beside it, without its solution.
 
     Args:
         loaded: The assignment.
@@ -108,8 +109,8 @@ def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
         _refuse_hidden(loaded, "students can read the files of their repository")
         name = f".github/rosgrade/{loaded.assignment.id}"
         members = {
-            f"{name}/{path.relative_to(loaded.folder).as_posix()}": Member(path.read_bytes())
-            for path in _files(loaded.folder)
+            f"{name}/{inside}": Member(path.read_bytes())
+            for inside, path in _assignment(loaded).items()
         }
         _write_members(out, members)
     text = _read_template("github-workflow.yml")
@@ -140,12 +141,21 @@ def _rosgrade(loaded: LoadedAssignment) -> dict[str, Member]:
     for package in _PACKAGES:
         for path in _files(root / package):
             paths[path.relative_to(root).as_posix()] = path
-    for path in _files(loaded.folder):
-        inside = path.relative_to(loaded.folder).as_posix()
+    for inside, path in _assignment(loaded).items():
         paths[f"assignments/{loaded.assignment.id}/{inside}"] = path
     return {
         f"{_OWN_FOLDER}/{name}": Member(path.read_bytes(), path.stat().st_mode & 0o100 != 0)
         for name, path in sorted(paths.items())
+    }
+
+
+def _assignment(loaded: LoadedAssignment) -> dict[str, Path]:
+    """What grading needs of an assignment: neither its solution nor what tells of it."""
+    found = {path.relative_to(loaded.folder): path for path in _files(loaded.folder)}
+    return {
+        inside.as_posix(): path
+        for inside, path in found.items()
+        if inside.parts[0] not in (REFERENCE_FOLDER, MUTANTS_FILE)
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -136,6 +137,19 @@ def test_the_workflow_gives_the_action_only_inputs_that_it_has(loaded, tmp_path)
     assert required <= set(given)
 
 
+def test_every_action_runs_on_a_node_that_github_still_has():
+    # The first versions on Node 24; GitHub took Node 20 from its runners in September 2026.
+    first = {"checkout": 5, "setup-python": 6, "cache": 5, "upload-artifact": 6}
+    files = ("action.yml", ".github/workflows/test.yml", "templates/export/github-workflow.yml")
+    used = [
+        found
+        for file in files
+        for found in re.findall(r"uses: actions/([\w-]+)@v(\d+)\n", (ROOT / file).read_text())
+    ]
+    assert {name for name, _ in used} == set(first)
+    assert [(name, number) for name, number in used if int(number) < first[name]] == []
+
+
 def test_no_input_of_the_action_reaches_a_shell_as_text():
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     scripts = [step["run"] for step in action["runs"]["steps"] if "run" in step]
@@ -149,6 +163,24 @@ def test_an_assignment_of_the_course_is_copied_into_the_repository(tmp_path):
     assert "assignment: .github/rosgrade/lesson\n" in file.read_text()
     copy = tmp_path / "repo" / ".github" / "rosgrade" / "lesson"
     assert load_assignment(copy).sha256 == load_assignment(tmp_path / "lesson").sha256
+
+
+@pytest.mark.parametrize("kind", ["github", "classroom50", "gradescope"])
+def test_the_solution_does_not_go_where_submissions_are_graded(tmp_path, kind):
+    loaded = lesson(tmp_path)
+    (loaded.folder / "reference" / "bot").mkdir(parents=True)
+    for name in ("reference/bot/bot.py", "mutants.yaml"):
+        (loaded.folder / name).write_text("solution = 'zq'", encoding="utf-8")
+    out = tmp_path / "out"
+    if kind == "github":
+        export.github(loaded, out, "c/r@v1")
+    elif kind == "classroom50":
+        export.classroom50(loaded, out)
+    else:
+        zipfile.ZipFile(export.gradescope(loaded, out)).extractall(out)
+    files = [path for path in out.rglob("*") if path.is_file() and path.suffix != ".zip"]
+    assert [path for path in files if path.name == "assignment.yaml"]
+    assert not [path for path in files if b"'zq'" in path.read_bytes()]
 
 
 @pytest.mark.parametrize("kind", ["github", "classroom50"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Scenario
+from grader.assignment.model import Scenario, Visibility
 from grader.assignment.mutant import Mutant
 from grader.assignment.stimulus import Join, Publish
 from grader.nearest import did_you_mean
@@ -19,6 +19,7 @@ def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterat
         mutants: Its mutants, or None where it has no such file.
     """
     yield from _unknown_topics(loaded)
+    yield from _shown_runs(loaded)
     if mutants is None:
         yield "there is no mutants.yaml: nothing shows that the checks notice mistakes"
         return
@@ -44,6 +45,22 @@ def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
                         f"the check {bound.spec.id!r} is about {topic!r}, which the scenario "
                         f"{scenario.id!r} neither records nor sends.{did_you_mean(topic, known)}"
                     )
+
+
+def _shown_runs(loaded: LoadedAssignment) -> Iterator[str]:
+    """Runs that are named for hidden checks alone, but that a visible check judges unnamed."""
+    visible = [b for b in loaded.checks if b.spec.visibility is Visibility.VISIBLE]
+    hidden = [b for b in loaded.checks if b.spec.visibility is not Visibility.VISIBLE]
+    named = {scenario for bound in visible for scenario in bound.spec.scenarios}
+    meant = {scenario for bound in hidden for scenario in bound.spec.scenarios} - named
+    for bound in visible:
+        for scenario in loaded.scenarios_of(bound):
+            if scenario.id in meant:
+                yield (
+                    f"students see the run of the scenario {scenario.id!r}, which only hidden "
+                    f"checks name: the visible check {bound.spec.id!r} names no scenarios, and so "
+                    "judges all"
+                )
 
 
 def _topics(scenario: Scenario) -> set[str]:

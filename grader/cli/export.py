@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.console import output_console, print_error
+from grader.cli.console import output_console, print_error, print_warning
 from grader.cli.options import AssignmentName
 
 Assignment = AssignmentName
@@ -97,6 +97,8 @@ def canvas(
     filled = canvas_csv(read_results(out), read_canvas(text, str(canvas)), column)
     write_whole(output, filled.text)
     _say(f"{output}: {filled.filled} scores")
+    for doubt in filled.doubts:
+        print_warning(doubt)
     for problem in filled.problems:
         print_error(problem)
     if filled.problems:

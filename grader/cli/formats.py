@@ -122,10 +122,10 @@ class Formats:
             xunit1 = self.junit_family is JunitFamily.XUNIT1
             write_whole(self.junit, render_junit(result, xunit1=xunit1))
         if self.markdown is not None:
-            from grader.report.markdown import render_markdown
+            from grader.report.markdown import COMMENT_BYTES, render_markdown
             from grader.report.student import for_student
 
-            write_whole(self.markdown, render_markdown(for_student(result)))
+            write_whole(self.markdown, render_markdown(for_student(result), COMMENT_BYTES))
         if self.gradescope is not None:
             from grader.report.gradescope import render_gradescope
 

@@ -16,7 +16,7 @@ from typing import Any
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
 from grader.report import words
-from grader.report.markdown import render_markdown
+from grader.report.markdown import COMMENT_BYTES, render_markdown
 from grader.report.result_model import Result
 from grader.report.student import for_student
 
@@ -88,7 +88,8 @@ def render_result(result: Result, identity: Mapping[str, str], committed: str) -
 def render_release(result: Result) -> str:
     """Render ``release-body.md``, which students read."""
     copy = for_student(result)
-    text = render_markdown(copy)
+    # A release may be twice as long, but its reader wants no more than the reader of a comment.
+    text = render_markdown(copy, COMMENT_BYTES)
     factor = whole_factor(copy)
     if factor == 1:
         return text

@@ -97,8 +97,13 @@ def where(place: PlacePart) -> str:
 
 
 def plain(check: CheckPart) -> str:
-    """:func:`explain` as text, a line for each."""
-    return "\n".join(f"{row.name}: {row.text}" for row in explain(check))
+    """:func:`explain` as text, a line for each; several lines stand below their name."""
+    return "\n".join(_told(row) for row in explain(check))
+
+
+def _told(row: Row) -> str:
+    gap = "\n" if "\n" in row.text else " "
+    return f"{row.name}:{gap}{row.text}"
 
 
 def points(check: CheckPart) -> str:

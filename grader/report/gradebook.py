@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.checks.finding import Status
@@ -20,7 +20,8 @@ from grader.report import words
 from grader.report.clean import one_line
 from grader.report.result_model import Result
 
-_FORMULA = ("=", "+", "-", "@")
+# Some spreadsheets take the wide forms of East Asian keyboards for the same.
+_FORMULA = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")
 # Canvas takes columns that are called so for its own totals, and drops them without a word.
 _DROPPED = re.compile(
     r"(Current|Final) (Score|Points|Grade)|Override (Score|Grade|Status)|[Ff]inal", re.ASCII
@@ -39,12 +40,16 @@ class CanvasExport:
     Attributes:
         identity: Headers of the columns that say who a student is.
         columns: Headers of the other columns.
+        points: What it says of the points of each of them: a number, ``(read only)``, or nothing.
         students: Their identity cells, a row each.
+        excused: For each of these rows, the columns that Canvas excuses the student from.
     """
 
     identity: tuple[str, ...]
     columns: tuple[str, ...]
+    points: Mapping[str, str]
     students: tuple[tuple[str, ...], ...]
+    excused: tuple[frozenset[str], ...]
 
 
 @dataclass(frozen=True)
@@ -55,11 +60,13 @@ class CanvasFile:
         text: CSV.
         filled: Students with a score.
         problems: What an instructor must know: who could not be matched, who is not graded.
+        doubts: What may be meant so: that Canvas counts other points.
     """
 
     text: str
     filled: int
     problems: tuple[str, ...]
+    doubts: tuple[str, ...]
 
 
 def plain_csv(results: Sequence[Result]) -> str:
@@ -117,8 +124,17 @@ def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
     end = next((n + 1 for n, title in enumerate(header) if "Section" in title), 0)
     identity = tuple(header[:end])
     _check_identity(identity, name)
-    students = [tuple(row[:end]) for row in rows[1:] if len(row) >= end and not _is_points(row[0])]
-    return CanvasExport(identity, tuple(header[end:]), tuple(students))
+    columns = tuple(header[end:])
+    said = next((row[end:] for row in rows[1:] if _is_points(row[0])), [])
+    points = {title: text.strip() for title, text in zip(columns, said, strict=False)}
+    body = [row for row in rows[1:] if len(row) >= end and not _is_points(row[0])]
+    return CanvasExport(
+        identity,
+        columns,
+        points,
+        students=tuple(tuple(row[:end]) for row in body),
+        excused=tuple(frozenset(_excused(columns, row[end:])) for row in body),
+    )
 
 
 def canvas_csv(
@@ -133,14 +149,23 @@ def canvas_csv(
             title of the column that the export has for the assignment's id.
 
     Raises:
-        UsageError: Canvas would drop the column, or no result fits a student.
+        UsageError: Canvas would drop the column or skip it, or no result fits a student.
     """
     assignment = _one_assignment(results)
     title = _column(export, column or assignment)
+    ours = max(result.max_score for result in results)
+    # Canvas takes this row for a change of the assignment, so what it says itself is kept.
+    points = export.points.get(title) or words.number(ours)
     rows = [
         [*export.identity, title],
-        [f"    {_POINTS_POSSIBLE}", *[""] * (len(export.identity) - 1), _most(results)],
+        [f"    {_POINTS_POSSIBLE}", *[""] * (len(export.identity) - 1), points],
     ]
+    doubts: tuple[str, ...] = ()
+    if _value(points) != ours:
+        doubts = (
+            f"{title} has {points} points in Canvas and {words.number(ours)} here; the scores are "
+            "filled in as they are",
+        )
     problems: list[str] = []
     taken: dict[int, str] = {}
     for result in results:
@@ -153,6 +178,8 @@ def canvas_csv(
             problems.append(f"{who}: the same student as {taken[found[0]]}, left out")
         elif result.score is None:
             problems.append(f"{who}: not graded, so the cell is left as it is")
+        elif title in export.excused[found[0]]:
+            problems.append(f"{who}: excused in Canvas, so the cell is left as it is")
         else:
             taken[found[0]] = who
             name, *rest = export.students[found[0]]
@@ -160,7 +187,7 @@ def canvas_csv(
             rows.append([cell(name), *rest[:-1], cell(rest[-1]), _score(result)])
     if not taken:
         raise UsageError("\n".join(["no score could be filled in:", *problems]))
-    return CanvasFile(_csv(rows), len(taken), tuple(problems))
+    return CanvasFile(_csv(rows), len(taken), tuple(problems), doubts)
 
 
 def cell(text: str) -> str:
@@ -176,8 +203,19 @@ def _score(result: Result) -> str:
     return "" if result.score is None else words.number(result.score)
 
 
-def _most(results: Iterable[Result]) -> str:
-    return words.number(max(result.max_score for result in results))
+def _excused(columns: Sequence[str], cells: Sequence[str]) -> Iterator[str]:
+    for title, text in zip(columns, cells, strict=False):
+        if text.strip().casefold() == "ex":
+            yield title
+
+
+def _value(number: str) -> float | None:
+    """A number as Canvas reads it: the last mark is the decimal one; None where it is none."""
+    *whole, last = re.split("[.,]", number)
+    try:
+        return float(f"{''.join(whole)}.{last}" if whole else last)
+    except ValueError:
+        return None
 
 
 def _one_assignment(results: Sequence[Result]) -> str:
@@ -228,6 +266,8 @@ def _column(export: CanvasExport, wanted: str) -> str:
             f"Canvas drops a column called {title!r} without a word, because it has "
             f"{dropped[0]!r} in it, as its own totals: give the assignment another title there"
         )
+    if re.search(r"read\s+only", export.points.get(title, "")):
+        raise UsageError(f"Canvas skips the column {title!r}: nobody may change it there")
     return title
 
 

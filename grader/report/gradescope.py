@@ -59,6 +59,8 @@ def render_gradescope(result: Result, metadata: Mapping[str, Any] | None = None)
         "rosgrade_version": result.rosgrade_version,
         "assignment_sha256": result.assignment.sha256,
         "submission_sha256": result.submission.sha256,
+        # Whether there is one is up to Gradescope's container, and staff see it nowhere else.
+        "sandbox": result.environment.get("sandbox"),
     }
     if metadata is not None:
         extra["created_at"] = metadata.get("created_at")

@@ -91,8 +91,8 @@ def _properties(parent: ET.Element, values: dict[str, str]) -> None:
 
 
 def _case(suite: ET.Element, result: Result, check: CheckPart, *, xunit1: bool) -> None:
-    group = check.scenario or "submission"
-    attributes = {"classname": one_line(f"{result.assignment.id}.{group}"), "name": check.id}
+    # What compares two runs knows a test by these two, so they say nothing of how it ended.
+    attributes = {"classname": result.assignment.id, "name": check.id}
     place = next(iter(check.evidence.places), None)
     if xunit1 and place is not None:
         attributes["file"] = one_line(place.file)

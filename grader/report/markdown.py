@@ -1,7 +1,7 @@
 """A result as GitHub-flavoured Markdown: for a comment, a job summary, a release.
 
-What a student chose is text and never markup: no heading, image, table, HTML or mention can
-be made from it.
+What a student chose is text and never markup: no heading, image, link, table, HTML, mention or
+reference to an issue can be made from it.
 """
 
 from __future__ import annotations
@@ -16,9 +16,14 @@ from grader.report.result_model import CheckPart, Result
 
 # Within a word an underscore is no markup; names would be hard to read with it escaped.
 _MARKUP = re.compile(r"[\\`*\[\]~|$]|(?<![^\W_])_|_(?![^\W_])")
+# GitHub makes links of bare addresses; escaped they show the same, and can be copied.
+_ADDRESS = re.compile(r":(?=//)|(?<=www)\.", re.IGNORECASE)
 _HTML = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
-_MENTION = re.compile(r"@(?=\w)")
+_CALL = re.compile(r"@(?=\w)|#(?=\d)|\bGH-(?=\d)", re.IGNORECASE)
+COMMENT_BYTES = 65_536
+"""Longest comment: GitHub refuses more characters, and none has less than a byte."""
 _LOG_LINES = 12
+_LINE_CHARACTERS = 500
 _CELL_BAR = "\\|"
 _MORE = "… the rest is in the report.\n"
 
@@ -68,8 +73,9 @@ def prose(text: str, *, cell: bool = False) -> str:
 def literal(text: str) -> str:
     """Text in one line that shows as it is."""
     escaped = _MARKUP.sub(lambda match: f"\\{match[0]}", one_line(text)).translate(_HTML)
-    # A word joiner is not seen, and nobody is called.
-    return _MENTION.sub("@\N{WORD JOINER}", escaped)
+    escaped = _ADDRESS.sub(lambda match: f"\\{match[0]}", escaped)
+    # A word joiner is not seen, and nobody and no issue is called.
+    return _CALL.sub(lambda match: f"{match[0]}\N{WORD JOINER}", escaped)
 
 
 def fence(text: str) -> str:
@@ -85,10 +91,15 @@ def explained(check: CheckPart) -> str:
     lines: list[str] = []
     for row in explanation.explain(check):
         if row.name == "printed":
-            lines += ["", fence("\n".join(row.text.splitlines()[-_LOG_LINES:])), ""]
+            printed = [_cut(line) for line in row.text.splitlines()[-_LOG_LINES:]]
+            lines += ["", fence("\n".join(printed)), ""]
         else:
             lines.append(f"- **{row.name}:** {prose(row.text)}")
     return "\n".join(lines).strip("\n")
+
+
+def _cut(line: str) -> str:
+    return line if len(line) <= _LINE_CHARACTERS else f"{line[: _LINE_CHARACTERS - 1]}…"
 
 
 def _head(result: Result) -> str:

@@ -14,8 +14,9 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
@@ -39,7 +40,8 @@ from grader.run.type_support import add_type_support
 NAME = "rosgrade_replay"
 _TICK_S = 0.01
 _DEPTH = 1000
-_SHOWN_EVERY_S = 0.2
+_MOST_SHOWN = 10
+"""Messages of a topic within a second; a burst is worth reading, a stream is not."""
 _TERMINATE_S = 2.0
 # The observation may have ended with the very answer to the last input.
 _AFTERMATH_S = 0.5
@@ -80,11 +82,12 @@ class Printer:
 
 @dataclass
 class Heard:
-    """What came on a topic, and how much of it was shown."""
+    """What came on a topic, how much of it was shown, and when the last of that."""
 
     count: int = 0
     shown: int = 0
-    shown_s: float = float("-inf")
+    shown_s: deque[float] = field(default_factory=lambda: deque(maxlen=_MOST_SHOWN))
+    last: Any = None
 
 
 class Player:
@@ -143,6 +146,8 @@ class Player:
             status = end.status
         self._stop()
         for topic, heard in sorted(self._heard.items()):
+            if heard.shown < heard.count:
+                self._tell(topic, heard)
             self._printer.say("rosgrade", f"{heard.count} messages on {topic}")
         return status
 
@@ -169,13 +174,17 @@ class Player:
     def _show(self, topic: str, message: Any) -> None:
         heard = self._heard[topic]
         heard.count += 1
+        heard.last = message
         now = time.monotonic()
-        if now - heard.shown_s < _SHOWN_EVERY_S:
-            return
+        if len(heard.shown_s) < _MOST_SHOWN or now - heard.shown_s[0] > 1.0:
+            heard.shown_s.append(now)
+            self._tell(topic, heard)
+
+    def _tell(self, topic: str, heard: Heard) -> None:
         left_out = heard.count - heard.shown - 1
         more = f"   ({left_out} more before it)" if left_out else ""
-        heard.shown, heard.shown_s = heard.count, now
-        self._printer.say(topic, f"{_written(plain(message))}{more}")
+        heard.shown = heard.count
+        self._printer.say(topic, f"{_written(plain(heard.last))}{more}")
 
     def _launch(self) -> None:
         environment = {**self._order.environment, "ROS_DOMAIN_ID": str(self._domain_id)}

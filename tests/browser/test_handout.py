@@ -26,6 +26,9 @@ def test_a_handout_is_accessible_quiet_and_fits(look, width, scheme):
     assert found.complaints == [] and found.requests == []
     wide = "document.documentElement.scrollWidth > document.documentElement.clientWidth"
     assert not found.page.evaluate(wide)
+    box = found.page.locator("article").bounding_box()
+    assert box["width"] > 0.6 * width
+    assert abs(box["x"] + box["width"] / 2 - width / 2) < 0.02 * width
 
 
 def test_the_page_of_a_watched_submission_follows_by_itself(

@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from mcap.reader import make_reader
 
 from grader.report.result import make_result, result_json
 from tests.cli.conftest import ROOT, Rosgrade
@@ -60,6 +62,17 @@ def lesson(folder: Path) -> Path:
     return place
 
 
+def recorded(file: Path) -> Iterator[str]:
+    """All facts of a recording, whose file is compressed."""
+    with file.open("rb") as stream:
+        reader = make_reader(stream)
+        for _, channel, message in reader.iter_messages():
+            if channel.message_encoding == "json":
+                yield f"{channel.topic} {message.data.decode()}"
+        yield from (attachment.data.decode() for attachment in reader.iter_attachments())
+        yield from (str(metadata) for metadata in reader.iter_metadata())
+
+
 @pytest.mark.ros
 def test_a_student_s_run_announces_what_is_hidden_and_leaks_nothing(
     rosgrade: Rosgrade, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -95,8 +108,11 @@ def test_a_student_s_run_announces_what_is_hidden_and_leaks_nothing(
     assert "## lesson: 1 of 3 points" in (tmp_path / "summary.md").read_text(encoding="utf-8")
     texts = [ended.stdout, ended.stderr]
     for file in [*report.rglob("*"), *files.values(), tmp_path / "summary.md", tmp_path / "output"]:
-        if file.is_file() and "install" not in file.parts:
+        if file.suffix == ".mcap":
+            texts += recorded(file)
+        elif file.is_file() and "install" not in file.parts:
             texts.append(file.read_bytes().decode(errors="replace"))
+    assert any("/rosgrade/endpoints" in text and "/cmd_vel" in text for text in texts)
     assert not [text for text in texts if "zq" in text]
 
     again = rosgrade("report", report, place, "--junit", tmp_path / "again.xml")

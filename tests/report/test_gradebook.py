@@ -20,8 +20,8 @@ EXPORT = """\
 Student,ID,SIS User ID,SIS Login ID,Section,ROS 2 Publisher (48211),Final Score
     Points Possible,,,,,10,(read only)
 "Lopez, Ana",90211,s1001,alopez,Sec 1,9.5,14
-"Ng, Wei",90212,s1002,wng,"Sec 1, =x",EX,
-"Ng, Wei",90213,s1003,wng2,Sec 2,,
+"Ng, Wei",90212,s1002,wng,"Sec 1, =x",,
+"Ng, Wei",90213,s1003,wng2,Sec 2,EX,
 "Student, Test",90300,,,Sec 1,,
 """
 
@@ -81,8 +81,25 @@ def test_identity_is_kept_and_others_are_not_touched():
     filled = fill([result("90212")])
     header, points, student = rows(filled.text)
     assert header == [*EXPORT.splitlines()[0].split(",")[:5], "ROS 2 Publisher (48211)"]
-    assert points == ["    Points Possible", "", "", "", "", "3"]
+    assert points == ["    Points Possible", "", "", "", "", "10"]
     assert student == ["Ng, Wei", "90212", "s1002", "wng", "Sec 1, =x", "3"]
+
+
+def test_the_points_of_canvas_are_kept_and_others_are_told():
+    # With another number in this row Canvas changes the assignment.
+    filled = fill([result("90212")], EXPORT)
+    assert rows(filled.text)[1][-1] == "10"
+    assert filled.doubts == (
+        "ROS 2 Publisher (48211) has 10 points in Canvas and 3 here; the scores are filled in as "
+        "they are",
+    )
+    assert fill([result("90212")], EXPORT.replace(",10,", ',"3,00",')).doubts == ()
+
+
+def test_a_column_that_canvas_would_skip_is_refused():
+    locked = EXPORT.replace(",10,", ",(read only),")
+    with pytest.raises(UsageError, match=r"Canvas skips the column 'ROS 2 Publisher \(48211\)'"):
+        fill([result("90212")], locked)
 
 
 def test_whoever_has_no_score_is_listed_with_the_reason():
@@ -93,6 +110,7 @@ def test_whoever_has_no_score_is_listed_with_the_reason():
             result("nobody"),
             result("Ng, Wei"),
             result("alopez"),
+            result("90213"),
         ]
     )
     assert canvas_reads(filled.text) == {"90211": {"ROS 2 Publisher (48211)": "3.02"}}
@@ -101,6 +119,7 @@ def test_whoever_has_no_score_is_listed_with_the_reason():
         "nobody: not matched, no student of that name or number in the gradebook",
         "Ng, Wei: not matched, several students in the gradebook",
         "alopez: the same student as 90211, left out",
+        "90213: excused in Canvas, so the cell is left as it is",
     )
 
 
@@ -124,7 +143,7 @@ def test_a_title_that_canvas_would_drop_is_refused(title):
 
 
 def test_a_title_that_stands_twice_must_be_named_whole():
-    twice = EXPORT.replace("Final Score", "ROS 2 Publisher (5)")
+    twice = EXPORT.replace("Final Score", "ROS 2 Publisher (5)").replace("(read only)", "10")
     with pytest.raises(UsageError, match=r"several times: .*\(48211\), ROS 2 Publisher \(5\)"):
         fill([result("90211")], twice)
     assert fill([result("90211")], twice, "ROS 2 Publisher (5)").filled == 1
@@ -204,6 +223,7 @@ def test_results_of_two_assignments_are_not_mixed():
 @given(st.text(max_size=20))
 def test_no_cell_is_a_formula(text):
     assert not cell(text).lstrip().startswith(("=", "+", "-", "@"))
+    assert not cell(f"\N{FULLWIDTH EQUALS SIGN}{text}").startswith("\N{FULLWIDTH EQUALS SIGN}")
     loaded = make_loaded([Told("a")])
     found = make_result(
         grade(loaded, make_submission(id=text), {"listen": make_recording()}), {}, make_facts()

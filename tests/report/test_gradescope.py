@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -107,6 +108,12 @@ def test_scores_and_whose_test_it_is():
     assert tests["builds"]["status"] == "passed"
     assert [test["number"] for test in data["tests"]] == ["1", "2", "3", "4"]
     assert sum(test["score"] for test in data["tests"]) == pytest.approx(data["score"])
+
+
+def test_staff_can_see_whether_there_was_a_sandbox():
+    facts = make_facts(environment={"sandbox": "none"})
+    data = rendered(lambda: replace(full_points(), facts=facts))
+    assert data["extra_data"]["sandbox"] == "none"
 
 
 @pytest.mark.parametrize("visibility", ["visible", "after_due_date", "after_published", "hidden"])

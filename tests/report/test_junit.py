@@ -11,12 +11,18 @@ from xml.etree import ElementTree as ET
 import pytest
 import xmlschema
 
+from grader.checks.finding import Evidence, Finding
+from grader.grade import grade
 from grader.report.junit import render_junit
 from grader.report.result import make_result
+from tests.grade.sample import Told, make_loaded, make_submission
 from tests.report.sample import (
+    Sample,
     everywhere,
     full_points,
     lost_points,
+    make_facts,
+    make_run,
     not_built,
     not_graded,
     reached_limits,
@@ -86,6 +92,23 @@ def test_a_failure_says_what_to_try():
     )
     assert "try next: The period grows with the work in the callback." in failure.text
     assert "where: src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)" in failure.text
+
+
+def test_what_was_printed_keeps_its_lines_below_one_another():
+    printed = Evidence(log=("Traceback:", "    node.spin()", "    ^^^^"))
+    recordings = {"listen": make_run()}
+    checks = [Told("alive", Finding.failed("e", "o", "h", printed))]
+    found = grade(make_loaded(checks), make_submission(), recordings)
+    text = rendered(lambda: Sample(found, recordings, make_facts()))
+    failure = next(ET.fromstring(text).iter("failure"))
+    assert "\nprinted:\nTraceback:\n    node.spin()\n    ^^^^" in failure.text
+
+
+def test_a_check_is_the_same_test_however_it_ends():
+    (suite,) = ET.fromstring(rendered(lost_points))
+    ended = {"passed" if not len(case) else case[0].tag for case in suite.iter("testcase")}
+    assert ended == {"passed", "failure", "skipped"}
+    assert {case.get("classname") for case in suite.iter("testcase")} == {"timed_publisher"}
 
 
 def test_points_are_properties_of_the_suite():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -9,14 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
+from grader.checks.finding import Evidence, Finding
+from grader.grade import grade
 from grader.recording.model import Breach
-from grader.report.markdown import fence, literal, prose, render_markdown
+from grader.report.markdown import COMMENT_BYTES, fence, literal, prose, render_markdown
 from grader.report.result import make_result
+from tests.grade.sample import Told, make_loaded, make_submission
 from tests.report.sample import (
     at,
     everywhere,
     full_points,
     lost_points,
+    make_facts,
     make_run,
     not_built,
     not_graded,
@@ -92,14 +97,35 @@ def test_a_literal_text_shows_as_it_is(text):
     assert shown(f"- {literal(line)}").replace("\N{WORD JOINER}", "") == line
 
 
-def test_nobody_is_called():
+def test_nobody_and_no_issue_is_called():
     assert "@ada" not in literal("ask @ada or ada@example.org")
+    assert not re.search(r"#\d|GH-\d", literal("#1, ros2/rclpy#983 and GH-7"))
+
+
+@pytest.mark.parametrize(
+    "text", ["see https://e.org/login", "FTP://e.org", "www.e.org", "WWW.e.org"]
+)
+def test_an_address_is_no_link_and_shows_as_it_is(text):
+    # As GitHub's autolink extension finds them: a bare scheme with "://", or "www.".
+    assert not re.search(r"(https?|ftp)://|www\.", literal(text), re.IGNORECASE)
+    assert shown(f"- {literal(text)}") == text
 
 
 def test_code_is_code_and_an_unpaired_tick_is_a_tick():
     assert prose("call `spin(node)` now") == "call `spin(node)` now"
     assert "code_inline" not in kinds(prose("a ` tick"))
     assert prose("`a|b`", cell=True) == "`a\\|b`"
+
+
+def test_a_comment_fits_and_still_says_why_however_much_was_printed():
+    long = Finding.failed("e", "it died", "h", Evidence(log=("z" * 16_000,) * 30))
+    checks = [Told(f"c{number}", long) for number in range(10)]
+    recordings = {"listen": make_run()}
+    found = grade(make_loaded(checks), make_submission(), recordings)
+    text = render_markdown(make_result(found, recordings, make_facts()), COMMENT_BYTES)
+    assert len(text.encode()) <= COMMENT_BYTES
+    assert text.count("- **observed:** it died") >= 9
+    assert "z…" in text
 
 
 @settings(deadline=None)
