@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
-from grader.batch.crew import Crew
+from grader.batch.crew import Crew, CrewLost
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.intake import HandedIn
@@ -104,6 +104,9 @@ class Batch:
 
         Yields:
             Every row, in the order in which they are finished; at first those that were.
+
+        Raises:
+            CrewLost: There is nobody any more who could grade the others.
         """
         for key, entry in self._entries.items():
             if key not in to_do and not entry.same_as:
@@ -134,7 +137,9 @@ class Batch:
         result = self.ledger.result(key)
         if result is None or result.submission.sha256 != self._entries[key].sha256:
             return False
-        if key in self.retry or RETRY_ALL in self.retry:
+        # Of the same submissions only one is graded, whichever of them was named.
+        same = {twin.key for twin in self._entries.values() if twin.same_as == key}
+        if RETRY_ALL in self.retry or not self.retry.isdisjoint({key, *same}):
             return False
         if RETRY_ERRORS in self.retry and not result.graded:
             return False
@@ -150,6 +155,8 @@ class Batch:
         try:
             future.result()
             self.ledger.put(key, partial)
+        except CrewLost:
+            raise
         except Exception as error:
             self._entries[key] = self._with_fault(self._entries[key], error)
 
@@ -168,9 +175,10 @@ class Batch:
         result = None if entry.fault else self.ledger.result(key)
         yield Done(entry, result, fresh)
         for twin in [item for item in self._entries.values() if item.same_as == key]:
+            told = self._entries[twin.key] = replace(twin, fault=entry.fault)
             if result is not None:
                 self._copy(key, twin)
-            yield Done(twin, self.ledger.result(twin.key) if result else None, fresh)
+            yield Done(told, self.ledger.result(twin.key) if result else None, fresh)
 
     def _copy(self, key: str, twin: Entry) -> None:
         """Give the same submission of somebody else the same result, under its own name."""

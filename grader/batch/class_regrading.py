@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from grader.assignment.load import LoadedAssignment
 from grader.batch.batch import Done
-from grader.batch.files import write_graded
+from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
 from grader.batch.regrading import compare, find, regrade
 from grader.errors import RosgradeError
@@ -76,6 +76,6 @@ def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Res
     graded = regrade(loaded, found)
     changes = tuple(compare(before, graded.grade))
     if changes or before.assignment.sha256 != loaded.sha256:
-        keep_earlier(folder)
+        keep_earlier(folder / RESULT_FILE)
         write_graded(graded, folder, Clock())
     return Regraded(Done(entry, ledger.result(entry.key), fresh=True), before, changes)

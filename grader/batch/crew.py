@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,17 +16,22 @@ _EACH_WORKER = 2
 """Submissions on their way to a thread of a worker: one is graded, one waits."""
 
 
+class CrewLost(GraderFault):
+    """Nobody is left to grade what was handed over, nor anything else."""
+
+
 class Crew(Protocol):
-    """Grades submissions.
+    """Grades submissions."""
 
-    Attributes:
-        capacity: So many are worth handing over at once.
-    """
-
-    capacity: int
+    @property
+    def capacity(self) -> int:
+        """So many are worth handing over at once, as things are now; at least one."""
 
     def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
-        """Grade what is at a path, and leave report, result and recordings in a folder."""
+        """Grade what is at a path, and leave report, result and recordings in a folder.
+
+        A future that ends with :class:`CrewLost` says nothing of its submission.
+        """
 
     def close(self) -> None:
         """End what is being graded and let nothing of it run on."""
@@ -87,12 +93,27 @@ class DaskCrew:
             self._client = connect(address, timeout=_CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise UsageError(f"no Dask scheduler answers at {address}: {error}") from error
-        threads = sum(self._client.nthreads().values())
-        if not threads:
+        # That a scheduler is lost is told by us, and without Dask's tracebacks.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+        self._order = order
+        self._address = address
+        if not self._threads():
             self._client.close()
             raise UsageError(f"the Dask scheduler at {address} has no workers")
-        self.capacity = _EACH_WORKER * threads
-        self._order = order
+
+    @property
+    def capacity(self) -> int:
+        """See :class:`Crew`; workers come and go."""
+        return max(1, _EACH_WORKER * self._threads())
+
+    def _threads(self) -> int:
+        try:
+            return sum(self._client.nthreads().values())
+        except OSError:
+            return 0
+
+    def _lost(self) -> CrewLost:
+        return CrewLost(f"the Dask scheduler at {self._address} was lost")
 
     def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
         """See :class:`Crew`."""
@@ -102,9 +123,19 @@ class DaskCrew:
         except RosgradeError as error:
             done.set_exception(error)
             return done
-        task = self._client.submit(grade_remotely, self._order, parcel, pure=False, retries=2)
+        try:
+            task = self._client.submit(grade_remotely, self._order, parcel, pure=False, retries=2)
+        except Exception:
+            # Dask closes a client that has waited in vain for its scheduler to come back.
+            if self._client.status != "closed":
+                raise
+            done.set_exception(self._lost())
+            return done
 
         def finish(finished: Any) -> None:
+            if finished.cancelled():
+                done.set_exception(self._lost())
+                return
             try:
                 unpack(finished.result(), folder)
             except GraderFault as fault:

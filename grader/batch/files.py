@@ -57,10 +57,12 @@ def write_graded(
         rosgrade_version=__version__,
         recordings={name: os.path.relpath(file, folder) for name, file in graded.files.items()},
     )
+    report = write_report(graded, folder, facts)
+    # Last: where it says what the grade is, the report beside it says the same.
     result = write_result(graded.grade, graded.recordings, facts, folder / RESULT_FILE)
     if json_file is not None:
         write_result(graded.grade, graded.recordings, facts, json_file)
-    return Written(write_report(graded, folder, facts), result)
+    return Written(report, result)
 
 
 def write_report(graded: Graded, folder: Path, facts: RunFacts) -> Path:

@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ import yaml
 from grader.batch.roster import Roster, Student, name_forms, normal
 from grader.errors import RosgradeError, UsageError
 from grader.submission.archive import SUFFIXES, unpack
-from grader.submission.listing import MANIFEST
+from grader.submission.manifest import MANIFEST
 from grader.submission.members import MIB, ArchiveLimits
 from grader.submission.paths import shown
 
@@ -28,6 +28,8 @@ _CANVAS = re.compile(
 # What Canvas adds to the name of a file that was handed in again: ws-1.zip.
 _AGAIN = re.compile(r"-\d+(?=(\.tar)?\.[^.]+$)")
 _IGNORED = ("__MACOSX",)
+# Archives that cannot be read: whoever handed one in is told so, and has a row.
+_FOREIGN = (".rar", ".7z")
 _REPOSITORY = re.compile(r"(https?|ssh|git|file)://|[\w.-]+@[\w.-]+:")
 _CLONE_LIMIT_S = 120.0
 # A class's archive holds what many students handed in.
@@ -71,7 +73,12 @@ class _Entry:
     fault: str = ""
 
 
-def take_in(source: Path, staging: Path, roster: Roster | None = None) -> list[HandedIn]:
+def take_in(
+    source: Path,
+    staging: Path,
+    roster: Roster | None = None,
+    on_left_out: Callable[[str], None] = lambda _: None,
+) -> list[HandedIn]:
     """Find out who handed in what.
 
     Args:
@@ -79,6 +86,7 @@ def take_in(source: Path, staging: Path, roster: Roster | None = None) -> list[H
             of such a folder.
         staging: An empty folder for what has to be unpacked, copied together or cloned.
         roster: Who should have handed in; without one everybody who did is a row.
+        on_left_out: Told the name of each file that is taken for no submission.
 
     Returns:
         The rows, sorted by key; those of the roster that handed in nothing are among them.
@@ -88,20 +96,23 @@ def take_in(source: Path, staging: Path, roster: Roster | None = None) -> list[H
     """
     folder = _opened(source, staging)
     _refuse_single(folder, source)
-    entries = list(_entries(folder, staging))
+    entries = list(_entries(folder, staging, on_left_out))
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected a folder or an archive of each")
     rows = _matched(entries, roster) if roster is not None else [_row(item) for item in entries]
     return _unique(rows)
 
 
-def take_in_roster(roster: Roster, base: Path, staging: Path) -> list[HandedIn]:
+def take_in_roster(
+    roster: Roster, base: Path, staging: Path, on_taken: Callable[[str], None] = lambda _: None
+) -> list[HandedIn]:
     """Take in what a roster itself names, as paths or URLs of git repositories.
 
     Args:
         roster: With a column ``submission``.
         base: Folder that its paths are relative to.
         staging: An empty folder for clones.
+        on_taken: Told the key of each row.
 
     Raises:
         UsageError: No row names a submission.
@@ -111,7 +122,11 @@ def take_in_roster(roster: Roster, base: Path, staging: Path) -> list[HandedIn]:
             "the roster names no submissions; give it a column `submission` with paths or URLs, "
             "or name the folder of submissions"
         )
-    return _unique([_from_roster(student, base, staging) for student in roster.students])
+    rows = []
+    for student in roster.students:
+        rows.append(_from_roster(student, base, staging))
+        on_taken(student.key)
+    return _unique(rows)
 
 
 def _from_roster(student: Student, base: Path, staging: Path) -> HandedIn:
@@ -124,7 +139,7 @@ def _from_roster(student: Student, base: Path, staging: Path) -> HandedIn:
         return replace(row, fault=problem) if problem else replace(row, path=target)
     path = base / student.submission
     if not path.exists():
-        return _with_problem(row, f"{shown(student.submission)} does not exist")
+        return replace(row, fault=f"{shown(student.submission)} does not exist")
     return replace(row, path=path)
 
 
@@ -149,8 +164,10 @@ def _clone(url: str, target: Path) -> str:
         return f"git clone took longer than {_CLONE_LIMIT_S:.0f} s"
     if done.returncode == 0:
         return ""
-    last = done.stderr.strip().rpartition("\n")[2]
-    return f"git clone failed: {shown(last)}"
+    # Below its reason git says what one might look at.
+    lines = done.stderr.strip().split("\n")
+    reason = next((line for line in lines if line.startswith("fatal: ")), lines[-1])
+    return f"git clone failed: {shown(reason.removeprefix('fatal: '))}"
 
 
 def _opened(source: Path, staging: Path) -> Path:
@@ -188,7 +205,7 @@ def _is_ignored(item: Path) -> bool:
     return item.name.startswith(".") or item.name in _IGNORED
 
 
-def _entries(folder: Path, staging: Path) -> Iterator[_Entry]:
+def _entries(folder: Path, staging: Path, on_left_out: Callable[[str], None]) -> Iterator[_Entry]:
     metadata = _gradescope(folder / GRADESCOPE_METADATA)
     canvas: dict[str, list[tuple[Path, re.Match[str]]]] = {}
     for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
@@ -199,15 +216,18 @@ def _entries(folder: Path, staging: Path) -> Iterator[_Entry]:
             yield _of_gradescope(item, metadata[item.name])
         elif match:
             canvas.setdefault(match["user"], []).append((item, match))
-        elif item.is_dir() or item.name.lower().endswith(SUFFIXES):
+        elif item.is_dir() or item.name.lower().endswith((*SUFFIXES, *_FOREIGN)):
             stem = _stem(item)
             yield _Entry(shown(stem), item, (stem,))
+        else:
+            on_left_out(shown(item.name))
     for files in canvas.values():
         yield _of_canvas(files, staging)
 
 
 def _stem(item: Path) -> str:
-    suffix = next((s for s in SUFFIXES if item.is_file() and item.name.lower().endswith(s)), "")
+    known = (*SUFFIXES, *_FOREIGN)
+    suffix = next((s for s in known if item.is_file() and item.name.lower().endswith(s)), "")
     return item.name[: len(item.name) - len(suffix)] or item.name
 
 

@@ -162,17 +162,16 @@ def folder_name(key: str) -> str:
     return name
 
 
-def keep_earlier(folder: Path) -> None:
-    """Keep a result beside the one that is about to replace it."""
-    file = folder / RESULT_FILE
+def keep_earlier(file: Path) -> None:
+    """Keep a file with grades beside the one that is about to replace it."""
     if file.is_file():
         stamp = datetime.fromtimestamp(file.stat().st_mtime, timezone.utc)
-        kept = folder / _EARLIER / f"result-{stamp:%Y%m%dT%H%M%S.%fZ}.json"
+        kept = file.parent / _EARLIER / f"{file.stem}-{stamp:%Y%m%dT%H%M%S.%fZ}{file.suffix}"
         write_whole(kept, file.read_bytes())
 
 
 def _carry_over(old: Path, new: Path) -> None:
-    keep_earlier(old)
+    keep_earlier(old / RESULT_FILE)
     if (old / _EARLIER).is_dir():
         shutil.copytree(old / _EARLIER, new / _EARLIER, dirs_exist_ok=True)
 

@@ -92,7 +92,8 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
         UsageError: Something is missing, or the assignment is no longer the one that was graded
             with: then only a regrade gives a report that fits.
     """
-    result = read_result(folder / RESULT_FILE)
+    found = find(folder)
+    result = found.result or read_result(folder / RESULT_FILE)
     loaded = _load(assignment or result.assignment.id)
     if loaded.sha256 != result.assignment.sha256:
         raise UsageError(
@@ -100,7 +101,7 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
             f"{folder}` judges again with it as it is now"
         )
     shown = visible_part(loaded) if result.withheld.checks else loaded
-    graded = regrade(select(shown, tuple(check.id for check in result.checks)), find(folder))
+    graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
     changed = _changed(result, graded.grade)
     if changed:
         raise UsageError(

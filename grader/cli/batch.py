@@ -64,7 +64,7 @@ def batch(
     from grader.assignment.load import load_assignment
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
-    from grader.batch.crew import DaskCrew, LocalCrew
+    from grader.batch.crew import CrewLost, DaskCrew, LocalCrew
     from grader.batch.ledger import Ledger
     from grader.batch.worker import Order, make_grading
     from grader.run.admission import Admission
@@ -81,7 +81,7 @@ def batch(
         Ledger(out).opened() as ledger,
         ClassProgress(quiet) as progress,
     ):
-        names, rows = _rows(submissions, roster, Path(staging))
+        names, rows = _rows(submissions, roster, Path(staging), progress)
         for problem in names.problems if names else ():
             progress.note(f"{roster or submissions}: {problem}")
         work = Batch(loaded, ledger, frozenset(retry or ()))
@@ -99,7 +99,7 @@ def batch(
             for item in work.grade(to_do, crew):
                 done.append(item)
                 progress.advance(item.entry.key, _said(item), fresh=item.fresh)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, CrewLost):
             progress.note(
                 f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same command "
                 "goes on with the others"
@@ -120,16 +120,21 @@ def batch(
 
 
 def _rows(
-    submissions: Path, roster: Path | None, staging: Path
+    submissions: Path, roster: Path | None, staging: Path, progress: ClassProgress
 ) -> tuple[Roster | None, list[HandedIn]]:
     from grader.batch.intake import take_in, take_in_roster
     from grader.batch.roster import read_roster
 
     if submissions.suffix.lower() == ".csv" and submissions.is_file():
         known = read_roster(submissions)
-        return known, take_in_roster(known, submissions.parent, staging)
+        progress.begin("fetching", len(known.students))
+        return known, take_in_roster(known, submissions.parent, staging, progress.advance)
     read = read_roster(roster) if roster else None
-    return read, take_in(submissions, staging, read)
+
+    def left_out(name: str) -> None:
+        progress.note(f"{name} is neither a folder nor an archive, and is left out")
+
+    return read, take_in(submissions, staging, read, left_out)
 
 
 def _at_once(jobs: str) -> int | None:

@@ -68,7 +68,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     from grader.assignment.load import load_assignment
     from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.class_regrading import regrade_class
-    from grader.batch.ledger import Ledger
+    from grader.batch.ledger import Ledger, keep_earlier
 
     console = output_console()
     began_s = time.monotonic()
@@ -79,6 +79,8 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
         for row in regrade_class(load_assignment(assignment or name), ledger):
             rows.append(row)
             progress.advance(row.done.entry.key)
+        if any(row.changes for row in rows):
+            keep_earlier(ledger.out / GRADES_FILE)
         overview = write_class([row.done for row in rows], ledger)
     for row in rows:
         for change in row.changes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import threading
@@ -132,10 +133,16 @@ def fingerprint(path: Path | str, limits: ArchiveLimits | None = None) -> str:
 
 
 def _hash(source: Path) -> str:
-    """Hash of an archive that was refused; of a folder only its name can be told."""
+    """Hash of what was refused; of a folder, names and sizes stand for what is in the files."""
     total = hashlib.sha256()
     if source.is_dir():
-        total.update(os.fsencode(source.name))
+        for folder, folders, names in os.walk(source):
+            folders.sort()
+            for path in (Path(folder, name) for name in sorted(names)):
+                total.update(os.fsencode(path.relative_to(source)))
+                # One that is gone by now is not there any more for whoever reads it next.
+                with contextlib.suppress(OSError):
+                    total.update(b"\0%d\0" % path.lstat().st_size)
     else:
         with source.open("rb") as file:
             while block := file.read(MIB):

@@ -14,7 +14,7 @@ import pytest
 from grader import resources
 from grader.assignment.load import load_assignment
 from grader.batch.batch import Batch, Done
-from grader.batch.crew import Crew, DaskCrew, LocalCrew
+from grader.batch.crew import Crew, CrewLost, DaskCrew, LocalCrew
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
 from grader.batch.worker import Order, make_grading
@@ -109,6 +109,27 @@ def test_a_worker_that_dies_loses_nothing_and_changes_nothing(
     assert all(item.result is not None for item in far)
     assert [judged(item) for item in far] == [judged(item) for item in near]
     assert {item.result.score for item in far if item.result} >= {0.0, 10.0}
+
+
+@pytest.mark.timeout(120)
+def test_a_cluster_takes_what_its_workers_can_and_is_lost_with_its_scheduler(
+    tmp_path: Path, cluster: Cluster
+) -> None:
+    order = Order(ASSIGNMENT, load_assignment(ASSIGNMENT).sha256, None, Choice.NONE)
+    crew = DaskCrew(cluster.address, order)
+    assert crew.capacity == 4
+    cluster.workers[0].kill()
+    deadline = time.monotonic() + LIMIT_S
+    while crew.capacity != 2:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    submission = tmp_path / "ana"
+    shutil.copytree(resources.reference() / ASSIGNMENT, submission)
+    on_its_way = crew.submit("ana", submission, tmp_path)
+    cluster.processes[0].kill()
+    with pytest.raises(CrewLost, match=r"the Dask scheduler at tcp://.* was lost"):
+        on_its_way.result(LIMIT_S)
+    crew.close()
 
 
 def judged(done: Done) -> tuple[str, str, str | None]:

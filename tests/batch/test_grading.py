@@ -307,6 +307,18 @@ def test_a_regrade_says_who_gains_what_and_why(
     assert lines[1] == "score: 1 -> 2 of 2"
 
 
+def test_a_result_is_replaced_only_when_its_report_is(grade: Grade, tmp_path: Path) -> None:
+    first, _ = grade(recording())
+    write_graded(first, tmp_path, Clock())
+    before = (tmp_path / RESULT_FILE).read_bytes()
+    (tmp_path / REPORT_FILE).unlink()
+    (tmp_path / REPORT_FILE).mkdir()
+    second, _ = grade(recording(stop_s=2.5))
+    with pytest.raises(UsageError, match=r"report\.html cannot be written"):
+        write_graded(second, tmp_path, Clock())
+    assert (tmp_path / RESULT_FILE).read_bytes() == before
+
+
 def test_what_cannot_be_judged_again_is_no_loss_of_points(
     grade: Grade, lesson: LoadedAssignment, tmp_path: Path
 ) -> None:

@@ -55,6 +55,25 @@ def test_folders_and_archives_are_named_after_themselves(course: Path, staging: 
     ]
 
 
+@pytest.mark.parametrize("suffix", [".rar", ".7z", ".RAR"])
+def test_an_archive_of_a_kind_that_cannot_be_read_is_a_row_all_the_same(
+    course: Path, staging: Path, suffix: str
+) -> None:
+    (course / f"ana{suffix}").write_bytes(b"Rar!")
+    (row,) = take_in(course, staging, Roster((Student(2, login="ana"),)))
+    assert (row.key, row.path) == ("ana", course / f"ana{suffix}")
+
+
+def test_files_that_are_taken_for_no_submission_are_named(course: Path, staging: Path) -> None:
+    folder(course / "ana")
+    (course / "ben.py").write_text("pass")
+    (course / ".DS_Store").write_text("")
+    (course / "__MACOSX").mkdir()
+    left_out: list[str] = []
+    take_in(course, staging, None, left_out.append)
+    assert left_out == ["ben.py"]
+
+
 def test_canvas_names_are_read(course: Path, staging: Path) -> None:
     archive(course / "lopezana_LATE_90211_1234567_workspace-2.zip")
     (course / "ngwei_90212_77_package.xml").write_text("<package/>")
@@ -188,11 +207,16 @@ def test_a_roster_may_name_paths_and_repositories(tmp_path: Path, staging: Path)
         "dee,nowhere\neli,\n",
         "roster.csv",
     )
-    rows = {row.key: row for row in take_in_roster(roster, tmp_path, staging)}
+    taken: list[str] = []
+    rows = {row.key: row for row in take_in_roster(roster, tmp_path, staging, taken.append)}
+    assert taken == ["ana", "ben", "cai", "dee", "eli"]
     assert rows["ana"].path == tmp_path / "here"
     assert rows["ben"].path is not None and (rows["ben"].path / "pkg" / "package.xml").is_file()
-    assert rows["cai"].path is None and "git clone failed" in rows["cai"].fault
-    assert rows["dee"].problem == "nowhere does not exist"
+    assert rows["cai"].path is None
+    assert rows["cai"].fault == (
+        f"git clone failed: '{tmp_path}/no' does not appear to be a git repository"
+    )
+    assert rows["dee"].path is None and rows["dee"].fault == "nowhere does not exist"
     assert rows["eli"].problem == "handed in nothing"
 
 

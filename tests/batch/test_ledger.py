@@ -8,7 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from grader.batch.ledger import BATCH_FILE, Entry, Ledger, folder_name
+from grader.batch.ledger import BATCH_FILE, Entry, Ledger, folder_name, keep_earlier
 from grader.errors import UsageError
 
 
@@ -48,6 +48,17 @@ def test_a_grade_that_is_replaced_is_kept_beside_the_new_one(tmp_path: Path) -> 
     assert (folder / "result.json").read_text() == "third"
     earlier = sorted((folder / "earlier").iterdir())
     assert [file.read_text() for file in earlier] == ["first", "second"]
+
+
+def test_a_gradebook_that_is_replaced_is_kept_beside_the_new_one(tmp_path: Path) -> None:
+    grades = tmp_path / "grades.csv"
+    keep_earlier(grades)
+    grades.write_text("before")
+    keep_earlier(grades)
+    grades.write_text("after")
+    (kept,) = (tmp_path / "earlier").iterdir()
+    assert kept.name.startswith("grades-") and kept.suffix == ".csv"
+    assert kept.read_text() == "before"
 
 
 def test_two_batches_do_not_write_to_one_folder(tmp_path: Path) -> None:

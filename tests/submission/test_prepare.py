@@ -10,7 +10,7 @@ import pytest
 from grader.errors import UsageError
 from grader.ros import RosInstallation
 from grader.submission.members import ArchiveLimits
-from grader.submission.prepare import Prepared, PrepareLimits, prepare
+from grader.submission.prepare import Prepared, PrepareLimits, fingerprint, prepare
 
 from .samples import MANIFEST, NODE, Tree, tar_bytes, tar_member, zip_bytes
 
@@ -92,3 +92,15 @@ def test_a_path_that_does_not_exist_is_a_wrong_use(
 ) -> None:
     with pytest.raises(UsageError, match="does not exist"):
         prepared(tmp_path / "nobody", named_ros)
+
+
+def test_two_folders_that_are_refused_are_not_taken_for_the_same(tmp_path: Path) -> None:
+    limits = ArchiveLimits(members=1)
+    prints = set()
+    for number in (1, 2):
+        folder = tmp_path / str(number) / "ws"
+        folder.mkdir(parents=True)
+        (folder / "a.py").write_text("x" * number)
+        (folder / "b.py").touch()
+        prints |= {fingerprint(folder, limits), fingerprint(folder, limits)}
+    assert len(prints) == 2

@@ -1,0 +1,153 @@
+"""The rows of a class: graded once each, whoever grades them and whatever becomes of it.
+
+What is handed in here cannot be built, so that nothing needs ROS.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+from pathlib import Path
+
+import pytest
+
+from grader import ros
+from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.batch.batch import Batch, Done
+from grader.batch.crew import Crew, CrewLost, LocalCrew
+from grader.batch.files import RESULT_FILE
+from grader.batch.grading import Grading
+from grader.batch.intake import take_in
+from grader.batch.ledger import Ledger
+from grader.errors import GraderFault
+from grader.run.runner import Runner
+
+YAML = """\
+rosgrade: 1
+id: lesson
+title: Test
+packages: [{name: bot, executables: [bot]}]
+scenarios:
+  - {id: run, launch: [{executable: bot}], timeout: 5 s}
+checks:
+  - {id: package, uses: package.found, with: {package: bot}, points: 1}
+"""
+
+
+class Class:
+    """A class that is graded again and again into the same folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "lesson").mkdir()
+        (folder / "lesson" / "assignment.yaml").write_text(YAML, encoding="utf-8")
+        self.loaded: LoadedAssignment = load_assignment(folder / "lesson")
+        self.ledger = Ledger(folder / "out")
+
+    def hand_in(self, name: str, content: str) -> None:
+        """A folder with one file."""
+        (self.folder / "class" / name).mkdir(parents=True)
+        (self.folder / "class" / name / "notes.txt").write_text(content)
+
+    def crew(self, jobs: int = 2) -> LocalCrew:
+        """Who can grade."""
+        runner = Runner(ros.RosInstallation("wheels", Path("python"), ()))
+        return LocalCrew(Grading(self.loaded, runner, self.folder / "cache"), jobs)
+
+    def grade(self, crew: Crew, *retry: str) -> dict[str, Done]:
+        """Run a batch to its end."""
+        with self.ledger.opened():
+            batch = Batch(self.loaded, self.ledger, frozenset(retry))
+            _, to_do = batch.read(take_in(self.folder / "class", self.folder))
+            done = {item.entry.key: item for item in batch.grade(to_do, crew)}
+        crew.close()
+        return done
+
+    def written(self) -> dict[str, int]:
+        """When each result was written."""
+        files = self.ledger.out.glob(f"submissions/*/{RESULT_FILE}")
+        return {file.parent.name: file.stat().st_mtime_ns for file in files}
+
+
+class FailingCrew:
+    """Has graded nothing when it fails."""
+
+    capacity = 1
+
+    def __init__(self, error: Exception) -> None:
+        self._error = error
+
+    def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+        """Fail."""
+        done: Future[None] = Future()
+        done.set_exception(self._error)
+        return done
+
+    def close(self) -> None:
+        """There is nothing to end."""
+
+
+@pytest.fixture
+def course(tmp_path: Path) -> Class:
+    made = Class(tmp_path)
+    made.hand_in("ana", "first")
+    made.hand_in("ben", "second")
+    made.hand_in("cai", "first")
+    return made
+
+
+@pytest.mark.parametrize("named", ["ana", "cai"])
+def test_of_the_same_submissions_either_may_be_named_to_be_graded_again(
+    course: Class, named: str
+) -> None:
+    assert not any(item.entry.fault for item in course.grade(course.crew()).values())
+    before = course.written()
+    done = course.grade(course.crew(), named)
+    assert {key for key, item in done.items() if item.fresh} == {"ana", "cai"}
+    after = course.written()
+    assert after["ana"] != before["ana"] and after["ben"] == before["ben"]
+
+
+def test_what_could_not_be_graded_is_told_on_the_row_of_its_twin_too(course: Class) -> None:
+    done = course.grade(FailingCrew(GraderFault("the disk is full")))
+    assert {key: item.entry.fault for key, item in done.items()} == dict.fromkeys(
+        ("ana", "ben", "cai"), "the disk is full"
+    )
+
+
+def test_a_lost_cluster_ends_the_batch_and_is_the_fault_of_no_row(course: Class) -> None:
+    with pytest.raises(CrewLost, match="the scheduler is gone"):
+        course.grade(FailingCrew(CrewLost("the scheduler is gone")))
+    _, entries = course.ledger.read()
+    assert not any(entry.fault for entry in entries)
+    assert not course.written()
+    assert {item.result is not None for item in course.grade(course.crew()).values()} == {True}
+
+
+def test_a_crew_that_grows_gets_more_to_do(course: Class) -> None:
+    for number in range(6):
+        course.hand_in(f"more{number}", f"{number}")
+
+    class Growing:
+        """Each time that it is asked there is one more of it; ends when all are at work."""
+
+        def __init__(self) -> None:
+            self.at_work: list[Future[None]] = []
+
+        @property
+        def capacity(self) -> int:
+            """One more than are at work."""
+            return len(self.at_work) + 1
+
+        def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
+            """Wait for the others."""
+            self.at_work.append(Future())
+            if len(self.at_work) == 8:
+                for future in self.at_work:
+                    future.set_exception(GraderFault("all at work"))
+            return self.at_work[-1]
+
+        def close(self) -> None:
+            """There is nothing to end."""
+
+    done = course.grade(Growing())
+    assert {item.entry.fault for item in done.values()} == {"all at work"}
