@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import multiprocessing
 import os
 import shutil
 import subprocess
@@ -208,11 +209,33 @@ def _robot(samples: Samples, name: str, folder: Path) -> None:
         least_s = max(_least_s(recording) for recording in graded.recordings.values())
         samples.add(f"{name}: least time of the longest scenario", least_s)
         samples.timed(f"{name}: HTML report with replays", partial(_report, graded))
+        samples.timed(
+            f"{name}: {_RENDERED} HTML reports on all CPUs", partial(_on_all_cpus, graded)
+        )
     write_graded(graded, folder / name, Clock())
     folders = [folder / name] * _RENDERED
     samples.timed(
         f"{name}: {_RENDERED} HTML reports, judged again", lambda: list(render_all(folders))
     )
+
+
+def _on_all_cpus(graded: Graded) -> None:
+    """Render reports in as many processes as there are CPUs."""
+    count = cpu_count()
+    shares = [len(range(first, _RENDERED, count)) for first in range(count)]
+    context = multiprocessing.get_context("fork")
+    workers = [context.Process(target=_reports, args=(graded, share)) for share in shares]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+        if worker.exitcode:
+            raise SystemExit(f"rendering ended with {worker.exitcode}")
+
+
+def _reports(graded: Graded, count: int) -> None:
+    for _ in range(count):
+        _report(graded)
 
 
 def _class(samples: Samples, folder: Path, _: int) -> None:

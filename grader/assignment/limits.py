@@ -59,7 +59,7 @@ class LimitOptions(_Bounds):
         description="Processes and threads together; a node of rclpy has 14 threads.",
     )
     cpu_time: Duration = Field(
-        _DEFAULTS.cpu_s, description="CPU time of one process.", validate_default=False
+        _DEFAULTS.cpu_s, description="CPU time of all processes together.", validate_default=False
     )
     file_size: Size = Field(
         _DEFAULTS.file_bytes, description="Size of one file.", validate_default=False
@@ -93,7 +93,7 @@ class BuildLimitOptions(_Bounds):
         BUILD.processes, ge=16, le=4096, description="Processes and threads together."
     )
     cpu_time: Duration = Field(
-        BUILD.cpu_s, description="CPU time of one process.", validate_default=False
+        BUILD.cpu_s, description="CPU time of all processes together.", validate_default=False
     )
     wall_time: Duration | None = Field(
         None,

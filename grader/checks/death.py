@@ -22,8 +22,10 @@ _SIGNALS = {
     signal.SIGBUS: "bus error",
     signal.SIGILL: "illegal instruction",
     signal.SIGFPE: "arithmetic error in native code",
-    signal.SIGKILL: "killed, usually for too much memory",
+    signal.SIGKILL: "killed: by itself, or for too much memory",
     signal.SIGXCPU: "too much CPU time",
+    signal.SIGXFSZ: "wrote a larger file than is allowed",
+    signal.SIGSYS: "a system call that no node needs",
     signal.SIGTERM: "asked to end by another process",
     signal.SIGPIPE: "wrote to a closed pipe",
 }
@@ -31,14 +33,22 @@ _SIGNAL_HINTS = {
     signal.SIGSEGV: "Native code crashed: look at the last call before it, such as one on a node "
     "or publisher that was destroyed already.",
     signal.SIGABRT: "A C++ exception or an assertion ended it: the last lines of output name it.",
-    signal.SIGKILL: "Look for a list or an image that grows without end.",
+    signal.SIGKILL: "Look for os.kill or os.killpg, or for a list or an image that grows without "
+    "end.",
     signal.SIGTERM: "Look for os.kill, os.killpg or subprocess calls that end their own group.",
 }
 
 _BREACH_HINTS = {
     "memory": "Look for a list, a queue or an image that grows without end.",
+    "cpu time": "Look for a loop without a pause: a node waits in rclpy.spin() and costs nothing "
+    "while nothing happens.",
     "sessions": "Look for a loop that starts processes with start_new_session=True or setsid.",
     "output": "Look for a print() or a log call in a loop that nothing slows down.",
+    "forbidden call": "Look for os.kill(os.getppid(), ...), and for whatever else is aimed at the "
+    "system, or at processes that are not your own.",
+    "forbidden packets": "The UDP ports from 7400 on belong to the middleware: choose another one "
+    "for a socket of your own.",
+    "forged report": "Write to no file descriptor that you did not open.",
 }
 
 _HINTS = {
@@ -62,6 +72,15 @@ _HINTS = {
     "MemoryError": "Look for a list or an image that grows without end.",
 }
 
+
+# What the system says where a limit of the sandbox is in the way, whatever raises it.
+_LIMIT_HINTS = {
+    "[Errno 27]": "The size of a file is limited here: write less, or to several files.",
+    "[Errno 28]": "The space in home, /tmp and /dev/shm is limited here: write less, and remove "
+    "what is not needed any more.",
+    "can't start new thread": "The number of processes and threads is limited here: start fewer, "
+    "and not one for each message.",
+}
 
 # A converter of rclpy met an object of another class; the name is that of the wanted one.
 _OTHER_CLASS = re.compile(r'convert_from_py: Assertion .strncmp\("[\w.]*\.(\w+)"')
@@ -170,6 +189,16 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
     )
 
 
+def offence(recording: Recording) -> Cause | None:
+    """What the processes did that is never allowed, also where they ended before it was seen."""
+    for breach in recording.breaches:
+        if not breach.allowed:
+            when_s = recording.since_launch_s(breach.time_ns)
+            moment = Moment(breach.what, when_s)
+            return Cause(str(breach), _BREACH_HINTS[breach.what], Evidence(moments=(moment,)))
+    return None
+
+
 def _returned(recording: Recording, process: Process, ended: str, evidence: Evidence) -> Cause:
     if testimony.broke_off(recording, process.name):
         return Cause(
@@ -207,6 +236,9 @@ def _exception_hint(failure: Failure, recording: Recording) -> str:
     if failure.type == "ModuleNotFoundError":
         hint = library_hint(failure.message, recording)
         if hint is not None:
+            return hint
+    for said, hint in _LIMIT_HINTS.items():
+        if failure.message.startswith(said):
             return hint
     if failure.type in _HINTS:
         return _HINTS[failure.type]

@@ -167,10 +167,12 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
 
     Explains why the goal was not reached, and a path with a detour.
     """
-    expected = f"a path at most {percent(parameters.most)} longer than the straight line"
     run = approach(recording, parameters.goal)
+    path = f"on a path at most {percent(parameters.most)} longer than the straight line"
     if isinstance(run, Cause):
-        return run.finding(expected)
+        return run.finding(f"within {metres(parameters.position)} of the goal, {path}")
+    near = f"within {metres(parameters.position)} of {point(run.goal.x_m, run.goal.y_m)}"
+    expected = f"{near}, {path}"
     straight_m = run.distance_m(run.truth[0])
     if straight_m <= parameters.position:
         return Finding.error(

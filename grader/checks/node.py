@@ -13,7 +13,7 @@ from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import NoParameters, Parameters, Subject, check
 from grader.checks.concerned import concerned_nodes
-from grader.checks.death import cause_of_death, dead, ended_early
+from grader.checks.death import cause_of_death, dead, ended_early, offence
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.node_absence import why_no_node, why_not_node
 from grader.checks.node_name import node_name
@@ -112,7 +112,8 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
 
     Judged by the process, which must still run when the observation ends, and by the ROS
     graph, which must not have lost the node before. Of several nodes those count that have an
-    endpoint on a topic that is recorded; a helper node may come and go.
+    endpoint on a topic that is recorded; a helper node may come and go. What a sandbox never
+    allows, such as a signal to the process that holds it, ends a node.
 
     Explains an exception (with the line in your file), a crash with its signal, and a main()
     that returned, such as one that does not call rclpy.spin.
@@ -128,8 +129,9 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
         ended = list(dead(recording))
     if ended:
         return cause_of_death(recording, ended[0]).finding(expected)
-    if missing is not None:
-        return missing.finding(expected)
+    seen = offence(recording) or missing
+    if seen is not None:
+        return seen.finding(expected)
     gone = _gone(recording, parameters.name)
     if gone is not None:
         when_s = recording.since_launch_s(gone.vanished_ns or recording.stop_ns)

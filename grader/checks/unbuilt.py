@@ -21,6 +21,7 @@ _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 # What colcon says of its own doings around the tool's output.
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
 _ABORTED = re.compile(r"^Aborted +<<< (\S+)", re.MULTILINE)
+_CMAKE = ("ament_cmake", "cmake")
 # What the build adds at the end when it ended colcon itself.
 _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
 
@@ -54,10 +55,15 @@ def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
         for item in submission.packages
         if match in (None, item.name)
     )
+    is_cmake = match is not None and existing_package(submission, match).build_type in _CMAKE
+    others = (
+        "in project(...) of CMakeLists.txt"
+        if is_cmake
+        else "in setup.py, setup.cfg, resource/ and the folder of the Python module"
+    )
     return Cause(
         found,
-        f"Write <name>{name}</name> in package.xml, and the same name in setup.py, setup.cfg, "
-        "resource/ and the folder of the Python module.",
+        f"Write <name>{name}</name> in package.xml, and the same name {others}.",
         Evidence(places=places[:10]),
     )
 

@@ -65,8 +65,8 @@ def why_unreported(
     name = missing[0]
     if reports.strange and not reports.runs:
         return Cause(
-            f"the messages on {code(topic)} are no reports, such as "
-            f"{value_text(reports.strange[0])}",
+            f"no message on {code(topic)} is a report of a callback: there is "
+            f"{value_text(reports.strange[0])}, for example",
             _FORMAT_HINT,
             evidence,
         )

@@ -26,7 +26,7 @@ SandboxChoice = Annotated[
 
 
 def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:
-    """The sandbox that was asked for; says so where there is none.
+    """The sandbox that was asked for; says which one it is, or that there is none.
 
     Raises:
         GraderFault: bwrap was asked for, and does not work here.
@@ -34,6 +34,5 @@ def chosen_sandbox(choice: Choice, progress: Progress) -> Sandbox | None:
     from grader.sandbox.trial import choose
 
     sandbox, notice = choose(choice, cache_folder())
-    if notice:
-        progress.say(notice)
+    progress.say(notice or f"sandbox: {sandbox.description if sandbox else 'none'}")
     return sandbox

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import array
 import json
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, lru_cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from mcap.reader import make_reader
+from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Message as Record
+from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from pydantic import TypeAdapter
 
@@ -54,6 +55,8 @@ _FACTS: dict[str, type] = {
     "incidents": Incident,
 }
 assert _FACTS.keys() == CHANNELS.keys()
+_PLAIN = frozenset({bool, int, float, str, bytes})
+"""Types of the primitive fields, and of an array of bytes."""
 
 
 @cache
@@ -94,52 +97,80 @@ class _NotARecording(Exception):
 
 
 def _read(stream: Any) -> Recording:
-    reader = make_reader(stream)
-    frame = _frame(reader)
+    frame: dict[str, Any] | None = None
+    submission: SubmissionRecord | None = None
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
     facts: dict[str, list[Any]] = {name: [] for name in CHANNELS}
     messages: dict[str, list[Message]] = {}
-    sent: dict[str, list[Message]] = {topic: [] for topic in frame.pop("sent", ())}
+    sent: dict[str, list[Message]] = {}
     joined: dict[str, list[Message]] = {}
-    factory = DecoderFactory()
-    for schema, channel, message in reader.iter_messages(log_time_order=False):
-        if channel.message_encoding == "json":
-            name = channel.topic.removeprefix("/rosgrade/")
-            if name in facts:
-                fact = _adapter(_FACTS[name]).validate_json(message.data)
-                facts[name].append((message.sequence, fact))
-            continue
-        decode = factory.decoder_for(channel.message_encoding, schema)
-        if decode is None or schema is None:
-            continue
-        found = Message(
-            topic=channel.metadata.get(TOPIC, channel.topic),
-            type=schema.name,
-            value=_fields(decode(message.data)),
-            stamp_ns=message.publish_time,
-            received_ns=message.log_time,
-            sequence=message.sequence,
-        )
-        join = channel.metadata.get(JOIN)
-        if join is not None:
-            joined.setdefault(join, []).append(found)
-        else:
-            topics = sent if SENT in channel.metadata else messages
-            topics.setdefault(found.topic, []).append(found)
+    # All of it, once, with its checksums: a flipped bit must not become another grade.
+    for record in StreamReader(stream, validate_crcs=True).records:
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        elif isinstance(record, Metadata) and record.name == "rosgrade":
+            frame = _frame(record)
+        elif isinstance(record, Attachment) and record.name == "submission.json":
+            submission = _adapter(SubmissionRecord).validate_json(record.data)
+        elif isinstance(record, Record):
+            channel = channels[record.channel_id]
+            if channel.message_encoding == "json":
+                name = channel.topic.removeprefix("/rosgrade/")
+                if name in facts:
+                    fact = _adapter(_FACTS[name]).validate_json(record.data)
+                    facts[name].append((record.sequence, fact))
+                continue
+            found = _message(record, channel, schemas[channel.schema_id])
+            join = channel.metadata.get(JOIN)
+            if join is not None:
+                joined.setdefault(join, []).append(found)
+            else:
+                topics = sent if SENT in channel.metadata else messages
+                topics.setdefault(found.topic, []).append(found)
+    if frame is None:
+        raise _NotARecording("an MCAP file, but not a recording of rosgrade")
+    if submission is None:
+        raise _NotARecording("the facts of the submission are missing")
     ordered = {
         name: tuple(fact for _, fact in sorted(items, key=lambda item: item[0]))
         for name, items in facts.items()
     }
+    unmatched: dict[str, list[Message]] = {topic: [] for topic in frame.pop("sent", ())}
     recording: Recording = _adapter(Recording).validate_python(
         {
             **frame,
             **ordered,
-            "submission": _submission(reader),
+            "submission": submission,
             "messages": _in_order(messages),
-            "sent": _in_order(sent),
+            "sent": _in_order(unmatched | sent),
             "joined": {name: tuple(items) for name, items in joined.items()},
         }
     )
     return recording
+
+
+def _message(record: Record, channel: Channel, schema: Schema) -> Message:
+    return Message(
+        topic=channel.metadata.get(TOPIC, channel.topic),
+        type=schema.name,
+        value=_fields(_decoder(schema.name, schema.encoding, schema.data)(record.data)),
+        stamp_ns=record.publish_time,
+        received_ns=record.log_time,
+        sequence=record.sequence,
+    )
+
+
+@lru_cache(maxsize=64)
+def _decoder(name: str, encoding: str, definition: bytes) -> Callable[[bytes], Any]:
+    """What decodes the messages of a type; each recording of a class has the same ones."""
+    schema = Schema(id=0, name=name, encoding=encoding, data=definition)
+    decode = DecoderFactory().decoder_for("cdr", schema)
+    if decode is None:
+        raise ValueError(f"{name} is defined as {encoding}, not as ros2msg")
+    return decode
 
 
 def _in_order(messages: Mapping[str, list[Message]]) -> dict[str, tuple[Message, ...]]:
@@ -192,32 +223,19 @@ def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, 
     return tuple(found), topics
 
 
-def _frame(reader: Any) -> dict[str, Any]:
-    for record in reader.iter_metadata():
-        if record.name == "rosgrade":
-            frame = {key: json.loads(value) for key, value in record.metadata.items()}
-            if frame.pop("format", None) != FORMAT:
-                raise _NotARecording(f"made by another version of rosgrade (not format {FORMAT})")
-            return frame
-    raise _NotARecording("an MCAP file, but not a recording of rosgrade")
-
-
-def _submission(reader: Any) -> SubmissionRecord:
-    for attachment in reader.iter_attachments():
-        if attachment.name == "submission.json":
-            record: SubmissionRecord = _adapter(SubmissionRecord).validate_json(attachment.data)
-            return record
-    raise _NotARecording("the facts of the submission are missing")
+def _frame(record: Metadata) -> dict[str, Any]:
+    frame = {key: json.loads(value) for key, value in record.metadata.items()}
+    if frame.pop("format", None) != FORMAT:
+        raise _NotARecording(f"made by another version of rosgrade (not format {FORMAT})")
+    return frame
 
 
 def _fields(value: Any) -> Any:
     """Plain mappings and lists from what the CDR decoder made."""
-    if hasattr(value, "__slots__") and not isinstance(value, str | bytes | array.array):
-        return {name: _fields(getattr(value, name)) for name in value.__slots__}
-    if isinstance(value, SimpleNamespace):
-        return {name: _fields(item) for name, item in vars(value).items()}
-    if isinstance(value, Mapping):
-        return {name: _fields(item) for name, item in value.items()}
-    if isinstance(value, list | tuple | array.array):
-        return [_fields(item) for item in value]
-    return value
+    kind = type(value)
+    if kind in _PLAIN:
+        return value
+    if kind is list:
+        # All of an array is of one type, and the ranges of a scan are many.
+        return list(map(_fields, value)) if value and type(value[0]) not in _PLAIN else value
+    return {name: _fields(getattr(value, name)) for name in kind.__slots__}

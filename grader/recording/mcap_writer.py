@@ -110,7 +110,7 @@ def _write(
     definitions: Mapping[str, str],
     submission: bytes,
 ) -> None:
-    writer = Writer(stream, compression=CompressionType.ZSTD)
+    writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(profile="ros2", library="rosgrade")
     writer.add_metadata("rosgrade", _frame(recording))
     _write_messages(writer, messages, definitions)

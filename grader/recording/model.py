@@ -283,14 +283,16 @@ class Intervention:
 
 @dataclass(frozen=True)
 class Breach:
-    """A limit of the sandbox that the student's processes reached.
+    """A limit of the sandbox that the student's processes reached, or what they must never do.
 
     Attributes:
         time_ns: When it was first seen.
-        what: ``memory``, ``processes``, ``sessions``, ``output``, ``disk``, ``shared memory``,
-            ``files in disk`` or ``files in shared memory``.
-        taken: Such as ``1056 MiB of memory``.
-        allowed: Such as ``1024 MiB``.
+        what: Of a limit: ``memory``, ``cpu time``, ``processes``, ``sessions``, ``output``,
+            ``disk``, ``shared memory``, ``files in disk`` or ``files in shared memory``. Else
+            ``forbidden call``, ``forbidden packets`` or ``forged report``.
+        taken: Such as ``1056 MiB of memory``; without a limit what they did, such as ``called
+            `reboot```.
+        allowed: Such as ``1024 MiB``; empty where there is no limit, because it is never allowed.
     """
 
     time_ns: int
@@ -301,11 +303,18 @@ class Breach:
     @property
     def ended(self) -> bool:
         """Whether the processes were ended for it; the kernel itself bounds the others."""
-        return self.what in ("memory", "sessions", "output")
+        return not self.allowed or self.what in ("memory", "cpu time", "sessions", "output")
+
+    @property
+    def deed(self) -> str:
+        """What the processes did, to follow who they are."""
+        if not self.allowed:
+            return f"{self.taken}, which is never allowed"
+        return f"took {self.taken}, {self.allowed} are allowed"
 
     def __str__(self) -> str:
         """Say it in words."""
-        return f"its processes took {self.taken}, {self.allowed} are allowed"
+        return f"its processes {self.deed}"
 
 
 @dataclass(frozen=True)

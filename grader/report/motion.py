@@ -215,14 +215,16 @@ def _strip(found: Sequence[Phase], x: Scale) -> list[Markup]:
 def _panel(panel: _Panel, x: Scale) -> list[Markup]:
     y = panel.y
     drawn = [label(panel.title, 0, y.end - 8)]
-    for value, text in ticks(y.low, y.high, 3):
+    for value, text in ticks(y.low, y.high, 4):
         drawn.append(line(LEFT, y(value), x.end, y(value), "grid"))
         drawn.append(label(text, LEFT - 8, y(value) + 4, anchor="end"))
-    for limit, text in panel.limits:
+    for limit, _ in panel.limits:
         drawn.append(line(LEFT, y(limit), x.end, y(limit), "limit"))
-        drawn.append(label(text, x.end, y(limit) - 4, anchor="end"))
     drawn.append(curve([(x(time_s), at) for time_s, at in panel.command], "command"))
     drawn.append(curve([(x(time_s), at) for time_s, at in panel.true], "true"))
+    # Over the lines, which run through the label of the lower limit.
+    for limit, text in panel.limits:
+        drawn.append(label(text, x.end, y(limit) - 4, anchor="end"))
     return drawn
 
 

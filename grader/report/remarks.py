@@ -83,7 +83,7 @@ def _talking(recording: Recording) -> Iterator[str]:
 
 
 def _forging(recording: Recording) -> Iterator[str]:
-    if any(breach.what == "forgery" for breach in recording.breaches):
+    if any(breach.what == "forged report" for breach in recording.breaches):
         return
     for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
         yield (

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from grader.checks.finding import Moment
 from grader.checks.topic_absence import OWN_TOPICS
 from grader.checks.wording import counted, listing
-from grader.recording.model import Call, LogLine, Owner, Process, Recording
+from grader.recording.model import NS, Call, LogLine, Owner, Process, Recording
 from grader.report import axis
 from grader.report.axis import time_axis
 from grader.report.clean import one_line
@@ -33,6 +33,8 @@ LANE = 36
 TRACK = 12
 SIDE = 6
 MOST_NODES = 4
+_OWN_SERVICE = "parameter service"
+"""Lane of what the grader asks every node again and again, until the end."""
 _COMPLAINTS = ("Traceback (most recent call last)", "[ERROR]", "[FATAL]")
 
 
@@ -125,14 +127,18 @@ def _lanes(recording: Recording, moments: Sequence[Moment]) -> list[Lane]:
         times = tuple(since(message.stamp_ns) for message in messages)
         lanes.append(Lane(f"to {topic}", f"{counted(len(times), 'message')} sent", ticks=times))
     for asked, calls in _calls(recording).items():
-        lost = [call for call in calls if call.answered_ns is None]
-        note = counted(len(calls), "call")
+        lost = [call for call in calls if _is_lost(call, asked, recording)]
+        cut_off = sum(call.answered_ns is None for call in calls) - len(lost)
+        notes = [f"{len(lost)} without an answer"] if lost else []
+        notes += [f"{cut_off} cut off by the end"] if cut_off else []
         lanes.append(
             Lane(
                 asked,
-                f"{note}, {len(lost)} without an answer" if lost else f"{note}, all answered",
+                ", ".join([counted(len(calls), "call"), *(notes or ["all answered"])]),
                 ticks=tuple(
-                    since(call.requested_ns) for call in calls if call.answered_ns is not None
+                    since(call.requested_ns)
+                    for call in calls
+                    if not _is_lost(call, asked, recording)
                 ),
                 crosses=tuple(since(call.requested_ns) for call in lost),
             )
@@ -173,12 +179,18 @@ def _complains(entry: LogLine) -> bool:
     return entry.level in ("ERROR", "FATAL") or entry.text.startswith(_COMPLAINTS)
 
 
+def _is_lost(call: Call, asked: str, recording: Recording) -> bool:
+    """Whether a call should have been answered; the end cuts off the last one of a series."""
+    at_the_end = asked == _OWN_SERVICE and call.requested_ns > recording.stop_ns - NS
+    return call.answered_ns is None and not at_the_end
+
+
 def _calls(recording: Recording) -> dict[str, list[Call]]:
     """Calls by the lane that they are drawn in."""
     found: dict[str, list[Call]] = {}
     for call in recording.calls:
         own = call.service.endswith("_parameters")
-        found.setdefault("parameter service" if own else call.service, []).append(call)
+        found.setdefault(_OWN_SERVICE if own else call.service, []).append(call)
     return found
 
 

@@ -25,6 +25,8 @@ from grader.run.stopwatch import Stopwatch
 from grader.run.student import StudentProcesses
 from grader.run.telling import tell, tell_line
 from grader.run.watchdog import Watchdog
+from grader.run.witnesses import Witnesses
+from grader.sandbox.wire import Wire
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
@@ -45,7 +47,9 @@ class Abandoned(Exception):
 class Cell:
     """Runs one scenario from launch to recording."""
 
-    def __init__(self, order: CellOrder, domain_id: int, probe: Probe) -> None:
+    def __init__(
+        self, order: CellOrder, domain_id: int, probe: Probe, wire: Wire | None = None
+    ) -> None:
         """Set the cell up; nothing of the student's runs yet."""
         self._order = order
         self._domain_id = domain_id
@@ -60,6 +64,7 @@ class Cell:
                 order.enclosure.limits,
                 lambda: self._students.inits,
                 lambda: self._output.written_bytes,
+                Witnesses(self._students, self._output, wire).deeds,
             )
         self._meter = DisturbanceMeter(Family(os.getpid()).look)
         self._graph = GraphObserver(

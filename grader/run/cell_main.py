@@ -26,7 +26,7 @@ from grader.run.telling import keep_apart, tell
 from grader.run.type_support import add_type_support
 
 if TYPE_CHECKING:
-    from grader.sandbox.namespaces import Mounter
+    from grader.sandbox.namespaces import Rights
 
 
 def _reset_signals() -> None:
@@ -45,32 +45,33 @@ def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
     return {name: concatenated_definition(name, find) for name in types}
 
 
-def main(folder: Path, avoid_domains: tuple[int, ...], mounter: Mounter | None = None) -> int:
+def main(folder: Path, avoid_domains: tuple[int, ...], rights: Rights | None = None) -> int:
     """Get ready, wait for the word, run the order in the folder.
 
     Args:
         folder: The cell's own.
         avoid_domains: Domains not to use.
-        mounter: In a sandbox: mounts what the student can write to.
+        rights: In a sandbox: what the cell got hold of before it gave up its rights.
     """
     # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
     gc.disable()
     become_subreaper()
     _reset_signals()
     keep_apart()
-    with DomainLock(0) if mounter else lock_domain(avoid_domains) as domain:
+    with DomainLock(0) if rights else lock_domain(avoid_domains) as domain:
         probe = Probe(domain.domain_id)
         if os.read(0, len(GO)) != GO:
             return 1
         order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
         if order.type_support:
             add_type_support(map(Path, order.type_support))
-        if mounter is not None and order.enclosure is not None:
+        if rights is not None and order.enclosure is not None:
             bounds = order.enclosure.limits
-            mounter.mount(bounds.disk_bytes, bounds.files, bounds.shared_bytes)
+            rights.mounter.mount(bounds.disk_bytes, bounds.files, bounds.shared_bytes)
+        wire = rights.wire if rights is not None else None
         probe.listen(order.topics, order.limits)
         try:
-            recording = Cell(order, domain.domain_id, probe).run()
+            recording = Cell(order, domain.domain_id, probe, wire).run()
         except Abandoned:
             return 1
         finally:

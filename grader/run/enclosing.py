@@ -25,7 +25,7 @@ from grader.sandbox.sandbox import TREES, Sandbox, hide
 _UID = 1000
 _TRACER = Path("/opt/tracer")
 _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
-_FILTER, _WORLD, _PASSWD_FILE = "student.bpf", "world.yaml", "passwd"
+_FILTER, _GUARD, _WORLD, _PASSWD_FILE = "student.bpf", "guard.bpf", "world.yaml", "passwd"
 
 
 def enclose(
@@ -52,6 +52,7 @@ def enclose(
         path: place for path, place in copies.items() if path == install or path in ros.underlays
     }
     shutil.copyfile(sandbox.filter_file, folder / _FILTER)
+    shutil.copyfile(sandbox.guard_file, folder / _GUARD)
     (folder / _PASSWD_FILE).write_text(_PASSWD, encoding="utf-8")
     in_cell = {str(path): str(CELL / place) for path, place in copies.items()}
     seen = {str(path): f"{WORKSPACE}/{place}" for path, place in for_student.items()}
@@ -76,6 +77,8 @@ def enclose(
         enclosure=Enclosure(
             arguments=(*_arguments(sandbox, ros, binds), "--chdir", HOME),
             filter=str(CELL / _FILTER),
+            guard=str(CELL / _GUARD),
+            calls=sandbox.guarded_calls,
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},
         ),

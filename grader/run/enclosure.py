@@ -38,21 +38,24 @@ class Enclosure:
     Attributes:
         arguments: Of bubblewrap.
         filter: File with the filter of system calls.
+        guard: File with the filter around it, which asks a guard.
+        calls: Numbers of the calls that it asks about.
         limits: What its processes may take.
         folders: Folder inside -> where the cell finds it.
     """
 
     arguments: tuple[str, ...]
     filter: str
+    guard: str
+    calls: dict[str, int]
     limits: Limits
     folders: dict[str, str]
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Enclosure:
         """Read what :func:`dataclasses.asdict` made."""
-        return cls(
-            tuple(data["arguments"]), data["filter"], Limits(**data["limits"]), data["folders"]
-        )
+        given = {**data, "arguments": tuple(data["arguments"]), "limits": Limits(**data["limits"])}
+        return cls(**given)
 
     def outside(self, path: str) -> Path:
         """Where the cell finds what a student sees at a path."""

@@ -291,11 +291,11 @@ def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool)
         for target, descriptor in enumerate(descriptors):
             os.dup2(descriptor, target)
         os.closerange(3, 256)
-        folder, mounter = Path(arguments[0]), None
+        folder, rights = Path(arguments[0]), None
         if private:
-            mounter = enter(folder)
+            rights = enter(folder)
             folder = CELL
-        status = main(folder, tuple(map(int, arguments[1:])), mounter)
+        status = main(folder, tuple(map(int, arguments[1:])), rights)
         sys.stdout.flush()
     except BaseException:
         traceback.print_exc()

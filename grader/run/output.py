@@ -153,6 +153,11 @@ class OutputReader:
         """What the tracers have reported so far."""
         return tuple(self._declarations)
 
+    @property
+    def forgers(self) -> frozenset[str]:
+        """Processes of which another than the tracer wrote to the tracer's pipe."""
+        return frozenset(self._foreign)
+
     def tail(self, process: str, stream: str, lines: int) -> list[str]:
         """The newest lines of a stream, for messages."""
         for item in list(self._streams):

@@ -9,12 +9,14 @@ import subprocess
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from grader.recording.model import NS, Process
 from grader.run.descendants import descendants, is_init, kill_descendants, reap
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.enclosure import EnclosedProcess, Enclosure
+from grader.run.guard import Guard
 from grader.run.order import Limits
 from grader.run.output import OutputReader
 from grader.run.shared_memory import remove_orphaned_segments
@@ -60,9 +62,15 @@ class StudentProcesses:
         Args:
             output: Reads what they write.
             enclosure: The sandbox that each of them gets, or None.
+
+        Raises:
+            OSError: Nobody can watch over a sandbox here.
         """
         self._output = output
         self._enclosure = enclosure
+        self._guard: Guard | None = None
+        if enclosure is not None:
+            self._guard = Guard.from_file(Path(enclosure.guard), enclosure.calls)
         self._running: list[_Running] = []
         self._pids: frozenset[int] = frozenset()
         self._survivors: tuple[str, ...] = ()
@@ -113,8 +121,10 @@ class StudentProcesses:
         folder: Path,
         pass_fds: tuple[int, ...],
     ) -> subprocess.Popen[bytes]:
-        if self._enclosure is not None:
-            return EnclosedProcess(self._enclosure, argv, variables, pass_fds)
+        if self._enclosure is not None and self._guard is not None:
+            return self._guard.start(
+                partial(EnclosedProcess, self._enclosure, argv, variables, pass_fds)
+            )
         return subprocess.Popen(
             argv,
             cwd=folder,
@@ -135,6 +145,11 @@ class StudentProcesses:
             if isinstance(process.popen, EnclosedProcess) and process.exited_ns is None
         ]
         return tuple(group for group in groups if group is not None)
+
+    @property
+    def deeds(self) -> tuple[str, ...]:
+        """System calls of theirs that nobody may make, in words."""
+        return self._guard.deeds if self._guard is not None else ()
 
     @property
     def pids(self) -> frozenset[int]:
@@ -234,6 +249,8 @@ class StudentProcesses:
         self.poll()
         reap()
         remove_orphaned_segments()
+        if self._guard is not None:
+            self._guard.close()
 
     def faults(self) -> tuple[str, ...]:
         """Sandboxes that could not be set up, one sentence each; call after :meth:`clean_up`."""

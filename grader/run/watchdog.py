@@ -1,7 +1,8 @@
 """Watches what the student's processes take in a sandbox, beyond what the kernel bounds itself.
 
 The kernel's limits are per process: a hundred processes may each stay within theirs. Here they
-are counted together several times a second, and ended when they take too much.
+are counted together several times a second, and ended when they take too much, or when a witness
+saw them do what nobody may.
 """
 
 from __future__ import annotations
@@ -10,14 +11,14 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from grader.recording.model import Breach
 from grader.run.descendants import descendants
-from grader.sandbox.limits import MIB, Limits
+from grader.sandbox.limits import Limits, size_words
 from grader.sandbox.namespaces import STUDENT
-from grader.sandbox.usage import memory_bytes, thread_count
+from grader.sandbox.usage import cpu_time_s, memory_bytes, thread_count
 
 _POLL_S = 0.1
 _FULL = 0.99
@@ -33,6 +34,7 @@ class Watchdog:
         limits: Limits,
         inits: Callable[[], Sequence[int]],
         output_bytes: Callable[[], int],
+        deeds: Callable[[], Iterable[tuple[str, str]]] = tuple,
     ) -> None:
         """Prepare.
 
@@ -40,10 +42,13 @@ class Watchdog:
             limits: What is too much.
             inits: Ids of the first processes of the student's sandboxes.
             output_bytes: How much was written so far.
+            deeds: What they did so far that is never allowed: its kind (see :class:`Breach`), and
+                the same in words.
         """
         self._limits = limits
         self._inits = inits
         self._output_bytes = output_bytes
+        self._deeds = deeds
         self._breaches: dict[str, Breach] = {}
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
@@ -68,7 +73,10 @@ class Watchdog:
         pids = [pid for init in self._inits() for pid in (init, *descendants(init))]
         taken = memory_bytes(pids, limits.memory_bytes)
         if taken > limits.memory_bytes:
-            self._note("memory", f"{_mib(taken)} of memory", _mib(limits.memory_bytes))
+            self._note("memory", f"{size_words(taken)} of memory", size_words(limits.memory_bytes))
+            self._end_all()
+        if cpu_time_s(pids) > limits.cpu_s:
+            self._note("cpu time", f"more than {limits.cpu_s} s of CPU time", f"{limits.cpu_s} s")
             self._end_all()
         threads = thread_count(pids)
         # The last ones that it may start count as too many: no more can be seen.
@@ -79,7 +87,11 @@ class Watchdog:
             self._end_all()
         written = self._output_bytes()
         if written > limits.output_bytes:
-            self._note("output", f"{_mib(written)} of output", _mib(limits.output_bytes))
+            allowed = size_words(limits.output_bytes)
+            self._note("output", f"{size_words(written)} of output", allowed)
+            self._end_all()
+        for kind, deed in self._deeds():
+            self._note(kind, deed, "")
             self._end_all()
         self._look_at(STUDENT / "disk", "disk", "/tmp and home")
         self._look_at(STUDENT / "shared", "shared memory", "/dev/shm")
@@ -88,7 +100,7 @@ class Watchdog:
         status = os.statvfs(place)
         size, free = status.f_blocks * status.f_frsize, status.f_bfree * status.f_frsize
         if free < (1 - _FULL) * size:
-            self._note(what, f"all space in {name}", _mib(size))
+            self._note(what, f"all space in {name}", size_words(size))
         if status.f_ffree < (1 - _FULL) * status.f_files:
             self._note(f"files in {what}", f"all files of {name}", str(status.f_files))
 
@@ -101,10 +113,6 @@ class Watchdog:
                 os.kill(init, signal.SIGKILL)
             except ProcessLookupError:
                 continue
-
-
-def _mib(size: int) -> str:
-    return f"{size // MIB} MiB"
 
 
 def _session(pid: int) -> int:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 MIB = 2**20
+_CPU_GRACE_S = 10
+"""Whoever counts all processes together comes first, and can say what happened."""
 
 
 @dataclass(frozen=True)
@@ -14,7 +16,7 @@ class Limits:
     Attributes:
         memory_bytes: Of all its processes together, shared pages counted once.
         processes: Processes and threads together.
-        cpu_s: CPU time of one process.
+        cpu_s: CPU time of all its processes together.
         file_bytes: Of one file.
         disk_bytes: Of everything that is written to /tmp and home.
         files: Number of files and folders there.
@@ -49,7 +51,7 @@ class Limits:
             f"--nproc={self.processes}",
             f"--nofile={self.open_files}",
             f"--fsize={self.file_bytes}",
-            f"--cpu={self.cpu_s}",
+            f"--cpu={self.cpu_s + _CPU_GRACE_S}",
             "--core=0",
         ]
 
@@ -66,3 +68,8 @@ BUILD = Limits(
     output_bytes=BUILD_OUTPUT_BYTES,
 )
 """Of a build: compilers take more than nodes."""
+
+
+def size_words(size: int) -> str:
+    """A size for people: ``64 MiB``, or ``100 KiB`` where it is small."""
+    return f"{size // MIB} MiB" if size >= 10 * MIB or size % MIB == 0 else f"{size // 1024} KiB"

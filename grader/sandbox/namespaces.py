@@ -6,6 +6,7 @@ interface), processes, shared memory and scratch, and sees of all cells' folders
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import fcntl
 import os
@@ -13,7 +14,10 @@ import re
 import signal
 import socket
 import struct
+from dataclasses import dataclass
 from pathlib import Path
+
+from grader.sandbox.wire import Wire
 
 CELL = Path("/cell")
 """Where a cell sees its folder."""
@@ -103,7 +107,20 @@ class Mounter:
             os._exit(0)
 
 
-def enter(folder: Path) -> Mounter:
+@dataclass(frozen=True)
+class Rights:
+    """What a cell got hold of before it gave up its rights.
+
+    Attributes:
+        mounter: Still has the right to mount.
+        wire: Hears the cell's network; None where the kernel has no packet sockets.
+    """
+
+    mounter: Mounter
+    wire: Wire | None
+
+
+def enter(folder: Path) -> Rights:
     """Go on as the first process of new namespaces; the caller becomes the one that waits.
 
     Returns only in the new process. It dies with the one that waits, and everything in its
@@ -113,7 +130,7 @@ def enter(folder: Path) -> Mounter:
         folder: The cell's own; its parent holds those of all cells.
 
     Returns:
-        What still has the right to mount.
+        What is left of the rights that the new process had.
 
     Raises:
         OSError: The system refuses it.
@@ -138,8 +155,11 @@ def enter(folder: Path) -> Mounter:
     _mount_own(folder)
     _bring_up_loopback()
     mounter = Mounter()
+    wire = None
+    with contextlib.suppress(OSError):
+        wire = Wire()
     _drop_capabilities()
-    return mounter
+    return Rights(mounter, wire)
 
 
 def _wait_for(child: int) -> None:

@@ -17,10 +17,11 @@ import sim
 from grader.ros import RosInstallation
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
-from grader.sandbox.limits import BUILD, MIB, Limits
+from grader.sandbox.limits import BUILD, Limits, size_words
 from grader.sandbox.namespaces import MOUNT_POINTS
 from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
-from grader.sandbox.usage import descendants, folder_usage, memory_bytes, thread_count
+from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
+from grader.sandbox.usage import cpu_time_s, descendants, folder_usage, memory_bytes, thread_count
 
 LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
 
@@ -62,20 +63,28 @@ class Sandbox:
         with self._lock:
             return self._others.setdefault(libraries, Sandbox(self.cache, libraries))
 
-    @cached_property
+    @property
     def filter_file(self) -> Path:
-        """A file with the filter of system calls for a run."""
-        return self._filter_file(one_session=False)
+        """A file with the filter of system calls for a run, which a guard watches over."""
+        return self._filter_file(student_filter(guarded=True))
+
+    @property
+    def guard_file(self) -> Path:
+        """A file with the filter that asks the guard of a run."""
+        return self._filter_file(guard_filter())
 
     @cached_property
+    def guarded_calls(self) -> dict[str, int]:
+        """Numbers of the calls that the guard is asked about."""
+        return guarded_calls()
+
+    @property
     def build_filter_file(self) -> Path:
         """A file with the filter of system calls for a build."""
-        return self._filter_file(one_session=True)
+        return self._filter_file(student_filter(one_session=True))
 
-    def _filter_file(self, *, one_session: bool) -> Path:
-        from grader.sandbox.seccomp import student_filter
-
-        program = student_filter(one_session=one_session)
+    def _filter_file(self, program: bytes) -> Path:
+        # Looked for at every use: somebody may empty the cache while rosgrade watches.
         file = self.cache / "sandbox" / f"{hashlib.sha256(program).hexdigest()[:32]}.bpf"
         if not file.is_file():
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -208,20 +217,26 @@ class BuildRoom:
         limits = self.limits
         pids = descendants(pid)
         if memory_bytes(pids, limits.memory_bytes) > limits.memory_bytes:
-            return f"it took more than {limits.memory_bytes // MIB} MiB of memory"
+            return f"it took more than {size_words(limits.memory_bytes)} of memory"
+        if cpu_time_s(pids) > limits.cpu_s:
+            return f"it took more than {limits.cpu_s} s of CPU time"
         if thread_count(pids) >= _NEARLY_ALL * limits.processes:
             return f"it started {limits.processes} processes"
         size, files = folder_usage(self.folders, limits.disk_bytes, limits.files)
         if size > limits.disk_bytes:
-            return f"it wrote more than {limits.disk_bytes // MIB} MiB"
+            return f"it wrote more than {size_words(limits.disk_bytes)}"
         return f"it made more than {limits.files} files" if files > limits.files else None
 
 
 def hide(binds: Sequence[Bind]) -> list[str]:
-    """Arguments that cover rosgrade's own code where what is shown would hold it."""
+    """Arguments that cover what is not to be seen where what is shown would hold it.
+
+    That is rosgrade's own code, and the libraries of the Python that our environment was made of
+    and takes none from.
+    """
     return [
         argument
-        for path in CODE
+        for path in (*CODE, *_libraries_beside())
         if _is_within(path, [bind for bind in binds if bind.source == bind.target])
         for argument in ("--tmpfs", str(path))
     ]
@@ -233,6 +248,13 @@ def _is_within(path: Path, binds: Iterable[Bind]) -> bool:
 
 def _in_environment() -> bool:
     return sys.prefix != sys.base_prefix
+
+
+def _libraries_beside() -> list[Path]:
+    base = Path(sys.base_prefix).resolve()
+    own = [Path(path).resolve() for path in sys.path]
+    found = base.glob("lib/python3*/site-packages")
+    return [path for path in found if _in_environment() and base != _USR and path not in own]
 
 
 def _python_and_ros(ros: RosInstallation) -> list[Path]:

@@ -8,23 +8,38 @@ refused fails with EPERM, as it would for lack of a privilege; calls of another 
 from __future__ import annotations
 
 import errno
+import signal
 import tempfile
+from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
+_AIMED = {"ptrace": 1, "process_vm_readv": 0, "process_vm_writev": 0}
+"""Calls on another process, and which argument is its id; refused whatever that is."""
+_SIGNALLING = {
+    **{"kill": 1, "tkill": 1, "rt_sigqueueinfo": 1},
+    **{"tgkill": 2, "rt_tgsigqueueinfo": 2},
+}
+"""Calls that send a signal to the process of their first argument, and where the signal is."""
+_UNHEARD_OF = (
+    *("setns", "open_by_handle_at", "bpf", "reboot", "swapon", "swapoff"),
+    *("init_module", "finit_module", "delete_module", "kexec_load", "kexec_file_load"),
+)
+"""Calls that no node and no library of one has a use for."""
+INIT = 1
+"""The first process of a sandbox, the only one in it that is not the student's."""
 _REFUSED = (
     # Other processes.
-    *("ptrace", "process_vm_readv", "process_vm_writev", "process_madvise", "kcmp"),
-    *("pidfd_getfd", "perf_event_open", "bpf", "userfaultfd"),
+    *("process_madvise", "kcmp", "pidfd_getfd", "perf_event_open", "userfaultfd"),
     # Keys are shared by all of a user's processes, in whatever namespace.
     *("add_key", "request_key", "keyctl"),
     *("io_uring_setup", "io_uring_enter", "io_uring_register"),
     # Namespaces and mounts.
-    *("mount", "umount2", "pivot_root", "chroot", "unshare", "setns", "mount_setattr"),
+    *("mount", "umount2", "pivot_root", "chroot", "unshare", "mount_setattr"),
     *("open_tree", "move_mount", "fsopen", "fsconfig", "fsmount", "fspick"),
-    *("open_by_handle_at", "name_to_handle_at", "quotactl", "quotactl_fd", "fanotify_init"),
+    *("name_to_handle_at", "quotactl", "quotactl_fd", "fanotify_init"),
     # The machine.
-    *("init_module", "finit_module", "delete_module", "kexec_load", "kexec_file_load"),
-    *("reboot", "swapon", "swapoff", "acct", "syslog", "settimeofday", "stime", "adjtimex"),
+    *("acct", "syslog", "settimeofday", "stime", "adjtimex"),
     *("clock_settime", "clock_adjtime", "iopl", "ioperm", "modify_ldt", "personality"),
     *("lookup_dcookie", "vhangup", "nfsservctl", "uselib"),
     # Memory that belongs to no process and to no file system with a bound.
@@ -46,12 +61,14 @@ _FAMILIES = (1, 2, 10, 16)
 _FAMILY_BITS = 6
 
 
-def student_filter(*, one_session: bool = False) -> bytes:
+@cache
+def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes:
     """Assemble the filter, as the BPF program that ``bwrap --seccomp`` takes.
 
     Args:
         one_session: Also keep all processes in one session, as the kernel shares the CPU between
             sessions. A daemon then gets the signals that are meant for its parent.
+        guarded: What :func:`guard_filter` tells of is left to it.
 
     Raises:
         RuntimeError: libseccomp is not there.
@@ -60,7 +77,7 @@ def student_filter(*, one_session: bool = False) -> bytes:
 
     rules = seccomp.SyscallFilter(seccomp.ALLOW)
     refuse = seccomp.ERRNO(errno.EPERM)
-    for name in _REFUSED:
+    for name in (*_REFUSED, *([] if guarded else [*_AIMED, *_UNHEARD_OF])):
         _add(rules, refuse, name)
     for name in (*_PRETENDED, *(["setsid"] if one_session else [])):
         _add(rules, seccomp.ERRNO(0), name)
@@ -78,6 +95,60 @@ def student_filter(*, one_session: bool = False) -> bytes:
         for bit in range(_FAMILY_BITS, 32):
             flag = 1 << bit
             _add(rules, refuse, call, seccomp.Arg(0, seccomp.MASKED_EQ, flag, flag))
+    return _program(rules)
+
+
+@cache
+def guard_filter() -> bytes:
+    """Assemble the filter around a student's sandbox, which asks a guard before it refuses.
+
+    It is in force while bubblewrap makes the sandbox, so it holds only calls that bubblewrap
+    itself does not need.
+
+    Raises:
+        RuntimeError: libseccomp is not there.
+    """
+    import pyseccomp as seccomp
+
+    rules = seccomp.SyscallFilter(seccomp.ALLOW)
+    for name in (*_AIMED, *_UNHEARD_OF):
+        _add(rules, seccomp.NOTIFY, name)
+    at_init = seccomp.Arg(0, seccomp.MASKED_EQ, _INT, INIT)
+    for name, place in _SIGNALLING.items():
+        # Signal 0 only asks whether the process is there.
+        _add(rules, seccomp.NOTIFY, name, at_init, seccomp.Arg(place, seccomp.NE, 0))
+    _add(rules, seccomp.NOTIFY, "pidfd_open", at_init)
+    return _program(rules)
+
+
+def guarded_calls() -> dict[str, int]:
+    """The numbers of the calls that :func:`guard_filter` tells of, and of ``seccomp`` itself."""
+    from pyseccomp import resolve_syscall, system_arch
+
+    names = (*_AIMED, *_UNHEARD_OF, *_SIGNALLING, "pidfd_open", "seccomp")
+    return {name: resolve_syscall(system_arch(), name) for name in names}
+
+
+def told_of(name: str, arguments: Sequence[int]) -> str | None:
+    """What a process did by a call that the guard was told of; None where there is no harm in it.
+
+    Args:
+        name: The call.
+        arguments: Its arguments, as the kernel gives them.
+    """
+    if name in _UNHEARD_OF:
+        return f"called `{name}`"
+    if arguments[_AIMED.get(name, 0)] & _INT != INIT:
+        # A debugger or a sanitizer looks at the student's own processes.
+        return None
+    if name not in _SIGNALLING:
+        return f"called `{name}` on the process that holds their sandbox"
+    number = arguments[_SIGNALLING[name]] & _INT
+    known = {int(one): one.name for one in signal.Signals}
+    return f"sent {known.get(number, f'signal {number}')} to the process that holds their sandbox"
+
+
+def _program(rules: Any) -> bytes:
     with tempfile.TemporaryFile() as file:
         rules.export_bpf(file)
         file.seek(0)

@@ -14,6 +14,9 @@ from grader.sandbox.sandbox import Sandbox
 
 _UID = 2000
 _LIMIT_S = 20.0
+_SWITCHES = {"user.max_user_namespaces": 10_000, "kernel.unprivileged_userns_clone": 1}
+"""Settings of the kernel that may forbid user namespaces, and what they should be."""
+_LEAST = 16
 _APPARMOR = """\
 sudo tee /etc/apparmor.d/bwrap <<'EOF'
 abi <abi/4.0>,
@@ -98,7 +101,11 @@ def try_sandbox() -> Trial:
     return Trial(f"bubblewrap may not make namespaces: {said[-1]}", _remedy())
 
 
-def _remedy() -> str:
+def _remedy(settings: Path = Path("/proc/sys")) -> str:
+    forbidding = [name for name in _SWITCHES if _forbids(settings, name)]
+    if forbidding:
+        wanted = " ".join(f"{name}={_SWITCHES[name]}" for name in forbidding)
+        return f"allow user namespaces (in a container: on its host): sudo sysctl {wanted}"
     if Path("/.dockerenv").exists() or Path("/run/.containerenv").exists():
         return (
             "start the container with --security-opt seccomp=unconfined --security-opt "
@@ -108,7 +115,13 @@ def _remedy() -> str:
     switch = Path("/proc/sys/kernel/apparmor_restrict_unprivileged_userns")
     if switch.exists() and switch.read_text().strip() == "1":
         return f"allow it to bubblewrap alone (Ubuntu 23.10 and newer):\n{_APPARMOR}"
-    return (
-        "allow user namespaces: sudo sysctl user.max_user_namespaces=10000 "
-        "kernel.unprivileged_userns_clone=1"
-    )
+    return "see whether `bwrap --unshare-all --ro-bind / / true` works by hand"
+
+
+def _forbids(settings: Path, name: str) -> bool:
+    """Whether a setting of the kernel is too low; one that this kernel does not have is not."""
+    try:
+        value = int(settings.joinpath(*name.split(".")).read_text())
+    except (OSError, ValueError):
+        return False
+    return value < min(_SWITCHES[name], _LEAST)

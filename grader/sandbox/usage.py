@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PROC = "/proc"
 
 
@@ -48,6 +49,11 @@ def thread_count(pids: Iterable[int]) -> int:
     return sum(_threads(pid) for pid in pids)
 
 
+def cpu_time_s(pids: Iterable[int]) -> float:
+    """CPU time of processes, and of their children that have ended and were waited for."""
+    return sum(map(_ticks, pids)) / _TICKS_PER_S
+
+
 def folder_usage(folders: Iterable[Path], most_bytes: int, most_files: int) -> tuple[int, int]:
     """Bytes on the disk and number of files below folders; stops to count beyond the limits."""
     total = count = 0
@@ -83,6 +89,15 @@ def _proportional_bytes(pid: int) -> int:
     except (OSError, IndexError):
         return _resident_bytes(pid)
     return 0
+
+
+def _ticks(pid: int) -> int:
+    try:
+        with open(f"{_PROC}/{pid}/stat", "rb") as file:  # noqa: PTH123  often
+            # utime, stime, cutime, cstime: proc(5).
+            return sum(map(int, file.read().rpartition(b")")[2].split()[11:15]))
+    except (OSError, ValueError):
+        return 0
 
 
 def _threads(pid: int) -> int:

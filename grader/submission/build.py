@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 _UNSAID = "colcon could not build this package; the log says why"
 _WHOLE_LOG = 60_000
 _LEAST_FREE_BYTES = 64 * MIB
+# What makes the sandbox, each with its own complaint; colcon is only started by the last.
+_NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|prlimit): .*")
 
 
 def build(
@@ -165,7 +167,12 @@ class _Workshop:
         outcome = colcon.build(finished)
         self._check_machine(outcome, scratch, install)
         limits = colcon.limits
-        problem = tidy(install, most_bytes=limits.install_bytes, most_files=limits.install_files)
+        problem = tidy(
+            install,
+            self.located.root,
+            most_bytes=limits.install_bytes,
+            most_files=limits.install_files,
+        )
         problem = problem or _ended_by_us(outcome, colcon.wall_s)
         record = self._record(outcome, finished, problem, scratch, install)
         record = _with_parts(record, parts.values())
@@ -185,6 +192,9 @@ class _Workshop:
             raise GraderFault(
                 f"colcon was killed by signal {-outcome.status}; perhaps memory ran out"
             )
+        unstarted = _NOT_STARTED.match(outcome.output)
+        if unstarted and "Starting >>>" not in outcome.output:
+            raise GraderFault(f"the sandbox of the build could not be started: {unstarted[0]}")
         if outcome.status is not None and _is_cut_off(outcome.output):
             raise GraderFault(f"colcon ended with status {outcome.status} in the middle of a build")
         if "No space left on device" in outcome.output:

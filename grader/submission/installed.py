@@ -85,13 +85,14 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
     )
 
 
-def tidy(install: Path, *, most_bytes: int, most_files: int) -> str | None:
-    """Take out of an install space what nobody of ours should open or follow.
+def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> str | None:
+    """See that an install space holds nothing that nobody of ours should open or follow.
 
-    Pipes, sockets and devices go, and symbolic links that lead out of it.
+    Symbolic links to what was handed in, or to nothing, go: nobody would find anything there.
 
     Args:
         install: The install space, as the student's build files left it.
+        sources: Folder of what was handed in, where it was built.
         most_bytes: Largest size of all files together.
         most_files: Largest number of files and folders.
 
@@ -102,22 +103,37 @@ def tidy(install: Path, *, most_bytes: int, most_files: int) -> str | None:
         install.unlink()
         return "the build put a symbolic link in place of the install space"
     total = count = 0
-    base = os.path.realpath(install)
+    planted: list[str] = []
+    base, own = os.path.realpath(install), os.path.realpath(sources)
     for parent, folders, names in os.walk(install):
         for name in [*folders, *names]:
             path = Path(parent, name)
             status = path.lstat()
             if stat.S_ISLNK(status.st_mode):
-                if not f"{os.path.realpath(path)}/".startswith(f"{base}/"):
+                end = os.path.realpath(path)
+                if not f"{end}/".startswith(f"{base}/"):
+                    if Path(end).exists() and not f"{end}/".startswith(f"{own}/"):
+                        target = str(path.readlink())
+                        planted.append(f"{_named(path, install)}, a link out to {target!r}")
                     path.unlink()
             elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+                planted.append(f"{_named(path, install)}, which is no file, folder or link")
                 path.unlink()
             total += status.st_size
             count += 1
     if total > most_bytes or count > most_files:
         shutil.rmtree(install)
         return f"the build installed more than {most_files} files or {most_bytes} bytes"
+    if planted:
+        shutil.rmtree(install)
+        more = f" and {len(planted) - 1} more of that kind" if len(planted) > 1 else ""
+        return f"the build installed {min(planted)}{more}"
     return None
+
+
+def _named(path: Path, install: Path) -> str:
+    """In quotes: the name is the student's."""
+    return repr(str(path.relative_to(install)))
 
 
 def site_packages(install: Path) -> list[Path]:

@@ -281,13 +281,17 @@ def call_as_32_bit_program():
         raise OSError(f'signal {os.WTERMSIG(status)}')
 
 
+# A node is ended for these, so they are tried one by one: see test_hostile.py.
+NOTICED = ('trace_parent', 'read_memory_of_parent', 'load_program_into_kernel', 'open_by_handle')
 ATTACKS = [value for name, value in list(globals().items())
            if callable(value) and getattr(value, '__module__', None) == __name__
            and name not in ('read', 'read_all', 'write', 'syscall', 'descriptors')]
 
 
-def main():
+def main(but=()):
     for attack in ATTACKS:
+        if attack.__name__ in but:
+            continue
         try:
             got = attack()
         except BaseException as error:

@@ -115,8 +115,47 @@ for port in (7400, 7401, 7410, 7411, 7412, 7413):
 HOGS = """\
 for number in range(8):
     if os.fork() == 0:
-        while True:
-            pass
+        break
+while True:
+    pass
+"""
+CALL = """\
+import ctypes, platform
+numbers = {{'x86_64': {x86_64}, 'aarch64': {aarch64}}}
+assert ctypes.CDLL(None).syscall(numbers[platform.machine()], {arguments}) == -1
+"""
+PLANT = """\
+import os, sys
+if 'install' in sys.argv:
+    # colcon says so where a package goes.
+    share = sys.prefix + '/share'
+    os.makedirs(share, exist_ok=True)
+    os.path.islink(share + '/passwd') or os.symlink('/etc/passwd', share + '/passwd')
+"""
+UNUSUAL = """\
+import asyncio, multiprocessing, socket, tempfile
+import numpy
+signal.signal(signal.SIGUSR1, lambda *_: None)
+signal.raise_signal(signal.SIGUSR1)
+os.kill(os.getpid(), signal.SIGUSR1)
+os.kill(os.getppid(), 0)
+child = subprocess.Popen([sys.executable, '-c', 'input()'], stdin=subprocess.PIPE)
+os.kill(child.pid, signal.SIGTERM)
+child.wait()
+asyncio.run(asyncio.create_subprocess_exec('true'))
+# Not forked: a fork beside the threads of DDS may hang.
+with multiprocessing.get_context('spawn').Pool(1) as pool:
+    assert pool.map(abs, [-1, -2]) == [1, 2]
+threads = [threading.Thread(target=sum, args=([1],)) for _ in range(8)]
+for thread in threads:
+    thread.start()
+    thread.join()
+numpy.linalg.inv(numpy.random.rand(400, 400)) @ numpy.random.rand(400, 400)
+ear = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+ear.bind(('127.0.0.1', 7500))
+for _ in range(500):
+    ear.sendto(b'not of any middleware', ear.getsockname())
+tempfile.TemporaryFile().write(bytes(2**20))
 """
 INJECTION = """\
 print('\\x1b[2J\\x1b]0;owned\\x07<script>alert(1)</script>')
@@ -145,11 +184,34 @@ class Attack:
 
 
 ALIVE = frozenset({"alive", "messages"})
+HOLDER = "the process that holds their sandbox"
 ATTACKS = {
     "kills_everything": Attack(
         "os.kill(-1, signal.SIGKILL)\nos.kill(os.getpid(), 9)", lost=ALIVE, named=("SIGKILL",)
     ),
-    "kills_the_probe": Attack(KILL_PROBE),
+    "kills_the_probe": Attack(KILL_PROBE, lost=ALIVE, named=(f"sent SIGKILL to {HOLDER}",)),
+    # It is over before anybody looks.
+    "kills_the_probe_at_its_end": Attack(
+        at_import="import atexit\natexit.register(lambda: os.kill(1, signal.SIGTERM))",
+        lost=frozenset({"alive"}),
+        named=(f"sent SIGTERM to {HOLDER}",),
+    ),
+    "traces_the_probe": Attack(
+        # PTRACE_ATTACH
+        CALL.format(x86_64=101, aarch64=117, arguments="16, os.getppid(), 0, 0"),
+        lost=ALIVE,
+        named=(f"called `ptrace` on {HOLDER}",),
+    ),
+    "reads_memory_of_the_probe": Attack(
+        CALL.format(x86_64=310, aarch64=270, arguments="os.getppid(), None, 0, None, 0, 0"),
+        lost=ALIVE,
+        named=(f"called `process_vm_readv` on {HOLDER}",),
+    ),
+    "loads_a_program_into_the_kernel": Attack(
+        CALL.format(x86_64=321, aarch64=280, arguments="0, 0, 0"),
+        lost=ALIVE,
+        named=("called `bpf`",),
+    ),
     "kills_its_group": Attack("os.killpg(0, signal.SIGKILL)", lost=ALIVE, named=("SIGKILL",)),
     "fork_bomb": Attack(BOMB, lost=ALIVE, named=("sessions",)),
     "heap": Attack(
@@ -207,18 +269,20 @@ ATTACKS = {
         lost=frozenset({"starts"}),
         named=("joined ROS domain 5",),
     ),
-    "forged_tracer": Attack(FORGED, named=("wrote into the channel",)),
+    "forged_tracer": Attack(FORGED, lost=ALIVE, named=("wrote into the channel",)),
     "squats_the_probe_s_name": Attack(
         SQUAT,
+        lost=frozenset({"untouched"}),
         named=("is called `/rosgrade_probe`, as the node", "publishes on `/clock` and `/odom`"),
     ),
-    "is_called_as_the_probe": Attack(name="rosgrade_probe", lost=frozenset({"node"})),
+    "is_called_as_the_probe": Attack(name="rosgrade_probe", lost=frozenset({"node", "untouched"})),
     "floods_topics_and_rosout": Attack(
-        FLOOD_TOPICS, named=("messages were sent on `/cmd_vel` within 1 s",)
+        FLOOD_TOPICS,
+        lost=frozenset({"messages"}),
+        named=("messages were sent on `/cmd_vel` within 1 s",),
     ),
-    "garbage_on_dds_ports": Attack(GARBAGE),
-    # It may be too late for its own sake, but that is never the machine's doing.
-    "burns_the_cpus": Attack(HOGS, maybe=frozenset({"ends", "messages"})),
+    "garbage_on_dds_ports": Attack(GARBAGE, lost=ALIVE, named=("sent garbage to the UDP ports",)),
+    "burns_the_cpus": Attack(HOGS, lost=ALIVE, named=("s of CPU time, 3 s are allowed",)),
     "injection": Attack(INJECTION, lost=ALIVE, named=("RuntimeError",)),
     "shadows_modules": Attack(
         files={
@@ -231,10 +295,9 @@ ATTACKS = {
         at_build=BOMB, lost=frozenset({"builds"}), named=("it started 64 processes",)
     ),
     "build_plants_links": Attack(
-        at_build="import os\nos.makedirs('../install', exist_ok=True)\n"
-        "open('bot_publisher/own.py', 'w').write('')\n"
-        "os.path.islink('bot_publisher/passwd') or "
-        "os.symlink('/etc/passwd', 'bot_publisher/passwd')",
+        at_build=PLANT,
+        lost=frozenset({"builds"}),
+        named=("'share/passwd', a link out to '/etc/passwd'",),
     ),
     "build_installs_outside": Attack(
         at_build="import setuptools\n_s = setuptools.setup\ndef setup(**k):\n"
@@ -265,6 +328,7 @@ HONEST = {
     "stops_too_early": Attack("node.timer.cancel()", lost=frozenset({"messages"})),
     "crashes": Attack("raise ValueError('a mistake')", lost=ALIVE),
     "uses_what_is_allowed": Attack(at_import="import scipy"),
+    "does_unusual_things": Attack(UNUSUAL),
     "uses_what_is_not": Attack(
         at_import="import pydantic",
         lost=frozenset({"starts"}),
@@ -273,15 +337,6 @@ HONEST = {
     "does_not_build": Attack(at_build="raise ValueError('a mistake')", lost=frozenset({"builds"})),
 }
 """Right and wrong, without any bad intent."""
-UNSEEN = frozenset(
-    {
-        "kills_the_probe",
-        "garbage_on_dds_ports",
-        "burns_the_cpus",
-        "build_plants_links",
-    }
-)
-"""What is refused or ignored without any effect: nobody is told, see docs/sandbox.md."""
 
 
 @dataclass(frozen=True)
@@ -370,7 +425,7 @@ def test_an_attack_costs_its_own_points_and_is_named(name: str, graded: dict[str
     assert handed.result.graded, str(handed)
     for text in attack.named:
         assert text in handed.told, str(handed)
-    assert attack.named or attack.lost or name in UNSEEN
+    assert handed.result.score is not None and handed.result.score < handed.result.max_score
 
 
 @pytest.mark.timeout(500)
@@ -381,7 +436,7 @@ def test_an_honest_grade_is_the_same_byte_for_byte(
     assert calm[name].failed == HONEST[name].lost, str(calm[name])
     for text in HONEST[name].named:
         assert text in calm[name].told, str(calm[name])
-    assert grade_json(graded[name].result) == grade_json(calm[name].result)
+    assert grade_json(graded[name].result) == grade_json(calm[name].result), str(graded[name])
 
 
 def test_nothing_is_left_running(graded: dict[str, Handed]) -> None:

@@ -1,6 +1,7 @@
 """What a submission cannot read, write or reach: at build, at import, in the node.
 
-One source tries some forty things and says what came of each. The control runs the same source
+One source tries some forty things and says what came of each. A node is ended for some of them,
+which :mod:`tests.attacks.test_hostile` tries one by one. The control runs the same source
 as the ordinary process that it would be without a sandbox.
 """
 
@@ -56,7 +57,7 @@ def outcomes(text: str) -> dict[str, str]:
 
 def all_refused(text: str) -> None:
     found = outcomes(text)
-    assert len(found) >= 40
+    assert len(found) >= 37
     succeeded = [line for line in text.splitlines() if re.search(r"ATTACK \w+ succeeded", line)]
     assert not succeeded
 
@@ -93,8 +94,8 @@ def test_nothing_is_reached_by_a_node_or_at_its_import(
 ) -> None:
     submission = write_submission(
         tmp_path / "eve",
-        at_import="from bot_publisher import spy\nspy.main()",
-        attack="spy.main()",
+        at_import="from bot_publisher import spy\nspy.main(but=spy.NOTICED)",
+        attack="spy.main(but=spy.NOTICED)",
         files={"bot_publisher/spy.py": targets.spy()},
     )
     graded = grading.grade(submission, tmp_path / "out")

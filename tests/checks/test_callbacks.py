@@ -214,7 +214,8 @@ class TestNearMisses:
     def test_other_words(self):
         subject = run(messages={EVENTS: (report(1.0, "timer_1 started"),)})
         words = failed("run", subject, ["timer_1"], period="1 s")
-        assert "no reports, such as 'timer_1 started'" in words
+        assert "no message on `/events` is a report" in words
+        assert "there is 'timer_1 started', for example" in words
         assert "such as `timer_1 start`" in words
 
     def test_only_starts(self):

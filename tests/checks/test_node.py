@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.recording.model import Ending, Intervention, Owner, Wait
+from grader.recording.model import Breach, Ending, Intervention, Owner, Wait
 from grader.submission.record import BuildRecord, SourceError
 from tests.checks.builder import (
     BOT,
@@ -175,7 +175,7 @@ class TestExists:
         [
             (-11, "SIGSEGV (segmentation fault)"),
             (139, "SIGSEGV (segmentation fault), reported as exit code 139"),
-            (-9, "SIGKILL (killed, usually for too much memory)"),
+            (-9, "SIGKILL (killed: by itself, or for too much memory)"),
             (-6, "SIGABRT (abort)"),
             (3, "exit code 3"),
         ],
@@ -257,6 +257,34 @@ class TestStarts:
 
 
 class TestAlive:
+    def test_what_is_never_allowed_costs_the_check_even_where_the_node_ran_to_its_end(self):
+        deed = "sent SIGKILL to the process that holds their sandbox"
+        run = recording(breaches=(Breach(at(1.0), "forbidden call", deed, ""),))
+        found = failing("node.alive", run)
+        assert found.startswith(
+            "its processes sent SIGKILL to the process that holds their sandbox, which is never "
+            "allowed"
+        )
+        assert judge("node.alive", replace(run, breaches=())).status is Status.PASSED
+
+    def test_a_limit_that_did_not_end_anything_costs_nothing(self):
+        full = Breach(at(1.0), "disk", "all space in /tmp and home", "64 MiB")
+        assert judge("node.alive", recording(breaches=(full,))).status is Status.PASSED
+
+    @pytest.mark.parametrize(
+        ("what", "taken", "allowed"),
+        [
+            ("cpu time", "more than 2 s of CPU time", "2 s"),
+            ("forbidden packets", "sent garbage to the UDP ports of the probe", ""),
+        ],
+    )
+    def test_who_was_ended_for_it_reads_why(self, what, taken, allowed):
+        breach = Breach(at(1.0), what, taken, allowed)
+        run = nodeless(processes=(died(-9),), ending=Ending.EXITED, breaches=(breach,))
+        finding = judge("node.alive", run)
+        assert finding.status is Status.FAILED
+        assert str(breach) in finding.observed and finding.hint
+
     def test_a_node_that_runs_until_sigint_passes_whatever_its_exit_code(self):
         for exit_code in (0, 1, -2, 130):
             run = recording(processes=(process(exit_code=exit_code),))

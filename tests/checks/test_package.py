@@ -61,6 +61,12 @@ class TestFound:
         found = self.found(submission(package("bot_publishr")))
         assert "found package `bot_publishr`" in found
         assert "<name>bot_publisher</name>" in found
+        assert "in setup.py, setup.cfg, resource/" in found
+
+    def test_a_misspelt_name_of_a_cmake_package(self):
+        found = self.found(submission(package("bot_publishr", build_type="ament_cmake")))
+        assert "in project(...) of CMakeLists.txt" in found
+        assert "setup.py" not in found
 
     def test_other_packages_only(self):
         found = self.found(submission(package("alpha"), package("omega")))

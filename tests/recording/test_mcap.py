@@ -256,15 +256,20 @@ def test_a_damaged_file_is_one_clear_error(tmp_path: Path, size: int) -> None:
         read_recording(file)
 
 
-def test_flipped_bytes_never_end_in_a_traceback(tmp_path: Path) -> None:
+@pytest.mark.parametrize("flipped", [0x01, 0x10, 0xFF])
+def test_a_flipped_byte_is_never_another_recording(
+    tmp_path: Path, flipped: int, capfd: pytest.CaptureFixture[str]
+) -> None:
     file = written(tmp_path, a_recording(), raw(3_000, *range(6)))
-    good = file.read_bytes()
+    good, recording = file.read_bytes(), read_recording(file)
     for place in range(0, len(good), 7):
-        file.write_bytes(good[:place] + bytes([good[place] ^ 0xFF]) + good[place + 1 :])
+        damaged = bytes([good[place] ^ flipped])
+        file.write_bytes(good[:place] + damaged + good[place + 1 :])
         try:
-            read_recording(file)
+            assert read_recording(file) == recording, f"byte {place}"
         except UsageError as error:
             assert str(file) in str(error)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_file_that_is_not_there_is_an_error(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.finding import Moment, Plot
-from grader.recording.model import Ending, Message, Process
+from grader.recording.model import Call, Ending, Message, Process
 from grader.report.flags import Flag, place
 from grader.report.plot import draw_plot
 from grader.report.svg import NARROW, WIDE, Scale, fitted, ticks
@@ -173,11 +173,22 @@ class TestTimeline:
         for text in (
             "bot_publisher/bot_pub: ran for 1.90 s",
             "/cmd_vel: 4 messages",
-            "parameter service: 2 calls, 1 without an answer",
+            "parameter service: 2 calls, 1 cut off by the end",
             "output: 1 line",
             "findings: 1 moment",
         ):
             assert text in description
+
+    def test_a_call_goes_wrong_unless_the_end_cuts_it_off(self):
+        service = "/bot_publisher/list_parameters"
+        lost, cut_off = Call(service, "", at(0.6)), Call(service, "", at(1.7))
+        svg = draw_timeline(make_run(calls=(lost, cut_off)), (), "t").wide
+        assert "2 calls, 1 without an answer, 1 cut off by the end" in words(svg)
+        assert len(of_class(svg, "out")) == 1
+
+    def test_a_call_of_a_scenario_is_never_cut_off(self):
+        svg = draw_timeline(make_run(calls=(Call("/add", "", at(1.7)),)), (), "t").wide
+        assert "1 call, 1 without an answer" in words(svg)
 
     def test_a_process_that_a_signal_ended(self):
         process = Process(PROCESS, 1, at(0.0), at(0.9), -11, "itself")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from grader.recording.model import (
+    Breach,
     Declaration,
     Endpoint,
     Kind,
@@ -47,6 +48,8 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
 def test_who_writes_to_the_tracer_s_pipe_is_named_once() -> None:
     foreign = Declaration(0, "bot/bot", "foreign", {})
     (said,) = remarks(run(declarations=(foreign, foreign)))
+    ended = Breach(0, "forged report", "wrote into the channel", "")
+    assert remarks(run(declarations=(foreign,), breaches=(ended,))) == ()
     assert said.startswith("`bot/bot` wrote into the channel")
 
 

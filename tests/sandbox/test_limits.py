@@ -14,7 +14,7 @@ from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.recording.model import Breach
 from grader.run.enclosure import Enclosure
 from grader.sandbox.limits import BUILD, Limits
-from grader.sandbox.usage import descendants, folder_usage, memory_bytes, thread_count
+from grader.sandbox.usage import cpu_time_s, descendants, folder_usage, memory_bytes, thread_count
 
 
 def test_an_author_s_limits_reach_the_command_in_front_of_the_program() -> None:
@@ -27,7 +27,7 @@ def test_an_author_s_limits_reach_the_command_in_front_of_the_program() -> None:
         "--nproc=40",
         "--nofile=1024",
         "--fsize=1048576",
-        "--cpu=120",
+        "--cpu=130",
         "--core=0",
     ]
 
@@ -59,7 +59,9 @@ def test_a_wrong_limit_is_refused_with_its_reason(written: object, problem: str)
 
 
 def test_the_enclosure_of_an_order_survives_json() -> None:
-    enclosure = Enclosure(("--ro-bind", "/a", "/b"), "/cell/x", Limits(), {"/ws/a": "/cell/a"})
+    enclosure = Enclosure(
+        ("--ro-bind", "/a", "/b"), "/cell/x", "/cell/y", {"bpf": 1}, Limits(), {"/ws/a": "/cell/a"}
+    )
     assert Enclosure.from_dict(json.loads(json.dumps(dataclasses.asdict(enclosure)))) == enclosure
     assert enclosure.outside("/ws/a/lib/x") == Path("/cell/a/lib/x")
     assert enclosure.outside("/ws/ab") == Path("/ws/ab")
@@ -68,6 +70,12 @@ def test_the_enclosure_of_an_order_survives_json() -> None:
 def test_a_breach_says_what_was_taken_and_what_is_allowed() -> None:
     breach = Breach(1, "memory", "461 MiB of memory", "400 MiB")
     assert str(breach) == "its processes took 461 MiB of memory, 400 MiB are allowed"
+    assert breach.ended
+
+
+def test_a_breach_of_what_is_never_allowed_says_what_was_done() -> None:
+    breach = Breach(1, "forbidden call", "called `bpf`", "")
+    assert str(breach) == "its processes called `bpf`, which is never allowed"
     assert breach.ended
 
 
@@ -82,4 +90,6 @@ def test_usage_is_measured(tmp_path: Path) -> None:
     assert memory_bytes([os.getpid()], 0) > 2**20
     assert memory_bytes([0], 0) == 0
     assert thread_count([os.getpid()]) >= 1
+    assert cpu_time_s([os.getpid()]) > 0
+    assert cpu_time_s([0]) == 0
     assert os.getpid() in descendants(os.getppid())

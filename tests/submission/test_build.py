@@ -12,6 +12,7 @@ import pytest
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
+from grader.sandbox.sandbox import Sandbox
 from grader.submission.build_key import build_key
 from grader.submission.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
@@ -279,6 +280,22 @@ def test_a_colcon_that_is_killed_is_no_fault_of_the_student(
     tree.package({"setup.py": f"import os\nos.kill(os.getppid(), 9)\n{SETUP_PY}"})
     with pytest.raises(GraderFault, match="killed by signal 9"):
         prepared(tree, real_ros)
+
+
+def test_a_sandbox_that_does_not_start_is_no_fault_of_the_student(
+    tree: Tree, real_ros: RosInstallation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bwrap = tmp_path / "bin/bwrap"
+    bwrap.parent.mkdir()
+    bwrap.write_text("#!/bin/sh\necho bwrap: Creating new namespace failed >&2\nexit 1\n")
+    bwrap.chmod(0o755)
+    tree.package()
+    cache = tree.root.parent / "cache"
+    with monkeypatch.context() as patched:
+        patched.setenv("PATH", f"{bwrap.parent}:{os.environ['PATH']}")
+        with pytest.raises(GraderFault, match="sandbox of the build could not be started"):
+            prepare(tree.root, real_ros, cache=cache, sandbox=Sandbox(cache))
+    assert list(cache.rglob("build.json")) == []
 
 
 @pytest.mark.slow

@@ -106,10 +106,21 @@ def test_an_install_space_is_tidied_before_anybody_looks_into_it(tmp_path: Path)
     (install / "lib").mkdir(parents=True)
     (install / "lib/libx.so.1").touch()
     (install / "lib/libx.so").symlink_to("libx.so.1")
-    assert tidy(install, most_bytes=10**6, most_files=10) is None
+    assert tidy(install, tmp_path / "src", most_bytes=10**6, most_files=10) is None
     assert {path.name for path in (install / "lib").iterdir()} == {"libx.so.1", "libx.so"}
-    assert tidy(install, most_bytes=1000, most_files=1) is not None
+    assert tidy(install, tmp_path / "src", most_bytes=1000, most_files=1) is not None
     assert not install.exists()
+
+
+def test_links_to_the_sources_or_to_nothing_go_and_cost_nothing(tmp_path: Path) -> None:
+    install, sources = tmp_path / "install", tmp_path / "src"
+    (install / "lib").mkdir(parents=True)
+    sources.mkdir()
+    (sources / "x.yaml").touch()
+    (install / "lib/x.yaml").symlink_to(sources / "x.yaml")
+    (install / "lib/gone.yaml").symlink_to("/home/student/ros2_ws/src/gone.yaml")
+    assert tidy(install, sources, most_bytes=10**6, most_files=10) is None
+    assert list((install / "lib").iterdir()) == []
 
 
 def test_what_leads_out_of_an_install_space_is_named_and_nothing_of_it_is_used(
@@ -118,11 +129,11 @@ def test_what_leads_out_of_an_install_space_is_named_and_nothing_of_it_is_used(
     install = tmp_path / "install"
 
     def refused() -> str | None:
-        return tidy(install, most_bytes=10**6, most_files=10)
+        return tidy(install, tmp_path / "src", most_bytes=10**6, most_files=10)
 
     (install / "lib").mkdir(parents=True)
     (install / "lib/etc").symlink_to("/etc")
-    assert refused() == "the build installed 'lib/etc', a link that leads out to '/etc'"
+    assert refused() == "the build installed 'lib/etc', a link out to '/etc'"
     assert not install.exists()
     (install / "lib").mkdir(parents=True)
     (install / "lib/up").symlink_to("../../..")
@@ -137,6 +148,6 @@ def test_a_link_in_place_of_the_install_space_is_taken_away(tmp_path: Path) -> N
     (tmp_path / "precious").mkdir()
     (tmp_path / "precious/link").symlink_to("/etc")
     (tmp_path / "install").symlink_to("precious")
-    assert tidy(tmp_path / "install", most_bytes=1000, most_files=10) is not None
+    assert tidy(tmp_path / "install", tmp_path, most_bytes=1000, most_files=10) is not None
     assert (tmp_path / "precious/link").is_symlink()
     assert not (tmp_path / "install").exists()

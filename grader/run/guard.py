@@ -1,0 +1,131 @@
+"""Sees system calls of the student's processes that a sandbox refuses, and says what they were.
+
+The kernel asks a process of ours before it goes on with such a call (seccomp_unotify(2)). The
+filter that makes it ask belongs to a thread, and to all that is started from it: so the
+student's sandboxes are started from one thread, and the cell itself is not under it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import errno
+import fcntl
+import os
+import select
+import struct
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TypeVar
+
+from grader.sandbox.seccomp import told_of
+
+# linux/seccomp.h
+_SET_MODE_FILTER, _NEW_LISTENER = 1, 1 << 3
+_NOTIF_RECV, _NOTIF_SEND = 0xC050_2100, 0xC018_2101
+_PR_SET_NO_NEW_PRIVS = 38
+_INSTRUCTION_BYTES = 8
+# id, process, flags, number, architecture, instruction, six arguments
+_ASKED = struct.Struct("=QIIiIQ6Q")
+# id, value, negative error, flags
+_ANSWER = struct.Struct("=QqiI")
+
+_Started = TypeVar("_Started")
+
+
+class Guard:
+    """Starts the student's sandboxes, and refuses what is asked of it."""
+
+    def __init__(self, program: bytes, calls: Mapping[str, int]) -> None:
+        """Stand guard.
+
+        Args:
+            program: :func:`grader.sandbox.seccomp.guard_filter`.
+            calls: :func:`grader.sandbox.seccomp.guarded_calls`.
+
+        Raises:
+            OSError: The kernel takes no such filter.
+        """
+        self._names = {number: name for name, number in calls.items()}
+        self._starter = ThreadPoolExecutor(1, "starter")
+        self._listener = self._starter.submit(_install, program, calls["seccomp"]).result()
+        self._deeds: list[str] = []
+        self._wake_read, self._wake_write = os.pipe()
+        self._thread = threading.Thread(target=self._listen, name="guard", daemon=True)
+        self._thread.start()
+
+    @classmethod
+    def from_file(cls, program: Path, calls: Mapping[str, int]) -> Guard:
+        """Read the filter from a file."""
+        return cls(program.read_bytes(), calls)
+
+    def start(self, start: Callable[[], _Started]) -> _Started:
+        """Start something under guard.
+
+        Raises:
+            OSError: It cannot be executed.
+        """
+        return self._starter.submit(start).result()
+
+    @property
+    def deeds(self) -> tuple[str, ...]:
+        """What the student's processes did so far that nobody may, in words."""
+        return tuple(self._deeds)
+
+    def close(self) -> None:
+        """End; call it when nothing that was started lives any more."""
+        os.write(self._wake_write, b".")
+        self._thread.join()
+        self._starter.shutdown()
+        for descriptor in (self._wake_read, self._wake_write, self._listener):
+            if descriptor is not None:
+                os.close(descriptor)
+
+    def _listen(self) -> None:
+        if self._listener is None:
+            return
+        poll = select.poll()
+        poll.register(self._listener, select.POLLIN)
+        poll.register(self._wake_read, select.POLLIN)
+        while True:
+            ready = dict(poll.poll())
+            if self._wake_read in ready:
+                return
+            if ready.get(self._listener, 0) & select.POLLIN:
+                # Whoever asked may have been killed meanwhile.
+                with contextlib.suppress(OSError):
+                    self._answer(self._listener)
+
+    def _answer(self, listener: int) -> None:
+        asked = bytearray(_ASKED.size)
+        fcntl.ioctl(listener, _NOTIF_RECV, asked, True)
+        number, _pid, _flags, call, _architecture, _place, *arguments = _ASKED.unpack(asked)
+        deed = told_of(self._names.get(call, f"system call {call}"), arguments)
+        if deed is not None and deed not in self._deeds:
+            self._deeds.append(deed)
+        fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, -errno.EPERM, 0))
+
+
+def _install(program: bytes, call: int) -> int | None:
+    """Put this thread under the filter.
+
+    Returns:
+        What the kernel asks through. None where somebody around us listens already (a container
+        may): the same calls are then refused, and nobody is told.
+    """
+    libc = ctypes.CDLL(None, use_errno=True)
+    code = ctypes.create_string_buffer(program, len(program))
+
+    class Filter(ctypes.Structure):
+        _fields_ = (("count", ctypes.c_ushort), ("code", ctypes.c_void_p))
+
+    given = Filter(len(program) // _INSTRUCTION_BYTES, ctypes.addressof(code))
+    libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+    for flags in (_NEW_LISTENER, 0):
+        done = libc.syscall(call, _SET_MODE_FILTER, flags, ctypes.byref(given))
+        if done != -1:
+            return done if flags else None
+    number = ctypes.get_errno()
+    raise OSError(number, f"seccomp: {os.strerror(number)}")

@@ -1,0 +1,88 @@
+"""A guard in this process: what it is told of, and what it says of that."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from grader.run.guard import Guard
+from grader.sandbox.seccomp import guard_filter, guarded_calls, told_of
+
+pytest.importorskip("pyseccomp")
+CALLS = guarded_calls()
+INIT, OTHER = 1, 2
+
+
+@pytest.fixture
+def guard() -> Iterator[Guard]:
+    guard = Guard(guard_filter(), CALLS)
+    yield guard
+    guard.close()
+
+
+def run(guard: Guard, source: str) -> str:
+    command = [sys.executable, "-S", "-c", source]
+    return guard.start(
+        lambda: subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "said"),
+    [
+        ("kill", (INIT, 9), "sent SIGKILL to the process that holds their sandbox"),
+        ("tgkill", (INIT, 1, 15), "sent SIGTERM to the process that holds their sandbox"),
+        ("kill", (INIT, 99), "sent signal 99 to the process that holds their sandbox"),
+        ("ptrace", (16, INIT), "called `ptrace` on the process that holds their sandbox"),
+        ("ptrace", (16, OTHER), None),
+        ("process_vm_readv", (INIT,), "called `process_vm_readv` on the process that holds their"),
+        ("reboot", (0,), "called `reboot`"),
+    ],
+)
+def test_a_call_is_put_into_words(name: str, arguments: tuple[int, ...], said: str | None) -> None:
+    told = told_of(name, (*arguments, *(0,) * (6 - len(arguments))))
+    assert told == said if said is None else told is not None and told.startswith(said)
+
+
+def test_a_process_id_counts_by_the_bits_that_the_kernel_looks_at() -> None:
+    assert told_of("kill", ((1 << 32) + INIT, 9, 0, 0, 0, 0)) is not None
+
+
+def test_what_a_process_asks_for_is_refused_and_told(guard: Guard) -> None:
+    source = (
+        "import ctypes\n"
+        "libc = ctypes.CDLL(None, use_errno=True)\n"
+        f"print(libc.syscall({CALLS['bpf']}, 0, 0, 0), ctypes.get_errno())\n"
+        "import os\n"
+        "try:\n    os.kill(1, 15)\nexcept PermissionError:\n    print('refused')"
+    )
+    assert run(guard, source).split() == ["-1", "1", "refused"]
+    assert guard.deeds == (
+        "called `bpf`",
+        "sent SIGTERM to the process that holds their sandbox",
+    )
+
+
+def test_a_process_may_do_what_it_likes_with_its_own(guard: Guard) -> None:
+    source = (
+        "import os, signal, subprocess\n"
+        "signal.signal(signal.SIGUSR1, lambda *_: print('heard'))\n"
+        "os.kill(os.getpid(), signal.SIGUSR1)\n"
+        "signal.raise_signal(signal.SIGUSR1)\n"
+        "child = subprocess.Popen(['sleep', '60'])\n"
+        "child.kill()\n"
+        "print(child.wait())\n"
+    )
+    assert run(guard, source).split() == ["heard", "heard", "-9"]
+    assert guard.deeds == ()
+
+
+def test_who_stands_guard_is_not_under_it(guard: Guard) -> None:
+    run(guard, "")
+    # No such command: whoever asks, it comes to nothing.
+    assert ctypes.CDLL(None).syscall(CALLS["bpf"], -1, 0, 0) == -1
+    assert guard.deeds == ()
