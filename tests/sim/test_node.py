@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import sys
 import threading
 import time
-import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -28,9 +26,7 @@ from grader.run.domain import lock_domain
 from sim.description import SimulatorOptions
 from sim.motion import NS, Pose, Twist
 from sim.node import RosSimulator, make_node
-from sim.odometry import OdometrySample
 from sim.pacing import MAX_BATCH, Lateness
-from sim.publishers import TransformPublisher, transform_type
 from sim.simulation import STEP_NS, EventKind, Step, make_simulation
 from sim.world import parse_world
 
@@ -420,53 +416,3 @@ def test_the_loop_ends_with_its_context(bench: Bench) -> None:
     bench.context.try_shutdown()
     loop.join(LIMIT_S)
     assert not loop.is_alive()
-
-
-class TransformMessage:
-    """Stands in for tf2_msgs/msg/TFMessage, which the package index does not have."""
-
-    def __init__(self, transforms: list[Any]) -> None:
-        self.transforms = transforms
-
-
-class FakeNode:
-    """Keeps what is published, by topic."""
-
-    def __init__(self) -> None:
-        self.published: dict[str, list[Any]] = {}
-        self.qos: dict[str, QoSProfile] = {}
-
-    def create_publisher(self, kind: Any, topic: str, qos: QoSProfile, **_: Any) -> Any:
-        messages = self.published.setdefault(topic, [])
-        self.qos[topic] = qos
-        return types.SimpleNamespace(publish=messages.append)
-
-
-def test_transforms_say_what_odometry_says_and_where_the_lidar_sits() -> None:
-    options = SimulatorOptions.model_validate({"lidar": {"pose": [-0.032, 0, "180 deg"]}})
-    lidar = make_simulation(ROOM, options).lidar
-    node: Any = FakeNode()
-    tf = TransformPublisher(node, options.topics.tf, options.odometry, lidar, TransformMessage)
-    tf.publish_static(3 * NS + 7)
-    tf.publish(OdometrySample(0, Pose(1.0, 2.0, math.pi / 2), Twist(0.0, 0.0)), 4 * NS)
-    (static,) = node.published["/tf_static"][0].transforms
-    assert (static.header.frame_id, static.child_frame_id) == ("base_footprint", "base_scan")
-    assert (static.header.stamp.sec, static.header.stamp.nanosec) == (3, 7)
-    assert static.transform.translation.x == -0.032
-    assert abs(static.transform.rotation.z) == pytest.approx(1.0)
-    assert node.qos["/tf_static"].durability == DurabilityPolicy.TRANSIENT_LOCAL
-    (moving,) = node.published["/tf"][0].transforms
-    assert (moving.header.frame_id, moving.child_frame_id) == ("odom", "base_footprint")
-    assert (moving.transform.translation.x, moving.transform.translation.y) == (1.0, 2.0)
-    assert moving.transform.rotation.z == pytest.approx(math.sqrt(0.5))
-    assert node.qos["/tf"].durability == DurabilityPolicy.VOLATILE
-
-
-def test_transforms_are_there_where_tf2_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    module: Any = types.ModuleType("tf2_msgs.msg")
-    module.TFMessage = TransformMessage
-    monkeypatch.setitem(sys.modules, "tf2_msgs", types.ModuleType("tf2_msgs"))
-    monkeypatch.setitem(sys.modules, "tf2_msgs.msg", module)
-    assert transform_type() is TransformMessage
-    monkeypatch.setitem(sys.modules, "tf2_msgs.msg", None)
-    assert transform_type() is None

@@ -1,0 +1,163 @@
+"""/tf and /tf_static, with a tf2_msgs that colcon generated: the package index has none."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from grader import ros
+from grader.run.domain import lock_domain
+from grader.submission.prepare import prepare
+
+pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.compiles]
+
+ROOT = Path(__file__).parents[2]
+LIMIT_S = 60.0
+MANIFEST = """\
+<?xml version="1.0"?>
+<package format="3">
+  <name>tf2_msgs</name>
+  <version>0.36.0</version>
+  <description>Transforms.</description>
+  <maintainer email="nobody@example.com">Nobody</maintainer>
+  <license>BSD-3-Clause</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+  <depend>geometry_msgs</depend>
+  <exec_depend>rosidl_default_runtime</exec_depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+  <export><build_type>ament_cmake</build_type></export>
+</package>
+"""
+CMAKE = """\
+cmake_minimum_required(VERSION 3.8)
+project(tf2_msgs)
+find_package(ament_cmake REQUIRED)
+find_package(geometry_msgs REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(${PROJECT_NAME} "msg/TFMessage.msg" DEPENDENCIES geometry_msgs)
+ament_package()
+"""
+WORLD = "bounds: [-1, -2, 3, 4]\nstart: [1, 2, 90 deg]\n"
+OPTIONS = "lidar: {pose: [-0.032, 0, 180 deg]}\n"
+LISTENER = """\
+import json, sys
+import rclpy
+from nav_msgs.msg import Odometry
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from tf2_msgs.msg import TFMessage
+
+heard = {'/tf': {}, '/odom': {}}
+
+def stamp(header):
+    return header.stamp.sec, header.stamp.nanosec
+
+def plain(one):
+    move, turn = one.transform.translation, one.transform.rotation
+    frames = [one.header.frame_id, one.child_frame_id]
+    return {'frames': frames, 'place': [move.x, move.y], 'turn': [turn.z, turn.w]}
+
+def on_odometry(message):
+    pose = message.pose.pose
+    heard['/odom'][stamp(message.header)] = {
+        'frames': [message.header.frame_id, message.child_frame_id],
+        'place': [pose.position.x, pose.position.y],
+        'turn': [pose.orientation.z, pose.orientation.w],
+    }
+
+def on_transform(message):
+    [one] = message.transforms
+    heard['/tf'][stamp(one.header)] = plain(one)
+
+def on_static(message):
+    heard['/tf_static'] = [plain(one) for one in message.transforms]
+
+rclpy.init(domain_id=int(sys.argv[1]))
+node = rclpy.create_node('listener')
+late = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+node.create_subscription(Odometry, '/odom', on_odometry, 10)
+node.create_subscription(TFMessage, '/tf', on_transform, 10)
+node.create_subscription(TFMessage, '/tf_static', on_static, late)
+both = set()
+while not both or '/tf_static' not in heard:
+    rclpy.spin_once(node)
+    both = heard['/tf'].keys() & heard['/odom'].keys()
+at = both.pop()
+print(json.dumps([heard['/tf'][at], heard['/odom'][at], heard['/tf_static']]))
+"""
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Variables of a shell with tf2_msgs in it."""
+    folder = tmp_path_factory.mktemp("tf2")
+    package = folder / "tf2_msgs"
+    (package / "msg").mkdir(parents=True)
+    (package / "package.xml").write_text(MANIFEST)
+    (package / "CMakeLists.txt").write_text(CMAKE)
+    (package / "msg/TFMessage.msg").write_text("geometry_msgs/TransformStamped[] transforms\n")
+    found = ros.find()
+    prepared = prepare(package, found, cache=folder / "cache")
+    assert prepared.install is not None, prepared.record.build
+    return {
+        **found.environment(os.environ, (prepared.install,)),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
+
+
+@pytest.fixture(scope="module")
+def heard(environment: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    """What `python -m sim` says on /tf and /odom at one time, and late on /tf_static."""
+    folder = tmp_path_factory.mktemp("worlds")
+    world, options = folder / "room.yaml", folder / "options.yaml"
+    world.write_text(WORLD)
+    options.write_text(OPTIONS)
+    with lock_domain() as domain:
+        number = str(domain.domain_id)
+        command = [sys.executable, "-m", "sim", str(world), "--options", str(options)]
+        simulator = subprocess.Popen(
+            [*command, "--domain-id", number],
+            cwd=ROOT,
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert simulator.stdout is not None
+            # It has published where the LiDAR sits by now.
+            simulator.stdout.readline()
+            told = subprocess.run(
+                [sys.executable, "-c", LISTENER, number],
+                env=environment,
+                stdout=subprocess.PIPE,
+                timeout=LIMIT_S,
+                check=True,
+            )
+        finally:
+            simulator.kill()
+            simulator.communicate()
+    found: list[Any] = json.loads(told.stdout)
+    return found
+
+
+def test_transforms_say_what_odometry_says(heard: list[Any]) -> None:
+    moving, odometry, _ = heard
+    assert moving == odometry
+    assert moving["frames"] == ["odom", "base_footprint"]
+
+
+def test_a_late_joiner_is_told_where_the_lidar_sits(heard: list[Any]) -> None:
+    [fixed] = heard[2]
+    assert fixed["frames"] == ["base_footprint", "base_scan"]
+    assert fixed["place"] == [-0.032, 0.0]
+    assert abs(fixed["turn"][0]) == pytest.approx(1.0)
+    assert abs(2.0 * math.acos(fixed["turn"][1])) == pytest.approx(math.pi)
