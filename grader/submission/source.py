@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+import threading
 import warnings
 
 from grader.submission.record import SourceError
@@ -16,6 +17,9 @@ _TRIED_APART_FROM_BYTES = 64 * 1024
 _TRY_S = 20
 _TRY = "import ast, sys; ast.parse(sys.stdin.buffer.read())"
 _TOO_COMPLEX = "Python cannot parse this file: it is nested too deeply"
+# Before 3.11.5 two threads of CPython that parse at the same time count their depths together, and
+# one ends with a SystemError (python/cpython#106905); to catch warnings is for one at a time too.
+_ONE_AT_A_TIME = threading.Lock()
 
 
 def parse(data: bytes, file: str) -> ast.Module | SourceError:
@@ -33,7 +37,7 @@ def parse(data: bytes, file: str) -> ast.Module | SourceError:
     if len(data) > _TRIED_APART_FROM_BYTES and not _survives(data):
         return SourceError(file, None, _TOO_COMPLEX)
     try:
-        with warnings.catch_warnings():
+        with _ONE_AT_A_TIME, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return ast.parse(data)
     except SyntaxError as error:

@@ -1,6 +1,10 @@
 from __future__ import annotations
 
 import ast
+import gc
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from hypothesis import given, settings
@@ -86,3 +90,37 @@ def test_a_script_is_known_by_its_first_line() -> None:
     assert is_python_script(b"#!/usr/bin/env python3\nimport rclpy\n")
     assert not is_python_script(b"#!/bin/sh\npython3 -m bot\n")
     assert not is_python_script(b"import rclpy\n")
+
+
+class Garbage:
+    """Collected at any moment, with code of its own: Python may then turn to another thread."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+    def __del__(self) -> None:
+        for _ in range(50):
+            pass
+
+
+@pytest.fixture
+def restless() -> Iterator[None]:
+    """Threads and the collector take turns as often as they can."""
+    interval_s, thresholds = sys.getswitchinterval(), gc.get_threshold()
+    sys.setswitchinterval(1e-6)
+    gc.set_threshold(50, 2, 2)
+    yield
+    sys.setswitchinterval(interval_s)
+    gc.set_threshold(*thresholds)
+
+
+@pytest.mark.usefixtures("restless")
+def test_a_class_is_parsed_by_many_threads_at_once() -> None:
+    data = b"def f(x):\n    return [x, {x: (x, -x)}, lambda y: x + y * 2]\n" * 60
+
+    def read(_: int) -> bool:
+        Garbage()
+        return isinstance(parse(data, "node.py"), ast.Module)
+
+    with ThreadPoolExecutor(6) as pool:
+        assert all(pool.map(read, range(600)))
