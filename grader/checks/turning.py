@@ -19,6 +19,7 @@ from grader.checks.immobility import why_cut_short
 from grader.checks.measure import degrees, metres, speed
 from grader.checks.reference import GoalPose
 from grader.checks.track import speed_plot
+from grader.checks.wording import counted
 from grader.recording.model import NS, Recording, Truth
 from sim.motion import wrap_angle
 
@@ -174,7 +175,7 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     first = detours[0]
     when_s = recording.since_launch_s(first.step.time_ns)
     long_rad = math.tau - abs(first.error_rad)
-    more = f", and {len(detours) - 1} more times" if len(detours) > 1 else ""
+    more = f", and {counted(len(detours) - 1, 'more time')}" if len(detours) > 1 else ""
     return Finding.failed(
         expected,
         f"turned away from {first.what} through half a turn: {degrees(long_rad)} "

@@ -180,7 +180,10 @@ def _complains(entry: LogLine) -> bool:
 
 
 def _is_lost(call: Call, asked: str, recording: Recording) -> bool:
-    """Whether a call should have been answered; the end cuts off the last one of a series."""
+    """Whether a call should have been answered; the end cuts off the last one of a series.
+
+    An answer may take 1 s, as ``executor.responsive`` has it by default.
+    """
     at_the_end = asked == _OWN_SERVICE and call.requested_ns > recording.stop_ns - NS
     return call.answered_ns is None and not at_the_end
 

@@ -26,6 +26,7 @@ _UID = 1000
 _TRACER = Path("/opt/tracer")
 _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
 _FILTER, _GUARD, _WORLD, _PASSWD_FILE = "student.bpf", "guard.bpf", "world.yaml", "passwd"
+_SYSTEM = "system"
 
 
 def enclose(
@@ -54,6 +55,7 @@ def enclose(
     shutil.copyfile(sandbox.filter_file, folder / _FILTER)
     shutil.copyfile(sandbox.guard_file, folder / _GUARD)
     (folder / _PASSWD_FILE).write_text(_PASSWD, encoding="utf-8")
+    bubblewrap.copy_system_files(folder / _SYSTEM)
     in_cell = {str(path): str(CELL / place) for path, place in copies.items()}
     seen = {str(path): f"{WORKSPACE}/{place}" for path, place in for_student.items()}
     binds = [
@@ -101,7 +103,7 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
     return [
         *bubblewrap.namespaces(_UID, network=False),
         *("--disable-userns", "--hostname", "student"),
-        *bubblewrap.system(),
+        *bubblewrap.system(CELL / _SYSTEM),
         *("--ro-bind", str(CELL / _PASSWD_FILE), "/etc/passwd"),
         # What can be written to comes first: Python may be installed below /tmp.
         *bubblewrap.bound((*writable, *python, *binds)),

@@ -25,6 +25,7 @@ from grader.sandbox.seccomp import told_of
 # linux/seccomp.h
 _SET_MODE_FILTER, _NEW_LISTENER = 1, 1 << 3
 _NOTIF_RECV, _NOTIF_SEND = 0xC050_2100, 0xC018_2101
+# linux/prctl.h
 _PR_SET_NO_NEW_PRIVS = 38
 _INSTRUCTION_BYTES = 8
 # id, process, flags, number, architecture, instruction, six arguments

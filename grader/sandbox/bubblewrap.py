@@ -37,7 +37,8 @@ exec "$@"
 """
 _NAMESPACES = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts")
 _SYSTEM_FOLDERS = ("bin", "sbin", "lib", "lib32", "lib64", "libx32")
-_SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/localtime")
+_LINKS = "/etc/alternatives"
+_SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/localtime")
 
 
 @dataclass(frozen=True)
@@ -71,8 +72,13 @@ def namespaces(uid: int, *, network: bool = True) -> list[str]:
     return [*own, "--uid", str(uid), "--gid", str(uid), "--new-session"]
 
 
-def system() -> list[str]:
-    """The system's programs and libraries, read-only, and an empty /proc, /dev and /tmp."""
+def system(copies: Path | None = None) -> list[str]:
+    """The system's programs and libraries, read-only, and an empty /proc, /dev and /tmp.
+
+    Args:
+        copies: Where :func:`copy_system_files` left the files, as bubblewrap will see it; by
+            default the files themselves are shown.
+    """
     arguments = ["--ro-bind", "/usr", "/usr"]
     for name in _SYSTEM_FOLDERS:
         path = Path("/", name)
@@ -80,10 +86,31 @@ def system() -> list[str]:
             arguments += ["--symlink", str(path.readlink()), str(path)]
         elif path.is_dir():
             arguments += ["--ro-bind", str(path), str(path)]
-    for file in _SYSTEM_FILES:
-        if Path(file).exists():
-            arguments += ["--ro-bind", file, file]
+    if Path(_LINKS).is_dir():
+        arguments += ["--ro-bind", _LINKS, _LINKS]
+    for file in _system_files():
+        source = file if copies is None else copies / file.relative_to("/")
+        arguments += ["--ro-bind", str(source), str(file)]
     return [*arguments, "--proc", "/proc", "--dev", "/dev"]
+
+
+def copy_system_files(folder: Path) -> None:
+    """Copy the files that :func:`system` shows, for a sandbox within a sandbox.
+
+    Whoever installs a package while a class is graded replaces them, and what was replaced can
+    no longer be bound from within a sandbox that has stood before.
+
+    Args:
+        folder: Made if it is not there.
+    """
+    for file in _system_files():
+        copy = folder / file.relative_to("/")
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, copy)
+
+
+def _system_files() -> list[Path]:
+    return [file for file in map(Path, _SYSTEM_FILES) if file.exists()]
 
 
 def variables(environment: Mapping[str, str]) -> list[str]:

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -35,10 +35,7 @@ class Cluster:
         self.file = folder / "scheduler.json"
         self.folder = folder
         self.processes = [self._start("scheduler", "--port", "0", "--no-dashboard")]
-        deadline = time.monotonic() + LIMIT_S
-        while not self.file.exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.05)
+        await_that(self.file.exists)
         self.workers = [self._start("worker", "--nthreads", "1", "--no-nanny") for _ in range(2)]
         self.processes += self.workers
 
@@ -119,10 +116,7 @@ def test_a_cluster_takes_what_its_workers_can_and_is_lost_with_its_scheduler(
     crew = DaskCrew(cluster.address, order)
     assert crew.capacity == 4
     cluster.workers[0].kill()
-    deadline = time.monotonic() + LIMIT_S
-    while crew.capacity != 2:
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    await_that(lambda: crew.capacity == 2)
     submission = tmp_path / "ana"
     shutil.copytree(resources.reference() / ASSIGNMENT, submission)
     on_its_way = crew.submit("ana", submission, tmp_path)
@@ -130,6 +124,13 @@ def test_a_cluster_takes_what_its_workers_can_and_is_lost_with_its_scheduler(
     with pytest.raises(CrewLost, match=r"the Dask scheduler at tcp://.* was lost"):
         on_its_way.result(LIMIT_S)
     crew.close()
+
+
+def await_that(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + LIMIT_S
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
 
 
 def judged(done: Done) -> tuple[str, str, str | None]:

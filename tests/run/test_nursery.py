@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,9 @@ from grader.errors import GraderFault
 from grader.recording.mcap_reader import read_recording
 from grader.run.descendants import descendants
 from grader.run.runner import Runner
+from grader.sandbox import bubblewrap
+from grader.sandbox.sandbox import Sandbox
+from grader.sandbox.trial import try_sandbox
 from tests.run import nodes
 from tests.run.conftest import SUBMISSION, RunNode, assignment, install
 
@@ -47,6 +51,31 @@ def test_a_run_whose_nursery_is_killed_is_a_fault_and_the_next_one_is_not(tmp_pa
         runner.progress = lambda _scenario, _event: None
         runner.run(course, scenario, SUBMISSION, space, file, seed=1)
         assert len(read_recording(file).on("/cmd_vel")) >= 3
+
+
+def test_whoever_installs_a_package_meanwhile_spoils_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = try_sandbox()
+    if found.problem:
+        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
+    course = assignment(until={"messages": 3})
+    space = install(tmp_path, nodes.timed())
+    # Not below /tmp, where a sandbox has its own.
+    with tempfile.TemporaryDirectory(dir="/var/tmp") as etc:
+        linker_cache = Path(etc, "ld.so.cache")
+        linker_cache.write_bytes(b"old")
+        Path(etc).chmod(0o755)
+        monkeypatch.setattr(bubblewrap, "_SYSTEM_FILES", (str(linker_cache),))
+        with Runner(ros.find(), sandbox=Sandbox(tmp_path / "cache")) as runner:
+            for name in ("before", "after"):
+                file = tmp_path / f"{name}.mcap"
+                runner.run(course, course.scenarios[0], SUBMISSION, space, file, seed=1)
+                assert len(read_recording(file).on("/cmd_vel")) >= 3
+                # As ldconfig does it at the end of every installation.
+                new = Path(etc, "ld.so.cache~")
+                new.write_bytes(b"new")
+                new.replace(linker_cache)
 
 
 def test_a_student_inherits_no_descriptor_but_its_own(run_node: RunNode) -> None:
