@@ -9,6 +9,7 @@ from itertools import pairwise
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.contact import why_touched
+from grader.checks.detour import WRAP_HINT, away
 from grader.checks.finding import Evidence, Moment, Plot
 from grader.checks.immobility import why_cut_short, why_not_moved
 from grader.checks.lateness import taken_s
@@ -22,6 +23,7 @@ from sim.motion import Pose, wrap_angle
 _WEAVES = 4
 # Share of the way: who ends so near the goal knows where it is.
 _A_LITTLE = 0.25
+_ASTRAY_RAD = math.radians(30.0)
 NO_SPEED_M_S = 1e-3
 
 
@@ -162,8 +164,17 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
             ours=True,
             disturbed=True,
         )
-    turns = abs(turned_rad(truth)) / math.tau
     moving = f"at {speed(last.linear_m_s)} and {turn(last.angular_rad_s)}"
+    far = [step for step in truth if run.distance_m(step) > position_m]
+    detours = list(away(far, run.bearing_error_rad, _ASTRAY_RAD, "the goal"))
+    if detours:
+        times = "once" if len(detours) == 1 else f"{len(detours)} times"
+        return Cause(
+            f"{seen}: on its way it turned away from the goal through half a turn, {times}",
+            WRAP_HINT,
+            evidence,
+        )
+    turns = abs(turned_rad(truth)) / math.tau
     if turns >= 1.5:
         return Cause(
             f"{seen}: it turned {turns:.1f} times around",

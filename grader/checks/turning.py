@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from itertools import pairwise
 
 from pydantic import Field
@@ -14,6 +13,7 @@ from grader.checks.approach import Approach, approach, why_not_there
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.contact import why_touched
+from grader.checks.detour import WRAP_HINT, Detour, away
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.immobility import why_cut_short
 from grader.checks.measure import degrees, metres, speed
@@ -21,7 +21,6 @@ from grader.checks.reference import GoalPose
 from grader.checks.track import speed_plot
 from grader.checks.wording import counted
 from grader.recording.model import NS, Recording, Truth
-from sim.motion import wrap_angle
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 # Way that braking and the delay of odometry may still cost after the position is reached.
@@ -29,10 +28,6 @@ _RUN_OUT_M = 0.02
 _OFF_RAD = 0.5
 _STRAIGHT_RAD_S = 0.01
 _PAUSE_NS = NS // 5
-_WRAP_HINT = (
-    "An angle error beyond [-pi, pi] makes the long way of the short one: normalise it with "
-    "atan2(sin(e), cos(e)) before you multiply it by the gain."
-)
 
 
 class TwoPhases(Parameters):
@@ -131,23 +126,6 @@ class ShortWay(Parameters):
     )
 
 
-@dataclass(frozen=True)
-class _Detour:
-    """A turn by the long way.
-
-    Attributes:
-        step: Where it begins.
-        error_rad: What would have been the short way from there.
-        away_rad: How far it turned away before it passed half a turn, or the run ended.
-        what: What it turned to.
-    """
-
-    step: Truth
-    error_rad: float
-    away_rad: float
-    what: str
-
-
 @check("motion.short_way", Subject.RECORDING, ShortWay)
 def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     """The robot always turns by the short way.
@@ -181,7 +159,7 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
         f"turned away from {first.what} through half a turn: {degrees(long_rad)} "
         f"{_sense(-first.error_rad)} where {degrees(abs(first.error_rad))} "
         f"{_sense(first.error_rad)} would do ({when_s:.2f} s after launch{more})",
-        _WRAP_HINT,
+        WRAP_HINT,
         Evidence(moments=(Moment("turns the long way", when_s),), plots=evidence.plots),
     )
 
@@ -190,35 +168,13 @@ def _sense(angle_rad: float) -> str:
     return "counter-clockwise" if angle_rad > 0.0 else "clockwise"
 
 
-def _detours(run: Approach, parameters: ShortWay) -> Iterator[_Detour]:
+def _detours(run: Approach, parameters: ShortWay) -> Iterator[Detour]:
     truth = run.truth
     arrival = run.arrival(parameters.position)
     driven = run.driven(parameters.position)
     first = truth if arrival is None else truth[:arrival]
-    yield from _away(first, run.bearing_error_rad, parameters.tolerance, "the goal")
+    yield from away(first, run.bearing_error_rad, parameters.tolerance, "the goal")
     if driven is not None:
-        yield from _away(
+        yield from away(
             truth[driven:], run.heading_error_rad, parameters.tolerance, "the goal's heading"
         )
-
-
-def _away(
-    truth: Sequence[Truth], error: Callable[[Truth], float], tolerance_rad: float, what: str
-) -> Iterator[_Detour]:
-    """Turns away from an error, by more than the tolerance, through half a turn."""
-    away_rad = 0.0
-    begin: Truth | None = None
-    for before, after in pairwise(truth):
-        error_rad = error(before)
-        turned_rad = wrap_angle(after.yaw_rad - before.yaw_rad)
-        if turned_rad * error_rad >= 0.0:
-            if turned_rad:
-                away_rad, begin = 0.0, None
-            continue
-        begin = begin or before
-        away_rad += abs(turned_rad)
-        crosses = error_rad * error(after) < 0.0 and abs(error_rad) > math.pi / 2.0
-        if crosses and away_rad > tolerance_rad:
-            yield _Detour(begin, error(begin), away_rad, what)
-        if crosses:
-            away_rad, begin = 0.0, None

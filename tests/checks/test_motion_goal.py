@@ -414,3 +414,11 @@ def test_drive_plain_silence_says_why():
     for name, parameters in checks(GOAL).items():
         if name.startswith("motion") and name != "motion.within_limits":
             assert "the robot never moved" in failing(name, run, **parameters)
+
+
+def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_the_error():
+    run = run_to(BEHIND, seconds=30.0, wrap=lambda error: error)
+    finding = judge("motion.path_length", run, goal=yaml(BEHIND), position="8 cm", most="180 %")
+    assert finding.status is Status.FAILED
+    assert "turned away from the goal through half a turn, 10 times" in finding.observed
+    assert "atan2(sin(e), cos(e))" in finding.hint
