@@ -112,6 +112,9 @@ def check(
             from grader.batch.files import keep_install, write_graded
             from grader.report.terminal import print_grade
 
+        except KeyboardInterrupt:
+            progress.say("interrupted: what still runs is ended, and no report is written")
+            raise
         finally:
             runner.close()
         written = write_graded(graded, report, clock, json_file)
