@@ -24,6 +24,7 @@ from grader.run.stimuli.stage import Stage
 from grader.run.stopwatch import Stopwatch
 from grader.run.student import StudentProcesses
 from grader.run.telling import tell, tell_line
+from grader.run.wall_clock import WallClock
 from grader.run.watchdog import Watchdog
 from grader.run.witnesses import Witnesses
 from grader.sandbox.wire import Wire
@@ -104,6 +105,7 @@ class Cell:
         self._meter.start()
         if self._watchdog is not None:
             self._watchdog.start()
+        clock = WallClock()
         launched_ns = time.time_ns()
         try:
             ending = self._observe()
@@ -121,6 +123,9 @@ class Cell:
         written = self._output.close(_PIPES_LIMIT_S)
         log = sorted((*written, *self._probe.rosout.lines), key=lambda line: line.time_ns)
         disturbance = self._meter.stop()
+        was_set = clock.fault
+        if was_set is not None:
+            self._faults.append(was_set)
         others = ", ".join(map(str, self._other_domains))
         return Recording(
             scenario=self._order.scenario,
