@@ -220,6 +220,8 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         if {**installed, "pyproject": ""} != {**wanted, "pyproject": ""}:
             _put_aside(venv, installed)
         try:
+            # A sandbox runs as another user where rosgrade runs as root; there is no secret in it.
+            os.umask(0o022)
             if not venv.exists():
                 _make(venv, chosen, lock_text, environ)
             # Only now, so that an interrupted set-up is not taken for a finished one.

@@ -38,6 +38,7 @@ _LOCK = ".lock"
 _UNFINISHED = ".unfinished-"
 _STALE_S = 3600.0
 _READABLE = 0o555
+_FOR_OTHERS = 0o444
 
 
 @dataclass(frozen=True)
@@ -213,12 +214,13 @@ def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:
 def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribution]) -> None:
     unfinished = Path(tempfile.mkdtemp(prefix=_UNFINISHED, dir=target.parent))
     try:
-        unfinished.chmod(0o755)
         files = {file for item in distributions for file in _files(item, prefix)}
         files |= {Path("pyvenv.cfg"), Path("lib64")}
         files |= {path.relative_to(prefix) for path in prefix.glob("bin/python*")}
         for file in sorted(files):
             _link(prefix / file, unfinished / file)
+        for folder, _, _ in os.walk(unfinished):
+            Path(folder).chmod(0o755)
         # Somebody else was quicker, perhaps.
         with contextlib.suppress(OSError):
             unfinished.rename(target)
@@ -238,6 +240,12 @@ def _link(source: Path, target: Path) -> None:
     if not (source.is_symlink() or source.is_file()):
         return
     target.parent.mkdir(parents=True, exist_ok=True)
+    mode = source.lstat().st_mode
+    if mode & _FOR_OTHERS != _FOR_OTHERS:
+        # Installed with a umask such as 077.
+        shutil.copy2(source, target)
+        target.chmod(mode | _FOR_OTHERS | (mode & 0o100) >> 2 | (mode & 0o100) >> 5)
+        return
     try:
         os.link(source, target, follow_symlinks=False)
     except OSError:

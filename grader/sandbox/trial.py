@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from grader.errors import GraderFault
 from grader.sandbox import bubblewrap
 from grader.sandbox.choice import Choice
-from grader.sandbox.sandbox import Sandbox
+from grader.sandbox.sandbox import CODE, Sandbox
 
 _UID = 2000
 _LIMIT_S = 20.0
@@ -79,6 +82,12 @@ def try_sandbox() -> Trial:
         student_filter()
     except (ImportError, OSError, RuntimeError) as error:
         return Trial(f"libseccomp cannot be used ({error})", "sudo apt install libseccomp2")
+    closed = _closed((*CODE, Path(sys.prefix))) if os.geteuid() == 0 else None
+    if closed is not None:
+        return Trial(
+            f"only root may read {closed}, and as root a sandbox runs as somebody else",
+            f"chmod -R a+rX {closed}",
+        )
     inner = ["bwrap", *bubblewrap.namespaces(_UID, network=False), "--disable-userns"]
     inner += [*bubblewrap.system(), "--", "true"]
     arguments = [*bubblewrap.namespaces(_UID), *bubblewrap.system(), "--tmpfs", "/tmp"]
@@ -99,6 +108,16 @@ def try_sandbox() -> Trial:
         return Trial()
     said = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
     return Trial(f"bubblewrap may not make namespaces: {said[-1]}", _remedy())
+
+
+def _closed(folders: Iterable[Path]) -> Path | None:
+    """The first folder that not everybody may read, as a umask of 077 makes them."""
+    for folder in folders:
+        for path in (folder, folder / "__init__.py", folder / "lib"):
+            wanted = 0o005 if path.is_dir() else 0o004
+            if path.exists() and path.stat().st_mode & wanted != wanted:
+                return folder
+    return None
 
 
 def _remedy(settings: Path = Path("/proc/sys")) -> str:

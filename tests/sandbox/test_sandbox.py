@@ -74,6 +74,31 @@ def test_a_missing_program_is_named_with_its_package(monkeypatch: pytest.MonkeyP
     assert trial.try_sandbox() == Trial("bwrap is not installed", "sudo apt install bubblewrap")
 
 
+def test_what_only_root_may_read_is_named_with_the_way_to_open_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    if trial.try_sandbox().problem:
+        pytest.skip("no sandbox on this machine")
+    (tmp_path / "__init__.py").touch(0o600)
+    tmp_path.chmod(0o755)
+    monkeypatch.setattr(trial, "CODE", (tmp_path,))
+    monkeypatch.setattr(os, "geteuid", lambda: 0)
+    found = trial.try_sandbox()
+    assert f"only root may read {tmp_path}" in found.problem
+    assert found.remedy == f"chmod -R a+rX {tmp_path}"
+
+
+def test_everybody_may_read_the_students_python_whatever_the_umask(tmp_path: Path) -> None:
+    before = os.umask(0o077)
+    try:
+        tree = student_prefix(tmp_path).path
+    finally:
+        os.umask(before)
+    folders = [Path(folder) for folder, _, _ in os.walk(tree)]
+    assert all(folder.stat().st_mode & 0o555 == 0o555 for folder in folders)
+    assert all(path.stat().st_mode & 0o444 == 0o444 for path in (tree / "bin").iterdir())
+
+
 @pytest.mark.parametrize(
     ("settings", "wanted"),
     [
