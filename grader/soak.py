@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
+import os
 import random
 import sys
 import tempfile
@@ -149,7 +150,9 @@ def _load(cpus: int, seed: int | None) -> Iterator[None]:
 
 def _burn(seed: int | None) -> None:
     order = random.Random(seed)
-    while True:
+    parent = os.getppid()
+    # Whoever is left behind by a soak that was killed would burn for ever.
+    while os.getppid() == parent:
         until_s = time.monotonic() + order.uniform(*_BURST_S)
         while time.monotonic() < until_s:
             pass
