@@ -8,14 +8,18 @@ to spare.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from grader.run.load import Load, cpu_count
 
 _CELLS_PER_CPU = 16
+_STARTS_PER_CPU = 1.5
+"""More than one, because a start also waits: for processes, and for DDS to discover them."""
 _BUSY_PER_CPU = 2.5
 """Runnable threads of the machine for each CPU from which on nobody more is let in."""
 _LONGEST_START_S = 2.0
@@ -33,23 +37,23 @@ class Admission:
 
         Args:
             cells: Most cells at once, whatever the load; by default the load decides.
-            starts: Most cells that start at once; by default one for each CPU.
+            starts: Most cells that start at once; by default three for each two CPUs.
             load: Of the machine.
         """
         cpus = cpu_count()
         self.most = cells if cells is not None else _CELLS_PER_CPU * cpus
         self._always = self.most if cells is not None else cpus
-        self._starts = starts if starts is not None else cpus
+        self._starts = starts if starts is not None else math.ceil(_STARTS_PER_CPU * cpus)
         self._busy = _BUSY_PER_CPU * cpus
         self._load = load or Load()
         self._running: dict[Ticket, float] = {}
+        self._queue: deque[Ticket] = deque()
         self._alone = False
-        self._waiting_alone = 0
-        self._changed = threading.Condition()
+        self._lock = threading.Lock()
 
     @contextmanager
     def cell(self, *, alone: bool = False) -> Iterator[Ticket]:
-        """Wait for a place.
+        """Wait for a place, first come, first served; who wants to be alone goes before.
 
         Args:
             alone: Wait until no other cell runs, and let none start meanwhile.
@@ -58,29 +62,39 @@ class Admission:
         try:
             yield ticket
         finally:
-            with self._changed:
+            with self._lock:
                 del self._running[ticket]
                 self._alone = self._alone and not alone
-                self._changed.notify_all()
+                self._call_next()
 
     def _enter(self, alone: bool) -> Ticket:
-        ticket = Ticket(self)
-        with self._changed:
-            self._waiting_alone += alone
+        ticket = Ticket(self, threading.Condition(self._lock))
+        with self._lock:
+            if alone:
+                self._queue.appendleft(ticket)
+            else:
+                self._queue.append(ticket)
             try:
-                while not self._is_free(alone):
-                    self._changed.wait(_LOOK_AGAIN_S)
+                # Only the first one looks again: the others would be the load that they see.
+                while self._queue[0] is not ticket or not self._is_free(alone):
+                    is_first = self._queue[0] is ticket
+                    ticket.called.wait(_LOOK_AGAIN_S if is_first else None)
+                self._running[ticket] = time.monotonic()
+                self._alone = alone
             finally:
-                self._waiting_alone -= alone
-            self._running[ticket] = time.monotonic()
-            self._alone = alone
+                self._queue.remove(ticket)
+                self._call_next()
         return ticket
+
+    def _call_next(self) -> None:
+        if self._queue:
+            self._queue[0].called.notify()
 
     def _is_free(self, alone: bool) -> bool:
         running = len(self._running)
         if alone:
             return running == 0
-        if self._alone or self._waiting_alone or running >= self.most:
+        if self._alone or running >= self.most:
             return False
         if self._starting() >= self._starts:
             return False
@@ -93,8 +107,8 @@ class Admission:
         )
 
     def _note_started(self) -> None:
-        with self._changed:
-            self._changed.notify_all()
+        with self._lock:
+            self._call_next()
 
 
 class Ticket:
@@ -102,11 +116,13 @@ class Ticket:
 
     Attributes:
         is_starting: Whether it has not got to where only its timers cost CPU time.
+        called: Notified when it may be its turn.
     """
 
-    def __init__(self, admission: Admission) -> None:
+    def __init__(self, admission: Admission, called: threading.Condition) -> None:
         """Made by :meth:`Admission.cell` only."""
         self._admission = admission
+        self.called = called
         self.is_starting = True
 
     def started(self) -> None:
