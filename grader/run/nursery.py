@@ -5,6 +5,10 @@ descriptor. Interpreter start, imports and loading of the DDS libraries are most
 costs; here they are paid once for all cells of a batch. Nothing of a student's is ever imported
 by it, and it has neither a node nor a thread of its own, so that a fork of it is a whole
 process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without them.)
+
+Students' programs are not forked from it. A sandbox begins with an exec, which drops all that was
+imported; and who forks from what was imported before does not import in the order of his own
+PYTHONPATH, where a package of his may well come before one of ROS.
 """
 
 from __future__ import annotations
