@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from grader.batch.grading import Graded
     from grader.batch.selftest import TrialResult
 
+_TOLD_EACH = 10
+"""Of so many submissions one has a line of its own where lines stay."""
+
 
 def selftest(
     assignments: Annotated[
@@ -50,10 +53,13 @@ def selftest(
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
     from grader.batch.grading import Grading
-    from grader.batch.selftest import Role, mutation_score
+    from grader.batch.selftest import Role, Trial, mutation_score, trials
     from grader.batch.selftest import selftest as run_selftest
     from grader.run.load import cpu_count
     from grader.run.runner import Runner
+
+    def chosen_trial(trial: Trial) -> bool:
+        return not record or trial.role is Role.REFERENCE
 
     console = output_console()
     perfect = True
@@ -62,6 +68,7 @@ def selftest(
         loaded = load_assignment(name)
         results: list[TrialResult] = []
         kept: list[str] = []
+        wanted = sum(chosen_trial(trial) for trial in trials(loaded))
         with Runner(ros.find(), sandbox=chosen) as runner, Progress(quiet).shown() as progress:
             grading = Grading(loaded, runner, cache_folder())
             for result in run_selftest(
@@ -69,13 +76,14 @@ def selftest(
                 grading,
                 jobs=jobs or 2 * cpu_count(),
                 keep=keep and keep / loaded.assignment.id,
-                chosen=lambda trial: not record or trial.role is Role.REFERENCE,
+                chosen=chosen_trial,
                 on_graded=partial(_keep, loaded, kept) if record else lambda _: None,
             ):
                 results.append(result)
                 progress.say(
-                    f"{loaded.assignment.id}: {len(results)} graded, last {result.trial.id}",
-                    passing=True,
+                    f"{loaded.assignment.id}: {len(results)} of {wanted} graded, "
+                    f"last {result.trial.id}",
+                    passing=len(results) % _TOLD_EACH != 0,
                 )
         if record:
             console.print(kept[0], soft_wrap=True)
