@@ -14,7 +14,6 @@ import multiprocessing
 import os
 import random
 import sys
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,6 +34,7 @@ from grader.run.load import cpu_count
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
+from grader.scratch import Scratch
 
 SUBMISSIONS = {
     "simple_publisher": (REFERENCE, "publishes_twice", "topic_misspelt"),
@@ -164,11 +164,11 @@ def _grade_all(queue: Sequence[Job], at_once: int) -> list[tuple[Job, TrialResul
     results = []
     began_s = time.monotonic()
     with (
-        tempfile.TemporaryDirectory(prefix="rosgrade-soak-") as name,
+        Scratch("soak") as folder,
         ThreadPoolExecutor(max_workers=at_once) as pool,
     ):
         futures = {
-            pool.submit(_grade_once, job, Path(name) / f"{job.trial.id}-{number}"): job
+            pool.submit(_grade_once, job, folder / f"{job.trial.id}-{number}"): job
             for number, job in enumerate(queue)
         }
         try:

@@ -7,7 +7,6 @@ mutant must lose exactly the checks that it names.
 from __future__ import annotations
 
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from grader.checks.finding import Status
 from grader.report.facts import RunFacts
 from grader.report.grade_part import grade_json
 from grader.report.result import make_result
+from grader.scratch import Scratch
 
 REFERENCE = "reference"
 
@@ -194,8 +194,7 @@ def selftest(
         Results as they come.
     """
     base = load_mutants(loaded.assignment, loaded.folder, reference).reference
-    with tempfile.TemporaryDirectory(prefix="rosgrade-selftest-") as name:
-        folder = Path(name)
+    with Scratch("selftest") as folder:
 
         def work(trial: Trial) -> TrialResult:
             on_start(trial)

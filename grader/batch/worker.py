@@ -7,7 +7,6 @@ import io
 import os
 import stat
 import tarfile
-import tempfile
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +23,7 @@ from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import choose
+from grader.scratch import Scratch
 from grader.submission.locate import opened
 from grader.submission.prepare import Prepared, refused
 
@@ -157,9 +157,9 @@ def grade_remotely(order: Order, parcel: Parcel) -> bytes:
         GraderFault: The worker has another version of the assignment.
     """
     grading = _grading(order)
-    with tempfile.TemporaryDirectory(prefix="rosgrade-worker-") as temporary:
-        path = Path(temporary, "in", parcel.name)
-        folder = Path(temporary, "out")
+    with Scratch("worker") as temporary:
+        path = temporary / "in" / parcel.name
+        folder = temporary / "out"
         folder.mkdir()
         path.parent.mkdir()
         if parcel.refused is not None:

@@ -14,6 +14,7 @@ from grader.cli.options import AssignmentName, Quiet, Seed
 from grader.cli.progress import ClassProgress
 from grader.cli.sandbox import Choice, SandboxChoice
 from grader.errors import UsageError
+from grader.scratch import Scratch
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,8 +60,6 @@ def batch(
     Leaves a report for each submission, an overview (index.html) and grades.csv in OUT. Ends
     with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
     """
-    import tempfile
-
     from grader.assignment.load import load_assignment
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
@@ -77,11 +76,11 @@ def batch(
     grading = make_grading(order, loaded, admission) if scheduler is None else None
     began_s = time.monotonic()
     with (
-        tempfile.TemporaryDirectory(prefix="rosgrade-batch-") as staging,
+        Scratch("batch") as staging,
         Ledger(out).opened() as ledger,
         ClassProgress(quiet) as progress,
     ):
-        names, rows = _rows(submissions, roster, Path(staging), progress)
+        names, rows = _rows(submissions, roster, staging, progress)
         for problem in names.problems if names else ():
             progress.note(f"{roster or submissions}: {problem}")
         work = Batch(loaded, ledger, frozenset(retry or ()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +10,7 @@ import typer
 from grader.cli.live import GradingProgress
 from grader.cli.options import Quiet
 from grader.resources import cache_folder
+from grader.scratch import Scratch
 
 
 def replay(
@@ -57,7 +57,7 @@ def replay(
     if prepared.install is None or reason is not None:
         told = reason.observed if reason else prepared.record.problem
         raise UsageError(f"{submission}: {told}")
-    with tempfile.TemporaryDirectory(prefix="rosgrade-replay-home-") as scratch:
+    with Scratch("replay-home") as scratch:
         installation = replace(installation, underlays=prepared.underlays or installation.underlays)
         order = make_order(
             recording,
@@ -65,7 +65,7 @@ def replay(
             loaded.assignment,
             installation,
             prepared.install,
-            Path(scratch),
+            scratch,
             type_support,
         )
         raise typer.Exit(play(order, installation))

@@ -25,7 +25,6 @@ import socket
 import struct
 import subprocess
 import sys
-import tempfile
 import threading
 import traceback
 import warnings
@@ -39,6 +38,7 @@ from grader.run.descendants import kill_tree
 from grader.run.environment import RMW, cell_environment
 from grader.sandbox import bubblewrap
 from grader.sandbox.namespaces import CELL, enter
+from grader.scratch import Scratch
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
@@ -137,12 +137,12 @@ class Nursery:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket = ours
         self._sandbox = sandbox
-        self._cells = tempfile.TemporaryDirectory(prefix="rosgrade-cells-")
+        self._cells = Scratch("cells")
         command = [str(ros.python), "-m", "grader.run.nursery", str(theirs.fileno())]
         environment = cell_environment(ros, sandboxed=sandbox is not None)
         if sandbox is not None:
-            bubblewrap.give(Path(self._cells.name))
-            command = sandbox.nursery_command(command, ros, Path(self._cells.name), environment)
+            bubblewrap.give(self._cells.path)
+            command = sandbox.nursery_command(command, ros, self._cells.path, environment)
             environment = bubblewrap.PLAIN_ENVIRONMENT
         with theirs:
             self._popen = subprocess.Popen(
@@ -162,7 +162,7 @@ class Nursery:
     @property
     def cells(self) -> Path:
         """Where the folders of its cells are made."""
-        return Path(self._cells.name)
+        return self._cells.path
 
     def start_cell(
         self, folder: Path, errors: IO[bytes], arguments: Sequence[str], imports: Sequence[str] = ()
@@ -212,7 +212,7 @@ class Nursery:
         """Wait for the cells that it has forked, and for itself, to end."""
         self._socket.close()
         self._popen.wait()
-        self._cells.cleanup()
+        self._cells.remove()
 
     def _kill(self, pid: int) -> None:
         if self._sandbox is None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import subprocess
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from grader.ros import RosInstallation
 from grader.run.environment import cell_environment, student_environment
 from grader.run.order import Command
 from grader.run.runner import Runner
+from grader.scratch import Scratch
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment
@@ -154,10 +154,10 @@ def play(order: ReplayOrder, ros: RosInstallation) -> int:
         0 when it was played to its end, 1 when the node ended or never listened, 130 when it
         was interrupted; nothing of it runs any more.
     """
-    with tempfile.TemporaryDirectory(prefix="rosgrade-replay-") as folder:
-        (Path(folder) / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
+    with Scratch("replay") as folder:
+        (folder / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
         player = subprocess.Popen(
-            [str(ros.python), "-m", "grader.run.replay_player", folder],
+            [str(ros.python), "-m", "grader.run.replay_player", str(folder)],
             env=cell_environment(ros),
             # Its end tells the player that nobody waits any more; so does Ctrl-C, in here.
             stdin=subprocess.PIPE,

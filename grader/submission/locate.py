@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import GraderFault, SubmissionError, UsageError
+from grader.scratch import Scratch
 from grader.submission import archive
 from grader.submission.listing import Listing, SubmissionFile, find_packages, list_files
 from grader.submission.members import ArchiveLimits
@@ -67,16 +68,16 @@ def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Lo
     """
     limits = limits or ArchiveLimits()
     source = check_path(path)
-    with tempfile.TemporaryDirectory(prefix="rosgrade-") as scratch:
+    with Scratch("submission") as scratch:
         if not source.is_dir():
-            unpacked = Path(scratch, "unpacked")
+            unpacked = scratch / "unpacked"
             unpacked.mkdir()
             archive.unpack(source, unpacked, limits)
             listed = unpacked
         else:
             listed = source
         listing = list_files(listed, limits)
-        root = Path(scratch, "submission")
+        root = scratch / "submission"
         sha256 = _copy(listed, listing, root)
         yield Located(
             id=submission_id(source),

@@ -167,7 +167,7 @@ def test_an_interrupted_check_leaves_nothing_behind(number: signal.Signals, tmp_
     assert "rosgrade: interrupted: what still runs is ended" in told
     assert "Traceback" not in told
     assert not (tmp_path / "rosgrade-report" / "result.json").exists()
-    assert not list(tmp_path.glob("rosgrade-cell*"))
+    assert not list(tmp_path.glob("rosgrade-scratch-*"))
     assert not _running(str(tmp_path))
 
 

@@ -76,7 +76,7 @@ def test_a_save_is_graded_again_and_ctrl_c_leaves_nothing(tmp_path: Path) -> Non
     assert told.endswith("No longer watching.\n")
     assert "Traceback" not in told
     assert not _running(str(tmp_path))
-    assert not list(tmp_path.glob("rosgrade-cell*"))
+    assert not list(tmp_path.glob("rosgrade-scratch-*"))
 
 
 @pytest.mark.ros

@@ -1,0 +1,76 @@
+"""Scratch folders: gone with whoever made them, and where that was killed, with the next one."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import shutil
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+
+PREFIX = "rosgrade-scratch-"
+_STALE_S = 3600.0
+"""One that is newer may not be locked yet, or something started from it may still be ending."""
+
+
+class Scratch:
+    """A scratch folder, below the system's folder for temporary files.
+
+    As long as it is there its maker holds a lock on it, which no end of a process outlives.
+
+    Attributes:
+        path: Its absolute path.
+    """
+
+    def __init__(self, kind: str) -> None:
+        """Make it, and remove what earlier ones left behind.
+
+        Args:
+            kind: A word for its name.
+        """
+        remove_stale(Path(tempfile.gettempdir()))
+        self._folder = tempfile.TemporaryDirectory(prefix=f"{PREFIX}{kind}-")
+        self.path = Path(self._folder.name)
+        self._lock = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
+        fcntl.flock(self._lock, fcntl.LOCK_SH)
+
+    def __enter__(self) -> Path:
+        """Use it for a block."""
+        return self.path
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Remove it."""
+        self.remove()
+
+    def remove(self) -> None:
+        """Remove it with all that is in it."""
+        self._folder.cleanup()
+        os.close(self._lock)
+
+
+def remove_stale(folder: Path, age_s: float = _STALE_S) -> None:
+    """Remove scratch folders that nobody holds.
+
+    Args:
+        folder: That they are in.
+        age_s: How long ago the last thing must have been made in one.
+    """
+    now_s = time.time()
+    for path in folder.glob(f"{PREFIX}*"):
+        with contextlib.suppress(OSError):
+            if now_s - path.lstat().st_mtime < age_s:
+                continue
+            lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(path, ignore_errors=True)
+            finally:
+                os.close(lock)

@@ -1,0 +1,59 @@
+"""Nothing of an earlier run stays behind in /tmp, however it ended."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from grader.scratch import Scratch, remove_stale
+
+HOLDS = """
+import sys, tempfile
+tempfile.tempdir = sys.argv[1]
+from grader.scratch import Scratch
+scratch = Scratch("test")
+(scratch.path / "file").touch()
+print(scratch.path, flush=True)
+input()
+"""
+
+
+def test_it_is_gone_after_its_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with Scratch("test") as path:
+        (path / "file").touch()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_process_left_goes_and_what_is_held_stays(tmp_path: Path) -> None:
+    (tmp_path / "rosgrade-report").mkdir()
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLDS, str(tmp_path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    path = Path(process.stdout.readline().strip())
+    remove_stale(tmp_path, age_s=0.0)
+    assert (path / "file").exists()
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    remove_stale(tmp_path)
+    assert path.exists()
+    remove_stale(tmp_path, age_s=0.0)
+    assert [item.name for item in tmp_path.iterdir()] == ["rosgrade-report"]
+
+
+def test_a_link_is_not_followed(tmp_path: Path) -> None:
+    precious = tmp_path / "precious"
+    precious.mkdir()
+    (tmp_path / "rosgrade-scratch-x").symlink_to(precious)
+    remove_stale(tmp_path, age_s=0.0)
+    assert precious.is_dir()
