@@ -34,7 +34,7 @@ class Scratch:
         remove_stale(Path(tempfile.gettempdir()))
         self._folder = tempfile.TemporaryDirectory(prefix=f"{PREFIX}{kind}-")
         self.path = Path(self._folder.name)
-        self._lock = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
+        self._lock: int | None = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
         fcntl.flock(self._lock, fcntl.LOCK_SH)
 
     def __enter__(self) -> Path:
@@ -51,9 +51,11 @@ class Scratch:
         self.remove()
 
     def remove(self) -> None:
-        """Remove it with all that is in it."""
+        """Remove it with all that is in it, if it is still there."""
         self._folder.cleanup()
-        os.close(self._lock)
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
 
 def remove_stale(folder: Path, age_s: float = _STALE_S) -> None:

@@ -29,6 +29,10 @@ def test_it_is_gone_after_its_block(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with Scratch("test") as path:
         (path / "file").touch()
     assert list(tmp_path.iterdir()) == []
+    twice = Scratch("test")
+    twice.remove()
+    twice.remove()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_a_killed_process_left_goes_and_what_is_held_stays(tmp_path: Path) -> None:
