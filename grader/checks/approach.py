@@ -23,6 +23,9 @@ from sim.motion import Pose, wrap_angle
 _WEAVES = 4
 # Share of the way: who ends so near the goal knows where it is.
 _A_LITTLE = 0.25
+# As far from the heading of the goal, in rad, as a tolerance may reasonably leave it.
+_A_LITTLE_RAD = 0.15
+_STRAIGHT_RAD_S = 0.02
 _ASTRAY_RAD = math.radians(30.0)
 NO_SPEED_M_S = 1e-3
 
@@ -189,6 +192,21 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
             evidence,
         )
     began_m = run.distance_m(truth[0])
+    if left_m > began_m and last.linear_m_s < 0.0:
+        return Cause(
+            f"{seen}, farther than at its start ({metres(began_m)}): it drives backwards, {moving}",
+            "linear.x is negative: it is a gain times the distance math.hypot(dx, dy), which never "
+            "is, and not times dx. Turn towards the goal, also where dx is negative.",
+            evidence,
+        )
+    if left_m > began_m and _has_turned_its_back(run):
+        return Cause(
+            f"{seen}, farther than at its start ({metres(began_m)}): it drives straight away from "
+            f"it, {moving}, as if half a turn were no error",
+            "The direction is math.atan2(dy, dx): math.atan(dy / dx) is the same for the opposite "
+            "one. An error is wrapped by whole turns, 2 * math.pi, not by math.pi.",
+            evidence,
+        )
     if left_m > began_m:
         return Cause(
             f"{seen}, farther than at its start ({metres(began_m)}), {moving}",
@@ -206,6 +224,16 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
         f"{seen}, {moving}, after {format_duration(watched_s)}",
         "If it is on its way, it is too slow: a larger gain, within the limits of the robot.",
         evidence,
+    )
+
+
+def _has_turned_its_back(run: Approach) -> bool:
+    """Whether the robot drives ahead in the end, without turning, and the goal is right behind."""
+    last = run.truth[-1]
+    return (
+        last.linear_m_s > NO_SPEED_M_S
+        and abs(last.angular_rad_s) < _STRAIGHT_RAD_S
+        and abs(run.bearing_error_rad(last)) > math.pi - _A_LITTLE_RAD
     )
 
 
@@ -307,5 +335,11 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
         return (
             ": it has not turned since it arrived",
             "After the position is reached, turn on the spot by the error goal_theta - yaw.",
+        )
+    if is_at_rest(last) and abs(run.heading_error_rad(last)) < _A_LITTLE_RAD:
+        return (
+            ": it stopped turning a little before",
+            "Compare abs(goal_theta - yaw) with angle_tolerance, in radians, and turn on until it "
+            "is smaller. It is not goal_tolerance, and no number of your own.",
         )
     return "", "The error is goal_theta - yaw in radians; yaw comes from the quaternion."

@@ -49,6 +49,17 @@ def single(recording: Recording) -> bool:
     return bool(found) and all(number == 1 for _, number in found)
 
 
+def forbids(recording: Recording, *, itself: bool) -> bool:
+    """Whether what the process declared would keep these callbacks from running at the same time.
+
+    Args:
+        recording: The run.
+        itself: They are two runs of one subscription's callback.
+    """
+    groups = _groups(recording, "subscription")
+    return single(recording) or (itself and len(groups) == 1 and groups[0][0] == _EXCLUSIVE)
+
+
 def not_judged(
     recording: Recording, expected: str, observed: str, *, prevented: bool
 ) -> Finding | None:

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
+from grader.checks.command import commands
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.immobility import why_cut_short, why_not_judged, why_not_moved
 from grader.checks.measure import metres, speed, turn
@@ -19,10 +20,21 @@ _HINT = (
     "Stop early enough: the robot needs time to see (a scan comes every 0.2 s) and to brake, and "
     "its edge is ahead of its middle."
 )
+_DECIDED_HINT = (
+    "It went on deciding to drive: log the range that you compare. Is it the beam straight ahead, "
+    "whose angle is 0, of the newest scan, and is your limit in metres? Where it is within the "
+    "limit, publish linear.x = 0.0."
+)
+_HELD_HINT = (
+    "The robot keeps the last command: publish one with every scan, or from a timer of 10 Hz or "
+    "more, and to stop one with linear.x = 0.0."
+)
 _BLIND_HINT = (
     "Without scans the robot drives blindly: keep the time of the last scan, and let a timer stop "
     "the robot when it is more than a second ago."
 )
+# A command that is older was not answered to one of the last two scans of the slowest LiDAR.
+_HELD_NS = NS // 2
 # Several scans of any LiDAR.
 _BLIND_NS = NS
 # Rest before something moving ran into the robot.
@@ -82,9 +94,12 @@ def why_touched(recording: Recording) -> Cause | None:
         motion = f"{way}at {speed(abs(before.linear_m_s))}"
     blind_ns = _blind_ns(recording, step)
     blind = f"; the last scan had come {blind_ns / NS:.2f} s before" if blind_ns else ""
+    held_ns = 0 if blind else _held_ns(recording, step, before)
+    held = f", sent {held_ns / NS:.2f} s before" if held_ns else ""
     return Cause(
-        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {_told(before)}{blind}",
-        _BLIND_HINT if blind else _HINT,
+        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, "
+        f"{_told(before)}{held}{blind}",
+        _BLIND_HINT if blind else _HELD_HINT if held else _hint(before),
         Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
     )
 
@@ -94,6 +109,19 @@ def _blind_ns(recording: Recording, step: Truth) -> int:
     scan = newest(recording, step.time_ns)
     since_ns = step.time_ns - scan.stamp_ns if scan is not None else 0
     return since_ns if since_ns > _BLIND_NS else 0
+
+
+def _held_ns(recording: Recording, step: Truth, before: Truth) -> int:
+    """Since when the command to drive had been held, if that is long enough to matter; else 0."""
+    sent = [item.time_ns for item in commands(recording) if item.time_ns <= step.time_ns]
+    if not sent or not before.command_m_s:
+        return 0
+    since_ns = step.time_ns - sent[-1]
+    return since_ns if since_ns > _HELD_NS else 0
+
+
+def _hint(before: Truth) -> str:
+    return _DECIDED_HINT if before.command_m_s else _HINT
 
 
 def _told(step: Truth) -> str:

@@ -73,6 +73,11 @@ _HINTS = {
 }
 
 
+_EMPTY_HINT = (
+    "The list is empty: ranges[-10:10] holds nothing, for -10 counts from the end; the beams on "
+    "both sides of the first are ranges[-10:] + ranges[:10]. After a filter, test `if values:`."
+)
+
 # What the system says where a limit of the sandbox is in the way, whatever raises it.
 _LIMIT_HINTS = {
     "[Errno 27]": "The size of a file is limited here: write less, or to several files.",
@@ -82,6 +87,26 @@ _LIMIT_HINTS = {
     "and not one for each message.",
 }
 
+# What Python says of slips that its own words do not explain to a beginner.
+_MESSAGE_HINTS = {
+    "min() arg is an empty": _EMPTY_HINT,  # Python 3.11 and before
+    "max() arg is an empty": _EMPTY_HINT,
+    "min() iterable argument is empty": _EMPTY_HINT,
+    "max() iterable argument is empty": _EMPTY_HINT,
+    "zero-size array to reduction": _EMPTY_HINT,
+    "cannot convert float infinity to integer": "inf says that a beam met nothing, and is no "
+    "index and no number of steps: test math.isfinite(value) before int(value).",
+    "cannot convert float NaN to integer": "nan says that there is no value: test "
+    "math.isfinite(value) before int(value).",
+    "Subscription.__init__(): callback should be": "A subscription's callback takes the message: "
+    "def message_callback(self, msg).",
+    "math domain error": "math.acos and math.asin take -1 to 1, math.sqrt takes 0 or more: limit "
+    "the value first, max(-1.0, min(1.0, value)), for rounding makes 1.0000000000000002 of 1.",
+}
+
+_OTHER_ARGUMENTS = re.compile(
+    r"\(\) (takes \d+ positional arguments? but \d+|missing \d+ required positional argument)"
+)
 # A converter of rclpy met an object of another class; the name is that of the wanted one.
 _OTHER_CLASS = re.compile(r'convert_from_py: Assertion .strncmp\("[\w.]*\.(\w+)"')
 
@@ -240,6 +265,20 @@ def _exception_hint(failure: Failure, recording: Recording) -> str:
     for said, hint in _LIMIT_HINTS.items():
         if failure.message.startswith(said):
             return hint
+    for said, hint in _MESSAGE_HINTS.items():
+        if failure.message.startswith(said):
+            return hint
+    if failure.type == "TypeError" and "CallbackGroup.add_entity()" in failure.message:
+        return (
+            "A callback group is an object, not its class: write ReentrantCallbackGroup() and "
+            "MutuallyExclusiveCallbackGroup(), with brackets."
+        )
+    if _enters_init(failure):
+        return (
+            "In Jazzy rclpy.init() returns nothing that `with` could enter; it does so in later "
+            "releases of ROS, whose tutorial this is from. Write rclpy.init(args=args) on a line "
+            "of its own, without `with`."
+        )
     if failure.type in _HINTS:
         return _HINTS[failure.type]
     if failure.type == "AttributeError" and "'str' has no attribute '_TYPE_SUPPORT'" in (
@@ -252,9 +291,26 @@ def _exception_hint(failure: Failure, recording: Recording) -> str:
         return "setup.py's console_scripts names a function that the module does not have."
     if failure.type == "TypeError" and "'qos_profile'" in failure.message:
         return "The third argument is the queue depth: self.create_publisher(Twist, 'cmd_vel', 10)."
+    if failure.type == "TypeError" and _called_by_rclpy(failure):
+        return (
+            "rclpy calls the callback of a timer without arguments and that of a subscription "
+            "with the message: def timer_callback(self), def message_callback(self, msg)."
+        )
     if student_place(failure, recording.submission):
         return "Mend the line that is named here."
     return "Read the traceback from its last line upwards."
+
+
+def _called_by_rclpy(failure: Failure) -> bool:
+    """Whether rclpy called something with arguments that it does not take."""
+    inside = any("/rclpy/" in frame.file for frame in failure.frames[-1:])
+    return inside and _OTHER_ARGUMENTS.search(failure.message) is not None
+
+
+def _enters_init(failure: Failure) -> bool:
+    """Whether it is `with rclpy.init():`; Python 3.10 only names the method that None lacks."""
+    refused = "context manager protocol" in failure.message or failure.message == "__enter__"
+    return refused and any("rclpy.init(" in frame.source for frame in failure.frames[-1:])
 
 
 def _wrong_class(lines: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from grader.checks.field import number_at
-from grader.checks.printed import numbers, shows
+from grader.checks.printed import exchanged, logged_text, numbers, shows
 from grader.recording.model import NS, LogLine, Message, Recording
 
 
@@ -106,10 +106,17 @@ def echoes(
             end_ns += round(recording.taken_s(begin_ns, end_ns) * NS)
         first = max(free, bisect_left(times, begin_ns))
         missing = set(item.values)
+        serving: list[str] = []
         for index in range(first, len(lines)):
             if times[index] > end_ns:
                 break
-            missing -= shown(printed[index], item, decimals)
+            here = missing & shown(printed[index], item, decimals)
+            if not here:
+                continue
+            missing -= here
+            serving.append(logged_text(lines[index].text))
+            if not missing and exchanged("\n".join(serving), item.values, decimals):
+                missing, serving = set(item.values), []
             if not missing:
                 free = index + 1
                 found.append(Echo(item, lines[first:free]))

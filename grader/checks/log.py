@@ -64,14 +64,15 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
 
     Lines on stdout and stderr (rclpy's loggers write to stderr) must follow messages on the
     topic and show the values of their fields. Any formatting is right: one line or several,
-    rounded or exact, the whole message; other numbers and other lines do not matter. Where the
-    lines come from does not matter either, a callback or a timer.
+    rounded or exact, the whole message; other numbers and other lines do not matter. Only the
+    name that stands right before a number, as in `x = 1.37`, must not be that of another of the
+    fields. Where the lines come from does not matter either, a callback or a timer.
 
     Explains a subscription that is missing, of another type, or that requests a QoS that the
-    publisher does not offer; an executor that never spins or that a callback blocks; other
-    values (another beam of a scan, the nearest of all, z instead of y, centimetres, too few
-    decimals); values that are logged only in the callback of another topic; and a callback that
-    logs nothing.
+    publisher does not offer; an executor that never spins or that a callback blocks; other values
+    (another beam of a scan, the nearest of all, z instead of y, centimetres, too few decimals); two
+    fields under each other's names; values that are logged only in the callback of another topic;
+    and a callback that logs nothing.
     """
     expected = (
         f"log lines that show {codes(parameters.fields)} of messages on {code(parameters.topic)}, "

@@ -12,7 +12,7 @@ from grader.checks.delivery import why_no_history, why_not_delivered
 from grader.checks.echo import Echo, Wanted, echoes, output_lines, shown
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.misreading import explain
-from grader.checks.printed import numbers, quote
+from grader.checks.printed import exchanged, logged_text, numbers, quote
 from grader.checks.sighting import first_seen
 from grader.checks.wording import code, codes, counted, listing, value_text
 from grader.recording.model import NS, Kind, LogLine, Recording
@@ -205,7 +205,12 @@ def _other_values(
     values = listing(f"{code(path)} = {_rounded(item.values[path], decimals)}" for path in missing)
     # A line with numbers is more likely to be meant than one without.
     told = next((line for line in reversed(near) if numbers(line.text)), near[-1])
-    reason = explain(numbers(told.text), item, missing, decimals)
+    pair = exchanged("\n".join(logged_text(line.text) for line in near), item.values, decimals)
+    reason = (
+        f"names the one where it shows the other: {listing(map(code, pair))} are exchanged"
+        if pair
+        else explain(numbers(told.text), item, missing, decimals)
+    )
     rows = tuple((path, value_text(value)) for path, value in item.values.items())
     return Cause(
         f"log lines follow messages on {code(topic)}, but none shows {values}: "
@@ -224,7 +229,7 @@ def _fields(paths: Sequence[str]) -> str:
 
 
 def _rounded(value: float, decimals: int) -> str:
-    return f"{value:.{max(decimals, 1)}f}"
+    return f"{value:.0f}" if value.is_integer() else f"{value:.{max(decimals, 1)}f}"
 
 
 def _silent(recording: Recording, topic: str) -> Cause:

@@ -242,4 +242,9 @@ def _explanation(
     series = [leaves(message.value).get(found[0].field) for message in messages]
     if slip.accumulates(found[0].expected, series):
         return f"{found[0].field} grows from message to message, as if added up"
-    return slip.explain(found, leaves(messages[first - 1].value), parameters.tolerance)
+    return slip.explain(
+        found,
+        leaves(messages[first - 1].value),
+        parameters.tolerance,
+        always=len(wrong) == len(messages),
+    )

@@ -50,6 +50,8 @@ def _relation(number: float, value: float) -> str:
             return f"{{path}} rounded to {words}"
     if math.isclose(number, -value, rel_tol=0.005):
         return "{path} with the opposite sign"
+    if value.is_integer() and abs(number - value) == 1.0:
+        return "{path} plus 1" if number > value else "{path} minus 1"
     for factor, words in _FACTORS:
         if math.isclose(number, factor * value, rel_tol=0.005):
             return f"{words} of {{path}}"

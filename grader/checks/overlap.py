@@ -59,7 +59,7 @@ def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
         expected,
         f"{_overlap_words(recording, worst)}, and {counted(len(found), 'overlap')} in all"
         + (f"; {declared}" if declared else ""),
-        _exclusion_hint(names, worst),
+        _exclusion_hint(recording, names, worst),
         Evidence(
             moments=(
                 Moment(
@@ -82,7 +82,13 @@ def _overlap_words(recording: Recording, overlap: Overlap) -> str:
     return f"{code(overlap.one.callback)} and {code(overlap.other.callback)} ran {at_once}"
 
 
-def _exclusion_hint(names: Sequence[str], overlap: Overlap) -> str:
+def _exclusion_hint(recording: Recording, names: Sequence[str], overlap: Overlap) -> str:
+    if concurrency.forbids(recording, itself=overlap.one.callback == overlap.other.callback):
+        return (
+            "The executor and the groups would not allow it, so something else runs the work: a "
+            "thread that a callback starts, a second executor or a second process. Work in the "
+            "callback itself, from its first report to its last."
+        )
     if overlap.one.callback == overlap.other.callback:
         return (
             "Give the subscription a MutuallyExclusiveCallbackGroup: "

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from itertools import combinations
 
 from grader.checks.wording import code
 
@@ -13,6 +15,13 @@ _NUMBER = re.compile(
 )
 # `1,37` as some locales write it. In `(1,37)` it could be two numbers as well: both are tried.
 _DECIMAL_COMMA = re.compile(r"(?<![0-9.,])[-+]?[0-9]+,[0-9]+(?![0-9.,])")
+# `x = 1.37`, `y: -0.62`, `"x": 1.37`: a name and its number with nothing but such signs between.
+_NAMED = re.compile(
+    r"""(?<![A-Za-z0-9_])(?P<name>[A-Za-z_]\w*)["']?[ \t]*[:=][ \t]*(?P<number>"""
+    + _NUMBER.pattern
+    + ")",
+    re.IGNORECASE,
+)
 # What rclpy's loggers put before a text: `[INFO] [1700000000.123456789] [bot]: `.
 _LOG_PREFIX = re.compile(r"\s*\[[A-Z]+\] \[[0-9.]+\] \[[^\]]*\]: ?")
 # A float32 and its decimal text differ by less.
@@ -47,6 +56,41 @@ def numbers(line: str) -> tuple[float, ...]:
             found.append(-number)
     found += [float(match[0].replace(",", ".")) for match in _DECIMAL_COMMA.finditer(text)]
     return tuple(found)
+
+
+def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[str, str] | None:
+    """Two fields each of whose names stands before the other one's value, as in `x = <y>, y = <x>`.
+
+    Names may also follow their numbers or stand apart from them, and such a text is not read.
+
+    Args:
+        text: One line or several.
+        values: Path of each field -> its value.
+        decimals: How many decimals must be right.
+
+    Returns:
+        The two paths, or None.
+    """
+    named: dict[str, list[float]] = {}
+    for match in _NAMED.finditer(logged_text(text)):
+        named.setdefault(match["name"].lower(), []).append(float(match["number"]))
+    for one, other in combinations(values, 2):
+        of_one, of_other = named.get(_last(one), []), named.get(_last(other), [])
+        if _last(one) == _last(other) or not of_one or not of_other:
+            continue
+        if any(shows(number, values[one], decimals) for number in of_one) or any(
+            shows(number, values[other], decimals) for number in of_other
+        ):
+            continue
+        if any(shows(number, values[other], decimals) for number in of_one) and any(
+            shows(number, values[one], decimals) for number in of_other
+        ):
+            return one, other
+    return None
+
+
+def _last(path: str) -> str:
+    return path.rpartition(".")[2].lower()
 
 
 def shows(number: float, value: float, decimals: int) -> bool:

@@ -16,6 +16,8 @@ _TENS_TOLERANCE = 0.1
 _MOST_TIMES = 5
 _TIMES_TOLERANCE = 0.08
 _SAME = 0.05
+# Share of the period.
+_AT_ONCE = 0.1
 # So many timers of one period are not made by hand.
 _MADE_ANEW = 4
 _WORDS = {2: "twice", 3: "three times", 4: "four times", 5: "five times"}
@@ -110,7 +112,7 @@ def _wrong_period(
     if same:
         return Explanation(said.removeprefix("; "), _seconds_hint(limits))
     if median_s < wanted_s:
-        return _too_fast(recording, topic)
+        return _too_fast(recording, topic, limits)
     longer = format_duration(median_s - wanted_s)
     right = [item for item in declared if math.isclose(item, wanted_s, rel_tol=_SAME)]
     if len(right) >= _MADE_ANEW:
@@ -137,7 +139,14 @@ def _wrong_period(
     return Explanation(f"{found} instead of {wanted}", _seconds_hint(limits))
 
 
-def _too_fast(recording: Recording, topic: str) -> Explanation:
+def _too_fast(recording: Recording, topic: str, limits: Limits) -> Explanation:
+    if testimony.timer_of_zero(recording):
+        return Explanation(
+            "messages come too often: the process declared a timer of 0 s, which fires again and "
+            "again without a pause",
+            "Less than a second becomes 0 in whole numbers, as in 300 // 1000 or int(0.3). "
+            f"{_seconds_hint(limits)}",
+        )
     if recording.student_endpoints(Kind.SUBSCRIPTION, topic):
         return Explanation(
             "the node subscribes to the topic that it publishes on, so it may answer itself",
@@ -151,6 +160,13 @@ def _irregular(measured: tuple[Interval, ...], verdict: Verdict) -> Explanation:
         measured[index].seconds / verdict.median_s if verdict.median_s else 0.0
         for index in verdict.irregular
     ]
+    at_the_start = tuple(verdict.irregular) == tuple(range(len(ratios)))
+    if at_the_start and all(ratio < _AT_ONCE for ratio in ratios):
+        return Explanation(
+            f"{len(ratios) + 1} messages come at once at the start",
+            "Publish in the callback of the timer only, not in the constructor or in main() as "
+            "well.",
+        )
     if all(ratio > 1.5 and abs(ratio - round(ratio)) < 0.1 for ratio in ratios):
         return Explanation(
             "messages are left out",

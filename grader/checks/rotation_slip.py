@@ -43,6 +43,10 @@ _FIXED_HINT = (
     "about z, so q = q_yaw * q_pitch * q_roll, in this order."
 )
 _INVERSE_HINT = "The vector part of the quaternion has the wrong sign, so it turns backwards."
+_SIGN_HINT = (
+    "q and -q are the same rotation, but all four numbers change their signs together: leave w "
+    "negative, without abs(), or negate x, y and z with it."
+)
 
 
 @dataclass(frozen=True)
@@ -168,6 +172,28 @@ def _conjugate(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
     return lambda rows: formula(rows) * np.array([-1.0, -1.0, -1.0, 1.0])
 
 
+def _sum_normalized(rows: Rows) -> Rows:
+    with np.errstate(all="ignore"):
+        axis = rows[:, :3] / np.abs(rows[:, :3]).sum(axis=1, keepdims=True)
+    return _turn(axis, _half(rows), _half(rows))
+
+
+def _sine_halved(rows: Rows) -> Rows:
+    return np.column_stack((_axis(rows) * 0.5 * np.sin(rows[:, 3:4]), np.cos(_half(rows))))
+
+
+def _sine_and_cosine_halved(rows: Rows) -> Rows:
+    return 0.5 * _turn(_axis(rows), rows[:, 3], rows[:, 3])
+
+
+def _w_without_sign(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
+    def given(rows: Rows) -> Rows:
+        rotations = formula(rows)
+        return np.column_stack((rotations[:, :3], np.abs(rotations[:, 3])))
+
+    return given
+
+
 _AXIS_ANGLE = (
     Slip(
         "the angle is not halved",
@@ -200,6 +226,13 @@ _AXIS_ANGLE = (
         lambda rows: _turn(_axis(rows), _half(rows), rows[:, 3]),
     ),
     Slip("the angle is halved twice", _HALF_HINT, _angle_scaled(0.5)),
+    Slip("the sine is halved, not the angle: sin(angle) / 2 instead of sin(angle / 2)", _HALF_HINT,
+         _sine_halved),
+    Slip("sine and cosine are halved, not the angle: sin(angle) / 2 instead of sin(angle / 2)",
+         _HALF_HINT, _sine_and_cosine_halved),
+    Slip("the axis is divided by the sum of its parts, not by its length", _AXIS_HINT,
+         _sum_normalized),
+    Slip("w has lost its sign", _SIGN_HINT, _w_without_sign(_right_quaternion)),
     Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
          _w_first(_right_quaternion)),
     Slip("the fields are in a wrong order: x, y, z, w hold y, z, w, x", _ORDER_HINT,
@@ -252,12 +285,21 @@ _RPY = (
          _FIXED_HINT, _intrinsic),
     Slip("the angles are not halved", "A quaternion holds half angles: math.sin(roll / 2).",
          _rpy_scaled(2.0)),
+    *(
+        Slip(f"the {name} is not halved", f"A quaternion holds half angles: math.sin({name} / 2).",
+             _signs(*factors))
+        for name, factors in (
+            ("roll", (2.0, 1.0, 1.0)), ("pitch", (1.0, 2.0, 1.0)), ("yaw", (1.0, 1.0, 2.0)),
+        )
+    ),
     Slip("the angles are halved twice", "A quaternion holds half angles: math.sin(roll / 2).",
          _rpy_scaled(0.5)),
     Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
          _w_first(rotations_of_rpy)),
     Slip("the fields are in a wrong order: x, y, z, w hold y, z, w, x", _ORDER_HINT,
          _w_moved(rotations_of_rpy)),
+    # Before the conjugate: where w is negative it gives the same rotation.
+    Slip("w has lost its sign", _SIGN_HINT, _w_without_sign(rotations_of_rpy)),
     Slip("it is the conjugate, the inverse rotation", _INVERSE_HINT,
          _conjugate(rotations_of_rpy)),
     Slip("the angles are converted as if they came in degrees", _RADIANS_HINT,
@@ -312,6 +354,13 @@ def _reordered_rpy(order: Sequence[int], rows: Rows) -> Rows:
     return _right_rpy(rows)[:, order]
 
 
+def _folded(columns: list[int], rows: Rows) -> Rows:
+    """Some of the angles as the arc sine gives them."""
+    angles = _right_rpy(rows)
+    angles[:, columns] = np.arcsin(np.sin(angles[:, columns]))
+    return angles
+
+
 _TO_RPY = (
     *(
         Slip(words, _SWAP_HINT, partial(_reordered_rpy, order))
@@ -327,12 +376,19 @@ _TO_RPY = (
          lambda rows: _right_rpy(rows[:, [1, 2, 3, 0]])),
     Slip("the quaternion is read in a wrong order: z as w", _ORDER_HINT,
          lambda rows: _right_rpy(rows[:, [3, 0, 1, 2]])),
+    # Before the inverse: where w is negative it gives the same angles.
+    Slip("w is read without its sign", _SIGN_HINT,
+         lambda rows: _right_rpy(np.column_stack((rows[:, :3], np.abs(rows[:, 3]))))),
     Slip("it is the inverse rotation", "The conjugate of a quaternion turns backwards: look for "
          "a wrong sign.", lambda rows: _right_rpy(rows * np.array([-1.0, -1.0, -1.0, 1.0]))),
     Slip("the pitch has the wrong sign", "The pitch is asin(2 (w y - z x)).",
          lambda rows: _right_rpy(rows) * np.array([1.0, -1.0, 1.0])),
     Slip("roll and yaw lose their quadrant", "Use math.atan2(a, b) and not math.atan(a / b): only "
          "the two signs tell the quadrant.", _tangent),
+    Slip("the yaw loses its quadrant", "Use math.atan2(a, b) for the yaw: math.asin and math.atan "
+         "give angles from -90 to 90 deg only.", partial(_folded, [2])),
+    Slip("the roll loses its quadrant", "Use math.atan2(a, b) for the roll: math.asin and "
+         "math.atan give angles from -90 to 90 deg only.", partial(_folded, [0])),
     Slip("the angles are halved", "atan2 and asin give the whole angle here; do not halve it.",
          lambda rows: 0.5 * _right_rpy(rows)),
     Slip("the angles are doubled", "atan2 and asin give the whole angle here; do not double it.",

@@ -15,13 +15,20 @@ _FACTORS = {1000.0: "1000 times", 100.0: "100 times", 10.0: "10 times"}
 _FACTOR_TOLERANCE = 1e-6
 
 
-def explain(wrong: tuple[Difference, ...], observed: Mapping[str, Any], tolerance: float) -> str:
+def explain(
+    wrong: tuple[Difference, ...],
+    observed: Mapping[str, Any],
+    tolerance: float,
+    *,
+    always: bool = True,
+) -> str:
     """Say which slip explains the differences, or nothing.
 
     Args:
         wrong: At least one difference.
         observed: All leaves of the message.
         tolerance: As for the comparison.
+        always: No other message is right.
 
     Returns:
         A clause such as ``linear.x and angular.z are swapped``, or an empty text.
@@ -34,7 +41,7 @@ def explain(wrong: tuple[Difference, ...], observed: Mapping[str, Any], toleranc
         _integer(numbers)
         or _not_a_number(numbers)
         or _swapped(numbers, tolerance)
-        or _all_zero(wanted, observed)
+        or _all_zero(wanted, observed, always)
         or _moved(wanted, numbers, tolerance)
         or _scaled(wanted, tolerance)
     )
@@ -101,9 +108,14 @@ def _stands_in(item: Difference, field: str) -> str:
     return f"the {value_text(item.expected)} stands in {field} instead of {item.field}"
 
 
-def _all_zero(wanted: list[Difference], observed: Mapping[str, Any]) -> str:
+def _all_zero(wanted: list[Difference], observed: Mapping[str, Any], always: bool) -> str:
     numbers = [value for value in observed.values() if _is_number(value)]
     if wanted and numbers and not any(numbers):
+        if not always:
+            return (
+                "every number in it is zero, although others are right: a second publish() sends "
+                "a message whose fields nobody sets"
+            )
         return "every number in it is zero: the message was published before its fields were set"
     return ""
 

@@ -94,6 +94,9 @@ def mistakes(value: SourceValue, message: Mapping[str, Any]) -> Iterator[tuple[s
         yield "asin(z), which is half of the yaw", math.asin(max(-1.0, min(1.0, z)))
         size = 2.0 * math.acos(max(-1.0, min(1.0, w)))
         yield "2 acos(w), which has lost the sign of the yaw", size
+        folded = math.atan(math.tan(right))
+        yield "the yaw without its quadrant: math.atan2(a, b), not math.atan(a / b)", folded
+        yield "the yaw from asin, which gives -90° to 90° only", math.asin(math.sin(right))
         roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
         yield "the roll: the arguments of the conversion are in another order", roll
         pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
@@ -105,6 +108,7 @@ def mistakes(value: SourceValue, message: Mapping[str, Any]) -> Iterator[tuple[s
         yield "the yaw with the quaternion taken as w, x, y, z", yaw(y, z, w, x)
     else:
         yield f"`{value.path}` with the wrong sign", -right
+        yield f"`{value.path}` without its sign, as of math.hypot() or abs()", abs(right)
         yield f"`{value.path}` in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
     for path, number in leaves(message).items():
         if path != value.path and isinstance(number, int | float):

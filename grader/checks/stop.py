@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Literal
 
 from pydantic import Field
@@ -10,7 +11,7 @@ from grader.assignment.quantity import Length, PositiveLength, Speed
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.command import scans
+from grader.checks.command import commands, scans
 from grader.checks.contact import why_touched
 from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Finding, Moment, Plot
@@ -30,6 +31,12 @@ _LATE_HINT = (
     "Publish the stop in the scan callback itself, from the newest scan: a sleep, a slow timer or "
     "an old stored value costs way."
 )
+_OTHER_LIMIT_HINT = (
+    "It answered these scans with a command to drive: which number does the callback compare the "
+    "front range with? Ranges are in metres, and -inf is nearer than the LiDAR can measure."
+)
+# A callback that sleeps, or a slow timer, answers fewer scans than come.
+_ANSWERED = 3
 
 
 class Stops(Parameters):
@@ -158,12 +165,23 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
             ours=True,
             disturbed=True,
         )
-    told = sum(crossed.time_ns <= scan.stamp_ns <= step.time_ns for scan in scans(recording))
-    within = f"; {counted(told, 'scan')} told of it meanwhile" if told else ""
+    told = [
+        item.stamp_ns
+        for item in scans(recording)
+        if crossed.time_ns <= item.stamp_ns <= step.time_ns
+    ]
+    driving = [item.time_ns for item in commands(recording) if item.twist.linear_m_s > 0.0]
+    answered = sum(
+        any(begin_ns <= time_ns < end_ns for time_ns in driving)
+        for begin_ns, end_ns in pairwise(told)
+    )
+    within = f"; {counted(len(told), 'scan')} told of it meanwhile" if told else ""
+    if answered >= _ANSWERED and answered == len(told) - 1:
+        within += ", and commands to drive on followed them"
     return Cause(
         f"{seen}: it came to rest {format_duration(took_s)} after that distance was reached, at up "
         f"to {speed(fastest)}{within}",
-        _LATE_HINT,
+        _OTHER_LIMIT_HINT if "commands" in within else _LATE_HINT,
         evidence,
     )
 

@@ -89,6 +89,11 @@ def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
     return tuple(found)
 
 
+def timer_of_zero(recording: Recording) -> bool:
+    """Whether the processes declared a timer without a period, which :func:`timers` leaves out."""
+    return any(_number(item.data, "period_s") == 0.0 for item in recording.declared("timer"))
+
+
 def queues(recording: Recording, kind: Kind, topic: str) -> tuple[DeclaredQueue, ...]:
     """History and depth of the endpoints that the processes declared on a topic."""
     found = []

@@ -304,6 +304,23 @@ class TestNeverOverlap:
         )
         assert "the process declared a `MultiThreadedExecutor` with 4 threads" in words
 
+    def test_threads_of_its_own(self):
+        """What one thread of an executor cannot do, other threads did."""
+        single = declared("spin", executor="SingleThreadedExecutor", threads=1)
+        words = failed("never_overlap", run(*parallel(), declarations=(single,)), self.EVERYBODY)
+        assert "a thread that a callback starts" in words
+
+    def test_one_exclusive_group_does_not_run_twice_by_itself(self):
+        runs = [("chatter", 2.0 + 0.1 * index, 2.2 + 0.1 * index) for index in range(4)]
+        several = declared("spin", executor="MultiThreadedExecutor", threads=4)
+        for group, words in (
+            ("MutuallyExclusiveCallbackGroup", "a thread that a callback starts"),
+            ("ReentrantCallbackGroup", "Give the subscription a MutuallyExclusiveCallbackGroup"),
+        ):
+            subscription = declared("subscription", group={"type": group, "id": 1})
+            subject = run(*runs, declarations=(several, subscription))
+            assert words in failed("never_overlap", subject, ["chatter"])
+
     def test_the_bars_that_overlap_are_marked(self):
         finding = judged("never_overlap", run(*parallel()), TIMERS)
         wrong = [span.name for span in finding.evidence.spans if span.wrong]

@@ -155,6 +155,8 @@ class TestExplains:
             (lambda heading: -heading, "the yaw with the wrong sign"),
             (lambda heading: heading / 2, "half of the yaw"),
             (lambda heading: 2 * math.acos(math.cos(heading / 2)), "lost the sign"),
+            (lambda heading: math.atan(math.tan(heading)), "without its quadrant"),
+            (lambda heading: math.asin(math.sin(heading)), "from asin"),
             (lambda _: 0.0, "never set"),
             (lambda _: 0.5, "always the same"),
             (lambda _: math.nan, "not a finite number"),
@@ -173,6 +175,21 @@ class TestExplains:
     def test_another_field_of_the_source(self):
         found = told(run(lambda t: status(-2.0 * place(t)[0], *place(t)[1:])))
         assert "it is `pose.pose.position.y`" in found
+
+    def test_a_speed_that_has_lost_its_sign(self):
+        def speed(time_s):
+            return 0.3 - 0.2 * (time_s - FIRST_S)
+
+        def sent(time_s):
+            return {**odometry(time_s), "twist": {"twist": {"linear": {"x": speed(time_s)}}}}
+
+        sources = tuple(
+            message(t, sent(t), sequence=n, topic=ODOM, type="nav_msgs/msg/Odometry")
+            for n, t in enumerate(TIMES, start=1)
+        )
+        subject = run(lambda t: status(*place(t)[:2], abs(speed(t))))
+        subject = replace(subject, messages={**subject.messages, ODOM: sources})
+        assert "without its sign" in told(subject)
 
     def test_fields_that_are_swapped(self):
         found = told(run(lambda t: status(place(t)[2], place(t)[1], place(t)[0])))

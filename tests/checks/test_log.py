@@ -124,6 +124,11 @@ class TestAnyFormatIsRight:
             "Position:\n\tx\n1.4e3 1.372\n\ty\n-0.618",
             "\x1b[32mx=1.37\x1b[0m y=-0.62",
             "y -0.62 x 1.37",
+            "y = -0.62, x = 1.37",
+            "x, y: 1.37, -0.62",
+            "(y, x) = (-0.62, 1.37)",
+            "1.37 x -0.62 y",
+            "in the map x = -0.62, y = 1.37; in odom x = 1.37, y = -0.62",
         ],
     )
     def test_of_two_numbers(self, text):
@@ -201,6 +206,34 @@ class TestAnyRhythmIsRight:
 
 
 class TestOtherValues:
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "[INFO] [1700000000.1] [bot]: Position: x = -0.62, y = 1.37",
+            '{"y": 1.372, "x": -0.618}',
+            "x: -0.62\ny: 1.37",
+        ],
+    )
+    def test_x_and_y_exchanged(self, text):
+        found = position(lines(text, ODOM_TIMES_S))
+        assert "none shows `pose.pose.position.x` = 1.37" in found
+
+    @pytest.mark.parametrize("text", ["x = -0.62, y = 1.37", "x: -0.62\ny: 1.37"])
+    def test_that_they_are_exchanged_is_said(self, text):
+        found = position(lines(text, ODOM_TIMES_S))
+        assert "`pose.pose.position.x` and `pose.pose.position.y` are exchanged" in found
+
+    def test_a_right_line_beside_an_exchanged_one_counts(self):
+        text = "x = -0.62, y = 1.37\nx = 1.37, y = -0.62"
+        finding = judge("log.follows", run(lines(text, ODOM_TIMES_S)), **POSITION)
+        assert finding.status is Status.PASSED
+
+    def test_one_more_than_a_whole_number(self):
+        value = {**scan(), "ranges": [765072.0, *RANGES[1:]]}
+        changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
+        found = front(lines("Received: 765073", SCAN_TIMES_S), messages=changed)
+        assert "`ranges[0]` = 765072: `Received: 765073`, which shows `ranges[0]` plus 1" in found
+
     def test_another_beam(self):
         assert "`2.50`, which shows `ranges[180]`" in front(lines("2.50", SCAN_TIMES_S))
 

@@ -312,6 +312,15 @@ class TestEqual:
     def test_slips(self, value, words):
         assert words in unequal(value)
 
+    def test_one_that_nobody_filled_among_others_that_are_right(self):
+        stream = tuple(
+            message(t, twist((0, 0, 0), (0, 0, 0)) if n == 2 else twist(), sequence=n)
+            for n, t in enumerate(every(0.3), 1)
+        )
+        finding = equal(recording(messages={"/cmd_vel": stream}))
+        assert "although others are right: a second publish()" in finding.observed
+        assert "(1 of 12 messages wrong)" in finding.observed
+
     def test_a_value_that_adds_up(self):
         stream = tuple(
             message(t, twist((float(n), 0, 0)), sequence=n) for n, t in enumerate(every(0.3), 1)

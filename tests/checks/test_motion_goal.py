@@ -293,6 +293,30 @@ class TestMistakes:
             "motion.slows_down", run
         )
 
+    def test_drives_backwards(self):
+        student = Student(BEHIND)
+
+        def by_dx(pose):
+            speed, turn = student(pose)
+            return math.copysign(speed, BEHIND[0] - pose.x_m), turn
+
+        run = drive(on_odometry(by_dx), seconds=20)
+        said = failing("motion.path_length", run, goal=yaml(BEHIND), most="180 %")
+        assert "it drives backwards" in said and "math.hypot(dx, dy)" in said
+
+    def test_half_a_turn_taken_for_no_error(self):
+        def by_half_turns(error):
+            return (error + math.pi / 2) % math.pi - math.pi / 2
+
+        run = run_to(BEHIND, seconds=20, wrap=by_half_turns)
+        said = failing("motion.path_length", run, goal=yaml(BEHIND), most="180 %")
+        assert "as if half a turn were no error" in said and "math.atan2(dy, dx)" in said
+
+    def test_turns_a_little_too_little(self):
+        run = run_to(GOAL, straight=0.08)
+        said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.03 rad")
+        assert "it stopped turning a little before" in said and "angle_tolerance" in said
+
     def test_ends_a_little_before_the_goal(self):
         run = run_to(GOAL)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.03 m", heading="0.1 rad")

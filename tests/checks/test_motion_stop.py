@@ -229,6 +229,20 @@ class TestStops:
             said = failing(check, run, **parameters)
             assert "drove into `segments[0]` at 0.1 m/s" in said
 
+    def test_decides_to_drive_until_it_touches(self):
+        run = drive(on_scan(lambda ranges: good([ranges[270]])), world=WALL, seconds=12)
+        said = failing("motion.no_contact", run)
+        assert "It went on deciding to drive" in said and "sent" not in said
+
+    def test_a_command_that_is_held_until_it_touches(self):
+        def slow(senses: Senses):
+            due = senses.new_scan and senses.scan is not None and senses.time_s < 1.0
+            return (0.1, 0.0) if due else None
+
+        said = failing("motion.no_contact", drive(slow, world=WALL, seconds=12))
+        assert "as the last command, sent 8." in said
+        assert "The robot keeps the last command" in said
+
     def test_drives_into_it_long_after_the_last_scan(self):
         run = drive(by_front(), world=WALL, seconds=12, options={"lidar": {"stops": "3 s"}})
         said = failing("motion.no_contact", run)
@@ -245,6 +259,16 @@ class TestStops:
 
         run = drive(law, world="{segments: [[0.8, -1, 0.8, 1]]}", seconds=20)
         assert "stopped late" in failing("motion.stops", run, distance="0.2 m", late="1 cm")
+
+        assert "a sleep, a slow timer" in failing(
+            "motion.stops", run, distance="0.2 m", late="1 cm"
+        )
+
+    def test_too_late_by_another_limit(self):
+        law = on_scan(lambda ranges: (0.0 if ranges[0] <= 0.13 else 0.1, 0.0))
+        said = failing("motion.stops", drive(law, world=WALL, seconds=20), **STOPS)
+        assert "and commands to drive on followed them" in said
+        assert "which number does the callback compare" in said
 
     def test_too_late_by_what_the_machine_took_is_no_fault_of_the_student(self):
         run = drive(by_front(0.15, 0.17), world=WALL, seconds=20)

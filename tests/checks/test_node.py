@@ -256,6 +256,12 @@ class TestStarts:
         assert failing("node.starts", run) == failing("node.exists", run, name=NODE)
 
 
+_IN_RCLPY = (
+    '  File "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/node.py", line 205, in f\n'
+    "    raise it\n"
+)
+
+
 class TestAlive:
     def test_what_is_never_allowed_costs_the_check_even_where_the_node_ran_to_its_end(self):
         deed = "sent SIGKILL to the process that holds their sandbox"
@@ -299,6 +305,78 @@ class TestAlive:
         )
         found = failing("node.alive", run)
         assert f"2.00 s after launch with ZeroDivisionError: division by zero ({SOURCE}:20" in found
+
+    @pytest.mark.parametrize(
+        ("raised", "source", "words"),
+        [
+            (
+                "TypeError: 'NoneType' object does not support the context manager protocol",
+                "with rclpy.init(args=args):",
+                "without `with`",
+            ),
+            ("AttributeError: __enter__", "with rclpy.init():", "without `with`"),
+            (
+                "ValueError: min() arg is an empty sequence",
+                "front = min(scan.ranges[-10:10])",
+                "ranges[-10:] + ranges[:10]",
+            ),
+            (
+                "ValueError: min() iterable argument is empty",
+                "front = min(near)",
+                "test `if values:`",
+            ),
+            (
+                "OverflowError: cannot convert float infinity to integer",
+                "int(front)",
+                "math.isfinite(value)",
+            ),
+            (
+                "RuntimeError: Subscription.__init__(): callback should be either be callable",
+                "self.create_subscription(Odometry, '/odom', self.odom_callback, 10)",
+                "def message_callback(self, msg)",
+            ),
+            ("ValueError: math domain error", "math.acos(w)", "max(-1.0, min(1.0, value))"),
+        ],
+    )
+    def test_what_an_exception_means(self, raised, source, words):
+        # The frame of the student is the last one, as where Python itself raises.
+        log = output(traceback(raised, source=source).replace(_IN_RCLPY, ""))
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        assert words in failing("node.alive", run)
+
+    @pytest.mark.parametrize(
+        ("raised", "words"),
+        [
+            (
+                "TypeError: Bot.tick() takes 1 positional argument but 2 were given",
+                "the callback of a timer without arguments",
+            ),
+            (
+                "TypeError: Bot.heard() missing 1 required positional argument: 'msg'",
+                "the callback of a timer without arguments",
+            ),
+            (
+                "TypeError: CallbackGroup.add_entity() missing 1 required positional argument: "
+                "'entity'",
+                "ReentrantCallbackGroup()",
+            ),
+        ],
+    )
+    def test_what_rclpy_could_not_call(self, raised, words):
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=output(traceback(raised)))
+        assert words in failing("node.alive", run)
+
+    def test_a_wrong_call_of_its_own_is_no_callback(self):
+        raised = "TypeError: Bot.tick() takes 1 positional argument but 2 were given"
+        log = output(traceback(raised).replace(_IN_RCLPY, ""))
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        assert "Mend the line that is named here." in failing("node.alive", run)
+
+    def test_another_with_is_not_that_of_rclpy(self):
+        raised = "TypeError: 'NoneType' object does not support the context manager protocol"
+        log = output(traceback(raised, source="with self.lock():").replace(_IN_RCLPY, ""))
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        assert "Mend the line that is named here." in failing("node.alive", run)
 
     def test_the_first_of_chained_exceptions_is_the_cause(self):
         log = output(

@@ -13,6 +13,7 @@ from tests.checks.builder import (
     after,
     at,
     declarations,
+    declared,
     died,
     endpoint,
     every,
@@ -325,12 +326,23 @@ class TestMistakes:
         assert "differ from the median by more than 30 ms" in found
         assert "Let a timer call the callback" in found
 
+    def test_a_burst_at_the_start(self):
+        found = wrong([0.0002, 0.0001, *[0.3] * 12])
+        assert "3 messages come at once at the start" in found
+        assert "not in the constructor" in found
+
     def test_a_feedback_loop(self):
         own = (endpoint(), endpoint(kind=Kind.SUBSCRIPTION), reader())
         assert "may answer itself" in wrong([0.0002] * 900, endpoints=own)
 
     def test_too_often_for_no_reason_that_can_be_seen(self):
         assert "messages come too often" in wrong([0.2] * 20, declarations=())
+
+    def test_a_timer_of_zero(self):
+        declarations = (declared("timer", period_s=0.0),)
+        found = wrong([0.0001] * 50, declarations=declarations)
+        assert "the process declared a timer of 0 s" in found
+        assert "300 // 1000" in found
 
     def test_many_times_the_period(self):
         assert "median 900 ms" in wrong([0.9] * 6, declarations=())
