@@ -56,3 +56,16 @@ def cache_folder() -> Path:
     """Folder for builds that may be deleted at any time (XDG Base Directory)."""
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "rosgrade"
+
+
+def check_executable(folder: Path) -> None:
+    """See that programs may be started from a folder.
+
+    Raises:
+        GraderFault: It is on a file system that allows none.
+    """
+    if os.statvfs(folder).f_flag & os.ST_NOEXEC:
+        raise GraderFault(
+            f"no program can be started from {folder}: it is on a file system that is mounted "
+            "noexec; let XDG_CACHE_HOME name a folder on another"
+        )

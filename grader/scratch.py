@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 
 PREFIX = "rosgrade-scratch-"
+_ASCII_PLACE = "/tmp"
 _STALE_S = 3600.0
 """One that is newer may not be locked yet, or something started from it may still be ending."""
 
@@ -31,8 +32,10 @@ class Scratch:
         Args:
             kind: A word for its name.
         """
-        remove_stale(Path(tempfile.gettempdir()))
-        self._folder = tempfile.TemporaryDirectory(prefix=f"{PREFIX}{kind}-")
+        # rosidl's generators cannot build interfaces below a folder with other letters.
+        place = tempfile.gettempdir() if tempfile.gettempdir().isascii() else _ASCII_PLACE
+        remove_stale(Path(place))
+        self._folder = tempfile.TemporaryDirectory(prefix=f"{PREFIX}{kind}-", dir=place)
         self.path = Path(self._folder.name)
         self._lock: int | None = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
         fcntl.flock(self._lock, fcntl.LOCK_SH)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grader.assignment.limits import BuildLimitOptions
 from grader.assignment.load import LoadedAssignment
@@ -24,8 +25,12 @@ from grader.run.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.submission.bounded import OutputLimits
+from grader.submission.build_cache import files_in
 from grader.submission.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
+
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
 
 RECORDINGS_FOLDER = "recordings"
 SUBMISSION_FILE = "submission.json"
@@ -108,10 +113,10 @@ class Grading:
 
         Raises:
             UsageError: There is nothing at ``path``.
-            GraderFault: The build could not be tried.
+            GraderFault: The build could not be tried, or what was built is gone.
         """
         self._type_support.prefixes(on_build)
-        sandbox = self._runner.sandbox
+        sandbox = self._sandbox
         # Each of them takes a CPU or more; beyond that they would only hold up each other.
         with self._builds:
             prepared = prepare(
@@ -120,13 +125,43 @@ class Grading:
                 cache=self._cache,
                 limits=self._prepare_limits,
                 on_progress=on_build,
-                sandbox=sandbox and sandbox.allowing(self._loaded.assignment.libraries),
+                sandbox=sandbox,
                 stop=self._stop,
                 on_output=on_output,
             )
         if name is not None:
             prepared = prepared.named(name)
         return self.grade_prepared(prepared, folder)
+
+    @property
+    def _sandbox(self) -> Sandbox | None:
+        sandbox = self._runner.sandbox
+        return sandbox and sandbox.allowing(self._loaded.assignment.libraries)
+
+    def _watched(self, prepared: Prepared) -> Callable[[Mapping[str, Recording]], None]:
+        """See that no point is lost because somebody empties the cache while nodes run.
+
+        Returns:
+            What takes the recordings and raises :class:`GraderFault` if anything that they run
+            with was deleted since.
+        """
+        sandbox = self._sandbox
+        check_python = sandbox.watched() if sandbox is not None and prepared.install else None
+        folders = (*prepared.underlays, *((prepared.install,) if prepared.install else ()))
+        before = [(folder, files_in(folder)) for folder in folders]
+
+        def check(recordings: Mapping[str, Recording]) -> None:
+            for folder, files in before:
+                if not files <= files_in(folder):
+                    raise GraderFault(
+                        f"files of what was built were deleted in {folder.parent} while it ran, "
+                        "perhaps by somebody who tidied up; grade again"
+                    )
+            # To look at every file of it takes 0.1 s; without one a program ends by itself.
+            if check_python is not None and any(map(_has_died, recordings.values())):
+                check_python()
+
+        return check
 
     def close(self) -> None:
         """End every build and cell that runs; what is being graded ends as interrupted."""
@@ -149,9 +184,13 @@ class Grading:
             prepared: The submission.
             folder: Where the recordings and the submission's facts go; recordings of an
                 earlier run are removed.
+
+        Raises:
+            GraderFault: Somebody deletes what was built while it runs.
         """
         for old in folder.glob("*.mcap"):
             old.unlink()
+        check_there = self._watched(prepared)
         write_whole(folder / SUBMISSION_FILE, to_json(prepared.record))
         runs: dict[str, int] = {}
         faults: dict[str, str] = {}
@@ -163,6 +202,8 @@ class Grading:
             self._run_all(prepared, folder, alone, recordings, faults, alone=True)
             runs.update(dict.fromkeys((*again, *alone), attempt))
             result = grade(self._loaded, prepared.record, recordings, faults)
+            if not result.full_points:
+                check_there(recordings)
             alone = sorted(
                 set(result.disturbed_scenarios(Status.ERROR))
                 | {name for name, recording in recordings.items() if recording.faults}
@@ -223,6 +264,10 @@ class Grading:
             alone=alone,
         )
         return read_recording(file)
+
+
+def _has_died(recording: Recording) -> bool:
+    return any(process.stopped_by == "itself" for process in recording.processes)
 
 
 def _prepare_limits(options: BuildLimitOptions) -> PrepareLimits:

@@ -10,6 +10,7 @@ import atexit
 import gc
 import signal
 import sys
+import traceback
 
 import typer
 
@@ -31,6 +32,7 @@ from grader.cli import (
     watch,
 )
 from grader.cli.console import print_error
+from grader.cli.streams import lasting_streams
 from grader.errors import GraderFault, RosgradeError
 
 USAGE = 2
@@ -92,8 +94,23 @@ def main() -> None:
     atexit.register(gc.freeze)
     # A CI job that is canceled gets this, and leaves as little behind as one that gets Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # So does a closed terminal, but for what `nohup` was asked to keep.
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:
+        signal.signal(signal.SIGHUP, signal.default_int_handler)
+    # Who waits for a child must be told of its end, whatever the caller had blocked or ignored.
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
-        app()
+        with lasting_streams():
+            app()
     except RosgradeError as error:
         print_error(str(error))
         sys.exit(NOT_GRADED if isinstance(error, GraderFault) else USAGE)
+    except OSError as error:
+        # A full disk, too few descriptors, a folder that somebody removed.
+        print_error(f"this machine: {error}")
+        sys.exit(NOT_GRADED)
+    except Exception:
+        # A bug of ours must not look as if points were lost.
+        traceback.print_exc()
+        sys.exit(NOT_GRADED)

@@ -38,6 +38,7 @@ from grader.run.descendants import kill_tree
 from grader.run.environment import RMW, cell_environment
 from grader.sandbox import bubblewrap
 from grader.sandbox.namespaces import CELL, enter
+from grader.sandbox.python_tree import trees_folder
 from grader.scratch import Scratch
 
 if TYPE_CHECKING:
@@ -137,6 +138,7 @@ class Nursery:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket = ours
         self._sandbox = sandbox
+        self._trees = _trees_of(sandbox)
         self._cells = Scratch("cells")
         command = [str(ros.python), "-m", "grader.run.nursery", str(theirs.fileno())]
         environment = cell_environment(ros, sandboxed=sandbox is not None)
@@ -156,8 +158,8 @@ class Nursery:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it can still be asked for cells."""
-        return self._popen.poll() is None
+        """Whether it can still be asked for cells, and they would find what is in the cache."""
+        return self._popen.poll() is None and self._trees == _trees_of(self._sandbox)
 
     @property
     def cells(self) -> Path:
@@ -221,6 +223,14 @@ class Nursery:
         # In a sandbox it counts processes in its own way. Without it the cell is gone as well.
         with contextlib.suppress(OSError):
             self._socket.send(json.dumps({"kill": pid}).encode())
+
+
+def _trees_of(sandbox: Sandbox | None) -> tuple[int, int] | None:
+    """What a sandbox shows of the cache: another folder once somebody has emptied that."""
+    if sandbox is None:
+        return None
+    status = trees_folder(sandbox.cache).stat()
+    return status.st_dev, status.st_ino
 
 
 def _serve(requests: socket.socket) -> None:

@@ -371,6 +371,7 @@ class Runner:
             modules = unlisted(submission.foreign_imports, assignment.libraries)
             return replace(order, facts={**order.facts, "unlisted": " ".join(modules)})
         limits = (scenario.limits or assignment.limits).limits()
+        limits.check_allowed()
         sandbox = self.sandbox.allowing(assignment.libraries)
         return enclose(order, folder, sandbox, ros, install, limits)
 

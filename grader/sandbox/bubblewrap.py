@@ -8,6 +8,7 @@ the command goes on as a user that has nothing.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
@@ -183,7 +184,8 @@ def take_back(path: Path) -> None:
 
 
 def _chown(path: Path, uid: int) -> None:
-    os.chown(path, uid, uid, follow_symlinks=False)
     for parent, folders, names in os.walk(path):
-        for name in (*folders, *names):
-            os.chown(os.path.join(parent, name), uid, uid, follow_symlinks=False)  # noqa: PTH118
+        for name in ("", *folders, *names):
+            # Somebody may empty the cache meanwhile; that is found where it matters.
+            with contextlib.suppress(FileNotFoundError):
+                os.chown(os.path.join(parent, name), uid, uid, follow_symlinks=False)  # noqa: PTH118

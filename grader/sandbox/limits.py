@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import resource
 from dataclasses import dataclass
+
+from grader.errors import GraderFault
 
 MIB = 2**20
 _CPU_GRACE_S = 10
@@ -37,6 +40,28 @@ class Limits:
     open_files: int = 1024
     address_bytes: int = 4096 * MIB
     output_bytes: int = 2048 * MIB
+
+    def check_allowed(self) -> None:
+        """See that the shell that started us leaves so much to untrusted code.
+
+        Raises:
+            GraderFault: It leaves less, and nothing at all could be started.
+        """
+        for what, option, unit, wanted in (
+            (resource.RLIMIT_AS, "v", 1024, self.address_bytes),
+            (resource.RLIMIT_DATA, "d", 1024, self.memory_bytes),
+            (resource.RLIMIT_NPROC, "u", 1, self.processes),
+            (resource.RLIMIT_NOFILE, "n", 1, self.open_files),
+            (resource.RLIMIT_FSIZE, "f", 1024, self.file_bytes),
+            (resource.RLIMIT_CPU, "t", 1, self.cpu_s + _CPU_GRACE_S),
+        ):
+            _, allowed = resource.getrlimit(what)
+            if allowed != resource.RLIM_INFINITY and allowed < wanted:
+                raise GraderFault(
+                    f"`ulimit -H{option}` is {allowed // unit} in the shell that grades, and in "
+                    f"the sandbox a submission may use {wanted // unit}: allow as much, or grade "
+                    "with --sandbox none"
+                )
 
     def prlimit(self) -> list[str]:
         """The command in front of what is to be bounded.

@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import metadata
 from pathlib import Path
 
@@ -48,10 +49,36 @@ class PythonTree:
     Attributes:
         path: Its folder.
         lock: Descriptor of the lock.
+        prefix: The environment that it was made of.
+        wanted: Distributions in it besides those of ROS.
     """
 
     path: Path
     lock: int
+    prefix: Path
+    wanted: frozenset[str] = frozenset()
+
+    def is_whole(self) -> bool:
+        """Whether all of it is still there: caches are emptied, and old files tidied away."""
+        present = {
+            os.path.relpath(os.path.join(folder, name), self.path)  # noqa: PTH118
+            for folder, folders, names in os.walk(self.path)
+            for name in (*folders, *names)
+        }
+        return self._expected <= present
+
+    @cached_property
+    def _expected(self) -> frozenset[str]:
+        files = _contents(self.prefix, _closure(self.wanted).values())
+        there = (str(file) for file in files if os.path.lexists(self.prefix / file))
+        # What is seen through the link lib64 lies in lib.
+        return frozenset(re.sub("^lib64/", "lib/", file) for file in there)
+
+    def discard(self) -> None:
+        """Let another one be made in its place; whoever uses it keeps what is left."""
+        with contextlib.suppress(OSError):
+            gone = tempfile.mkdtemp(prefix=_UNFINISHED, dir=self.path.parent)
+            self.path.rename(gone)
 
     def __del__(self) -> None:
         """Let it go."""
@@ -82,13 +109,13 @@ def student_prefix(
         GraderFault: A library is not installed here.
     """
     check_installed(libraries)
-    wanted = {_normal(name) for name in libraries}
+    wanted = frozenset(map(_normal, libraries))
     parts = [str(VERSION), str(prefix), sys.executable, sys.version, *sorted(wanted)]
     # Their folders are named by distribution and version; to read them all takes 0.1 s.
     parts += sorted(path.name for path in prefix.glob("lib/python3*/site-packages/*-info"))
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
     target = trees_folder(cache) / key
-    tree = PythonTree(target, _hold(target))
+    tree = PythonTree(target, _hold(target), prefix, wanted)
     if not target.is_dir():
         _make(target, prefix, _closure(wanted).values())
         prune(target.parent)
@@ -214,10 +241,7 @@ def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:
 def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribution]) -> None:
     unfinished = Path(tempfile.mkdtemp(prefix=_UNFINISHED, dir=target.parent))
     try:
-        files = {file for item in distributions for file in _files(item, prefix)}
-        files |= {Path("pyvenv.cfg"), Path("lib64")}
-        files |= {path.relative_to(prefix) for path in prefix.glob("bin/python*")}
-        for file in sorted(files):
+        for file in sorted(_contents(prefix, distributions)):
             _link(prefix / file, unfinished / file)
         for folder, _, _ in os.walk(unfinished):
             Path(folder).chmod(0o755)
@@ -226,6 +250,13 @@ def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribut
             unfinished.rename(target)
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _contents(prefix: Path, distributions: Iterable[metadata.Distribution]) -> set[Path]:
+    """What is in an environment with these distributions, relative to it."""
+    files = {file for item in distributions for file in _files(item, prefix)}
+    files |= {Path("pyvenv.cfg"), Path("lib64")}
+    return files | {path.relative_to(prefix) for path in prefix.glob("bin/python*")}
 
 
 def _files(distribution: metadata.Distribution, prefix: Path) -> Iterable[Path]:

@@ -6,7 +6,7 @@ import hashlib
 import sys
 import tempfile
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,6 +14,7 @@ from pathlib import Path
 
 import grader
 import sim
+from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
@@ -100,10 +101,38 @@ class Sandbox:
         Raises:
             GraderFault: A library is not installed here.
         """
+        return self._held_tree().path
+
+    def _held_tree(self) -> PythonTree:
         with self._lock:
-            if self._tree is None:
+            if self._tree is None or not self._tree.path.is_dir():
                 self._tree = student_prefix(self.cache, self.libraries)
-            return self._tree.path
+            return self._tree
+
+    def watched(self) -> Callable[[], None]:
+        """See that untrusted code does not fail because something of ours was deleted.
+
+        Returns:
+            What raises :class:`GraderFault` if anything of :attr:`python_tree` is gone, or was
+            gone at any time since.
+        """
+        tree = self._held_tree() if _in_environment() else None
+
+        def check() -> None:
+            if tree is None:
+                return
+            with self._lock:
+                if self._tree is tree and tree.is_whole():
+                    return
+                if self._tree is tree:
+                    tree.discard()
+                    self._tree = None
+            raise GraderFault(
+                f"files of the students' Python were deleted in {tree.path.parent}, perhaps by "
+                "somebody who tidied up; grade again, and they are made anew"
+            )
+
+        return check
 
     def student_view(self, ros: RosInstallation, trees: Path | None = None) -> list[Bind]:
         """What untrusted code sees of Python and ROS.

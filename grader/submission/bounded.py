@@ -19,6 +19,8 @@ _SUPERVISOR = Path(__file__).with_name("supervise.py")
 _CHUNK = 64 * 1024
 _KILL_S = 15.0
 _POLL_S = 0.25
+_FROZEN_S = 2.0
+"""Who looks again only after this time was stopped meanwhile, and perhaps everybody else was."""
 _LONGEST_LINE = 4096
 
 
@@ -168,14 +170,20 @@ def _drain(
 ) -> str | None:
     """Take the output until the supervisor has ended; the limit that was passed, or None."""
     assert process.stdout is not None
-    next_look = time.monotonic() + _POLL_S
+    seen = time.monotonic()
+    next_look = seen + _POLL_S
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
         while True:
-            left = deadline - time.monotonic()
+            now = time.monotonic()
+            if now - seen > _FROZEN_S:
+                # Ctrl-Z, or a container that was paused: nobody knows who could work meanwhile.
+                deadline += now - seen
+            seen = now
+            left = deadline - now
             if left <= 0:
                 return "time"
-            if time.monotonic() >= next_look:
+            if now >= next_look:
                 passed = excess(process.pid)
                 if passed is not None:
                     return passed

@@ -164,8 +164,11 @@ class _Workshop:
                 self.on_output(line)
         finished = set(parts)
         colcon = self.colcon(scratch, install)
+        check_python = colcon.sandbox.watched() if colcon.sandbox else None
         outcome = colcon.build(finished)
         self._check_machine(outcome, scratch, install)
+        if check_python is not None and outcome.status != 0:
+            check_python()
         limits = colcon.limits
         problem = tidy(
             install,

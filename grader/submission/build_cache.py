@@ -22,6 +22,7 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from grader.errors import GraderFault
+from grader.resources import check_executable
 from grader.submission.record import BuildRecord
 
 INSTALL = "install"
@@ -109,6 +110,7 @@ class BuildCache:
         deadline = time.monotonic() + wait_s
         with _usable(self._folder):
             self._folder.mkdir(parents=True, exist_ok=True)
+            check_executable(self._folder)
             file = os.open(self._folder / f"{key}.lock", os.O_RDWR | os.O_CREAT, 0o600)
         try:
             held = _lock(file)
@@ -220,6 +222,11 @@ def tree_hash(folder: Path) -> str:
         executable = b"x" if status.st_mode & stat.S_IXUSR else b"-"
         total.update(executable + name + b"\0" + hashlib.sha256(content).digest())
     return total.hexdigest()
+
+
+def files_in(folder: Path) -> frozenset[Path]:
+    """All files and links below a folder, but for what Python caches while it runs."""
+    return frozenset(_files(folder))
 
 
 def _files(folder: Path) -> Iterator[Path]:

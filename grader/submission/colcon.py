@@ -161,6 +161,7 @@ class Colcon:
         )
         if self.sandbox is None:
             return run(command, environment=self.environment, excess=self._watched())
+        self.limits.room.check_allowed()
         folders = (self.scratch, self.root, self.install.parent)
         with self.sandbox.build(self.ros, folders, self.limits.room) as room:
             return run(

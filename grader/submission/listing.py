@@ -6,6 +6,7 @@ workspace, with copies of every package in ``build/`` and ``install/``.
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from collections.abc import Iterable, Iterator
@@ -13,7 +14,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from grader.errors import SubmissionError
+from grader.errors import GraderFault, SubmissionError
 from grader.submission.leftovers import COLCON_FOLDERS, is_left_out, is_leftover
 from grader.submission.manifest import MANIFEST
 from grader.submission.members import (
@@ -25,6 +26,10 @@ from grader.submission.members import (
 from grader.submission.paths import join, parents, shown
 
 IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
+_CHANGED = frozenset({errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ESTALE})
+_OF_THE_MACHINE = frozenset(
+    {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE, errno.EIO, errno.ENOMEM}
+)
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,31 @@ class Listing:
     skipped: list[str] = field(default_factory=list)
 
 
+class ChangedMeanwhile(GraderFault):
+    """Somebody writes to the submission while it is read: an editor, `git`, a synced folder."""
+
+    def __init__(self, path: str) -> None:
+        """Name the file."""
+        super().__init__(
+            f"{shown(path)}: changed while the submission was read; grade again when nobody "
+            "writes to it"
+        )
+
+
+def unreadable(path: str, error: OSError) -> SubmissionError | GraderFault:
+    """Whose fault it is that a file cannot be read.
+
+    Args:
+        path: Of the file.
+        error: What happened.
+    """
+    if error.errno in _CHANGED:
+        return ChangedMeanwhile(path)
+    if error.errno in _OF_THE_MACHINE:
+        return GraderFault(f"no private copy of the submission could be made: {error}")
+    return SubmissionError(f"{shown(path)}: cannot be read: {error.strerror}")
+
+
 def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
     """List a folder, the same way on every machine.
 
@@ -67,13 +97,12 @@ def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
     Raises:
         SubmissionError: Too many or too large files, a file that cannot be read, or a symbolic
             link that leads out of the folder.
+        GraderFault: This machine cannot read it now.
     """
     try:
         return _list_files(root, limits or ArchiveLimits())
     except OSError as error:
-        raise SubmissionError(
-            f"{shown(str(error.filename))}: cannot be read: {error.strerror}"
-        ) from error
+        raise unreadable(str(error.filename), error) from error
 
 
 def _list_files(root: Path, limits: ArchiveLimits) -> Listing:

@@ -7,24 +7,34 @@ original.
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
 import re
+import shutil
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from grader.errors import GraderFault, SubmissionError, UsageError
+from grader.errors import UsageError
 from grader.scratch import Scratch
 from grader.submission import archive
-from grader.submission.listing import Listing, SubmissionFile, find_packages, list_files
+from grader.submission.listing import (
+    ChangedMeanwhile,
+    Listing,
+    SubmissionFile,
+    find_packages,
+    list_files,
+    unreadable,
+)
 from grader.submission.members import ArchiveLimits
 from grader.submission.paths import is_within, shown
 
 _CHUNK = 1024 * 1024
+_PAUSES_S = (0.05, 0.5)
+"""Before it is read again because somebody wrote to it meanwhile."""
 _URL = re.compile(r"(https?|ssh|git|file|ftp):/|[\w.-]+@[\w.-]+:")
 
 
@@ -76,9 +86,8 @@ def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Lo
             listed = unpacked
         else:
             listed = source
-        listing = list_files(listed, limits)
         root = scratch / "submission"
-        sha256 = _copy(listed, listing, root)
+        listing, sha256 = _snapshot(listed, root, limits)
         yield Located(
             id=submission_id(source),
             sha256=sha256,
@@ -143,6 +152,19 @@ def submission_id(source: Path) -> str:
     return shown(name)
 
 
+def _snapshot(source: Path, root: Path, limits: ArchiveLimits) -> tuple[Listing, str]:
+    """Copy a folder as it was at one moment, as far as one can tell."""
+    for pause_s in _PAUSES_S:
+        try:
+            listing = list_files(source, limits)
+            return listing, _copy(source, listing, root)
+        except ChangedMeanwhile:
+            shutil.rmtree(root, ignore_errors=True)
+            time.sleep(pause_s)
+    listing = list_files(source, limits)
+    return listing, _copy(source, listing, root)
+
+
 def _copy(source: Path, listing: Listing, root: Path) -> str:
     """Copy the listed files and hash what was copied, so that both agree for certain."""
     total = hashlib.sha256()
@@ -158,7 +180,7 @@ def _copy(source: Path, listing: Listing, root: Path) -> str:
                 digest = _copy_file(source / file.path, target, file)
                 kind = b"x" if file.executable else b"f"
         except OSError as error:
-            raise _fault(file.path, error) from error
+            raise unreadable(file.path, error) from error
         # A NUL ends the path: no path contains one.
         total.update(kind + os.fsencode(file.path) + b"\0" + digest)
     return total.hexdigest()
@@ -178,10 +200,7 @@ def _copy_file(source: Path, target: Path, file: SubmissionFile) -> bytes:
             digest.update(block)
             writing.write(block)
             left -= len(block)
+        if left or reading.read(1):
+            # Half a file that is just being saved would be graded as a whole one.
+            raise ChangedMeanwhile(file.path)
     return digest.digest()
-
-
-def _fault(path: str, error: OSError) -> SubmissionError | GraderFault:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE):
-        return GraderFault(f"no private copy of the submission could be made: {error}")
-    return SubmissionError(f"{shown(path)}: cannot be read: {error.strerror}")

@@ -209,6 +209,23 @@ def test_a_cell_that_fails_is_an_error_and_not_the_student_s(grade: Grade) -> No
     assert "status -9" in graded.grade.result("alive").decisive.finding.observed
 
 
+def test_a_cache_that_is_emptied_while_nodes_run_costs_nobody_points(
+    lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    install = tmp_path / "cache" / "install"
+    install.mkdir(parents=True)
+    (install / "bot").touch()
+
+    class Emptied(ScriptedRunner):
+        def run(self, *arguments: object, alone: bool = False, **more: object) -> None:
+            shutil.rmtree(tmp_path / "cache")
+            super().run(*arguments, alone=alone, **more)
+
+    grading = Grading(lesson, Emptied(recording(stop_s=9.0)), tmp_path / "cache")
+    with pytest.raises(GraderFault, match=r"deleted in .* while it ran"):
+        grading.grade_prepared(Prepared(SUBMISSION, install), tmp_path / "recordings")
+
+
 def test_what_does_not_build_is_not_run(lesson: LoadedAssignment, tmp_path: Path) -> None:
     build = BuildRecord(succeeded=False, duration_s=1.0, log="error")
     record = dataclasses.replace(SUBMISSION, build=build)

@@ -144,7 +144,7 @@ def test_a_crash_is_shown_with_the_student_s_file_and_line(
     assert f"{NODE}:{line}" in ended.stdout
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_check_leaves_nothing_behind(number: signal.Signals, tmp_path: Path) -> None:
     submission = copy(tmp_path, "PERIOD_S = 0.3", "PERIOD_S = 2.5")
     check = subprocess.Popen(

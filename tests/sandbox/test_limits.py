@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import resource
 from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
+from grader.errors import GraderFault
 from grader.recording.model import Breach
 from grader.run.enclosure import Enclosure
 from grader.sandbox.limits import BUILD, Limits
@@ -93,3 +95,27 @@ def test_usage_is_measured(tmp_path: Path) -> None:
     assert cpu_time_s([os.getpid()]) > 0
     assert cpu_time_s([0]) == 0
     assert os.getpid() in descendants(os.getppid())
+
+
+@pytest.mark.parametrize(
+    ("what", "allowed", "said"),
+    [
+        (resource.RLIMIT_NPROC, 100, r"`ulimit -Hu` is 100 .* may use 128"),
+        (resource.RLIMIT_AS, 700_000 * 1024, r"`ulimit -Hv` is 700000 .* may use 4194304"),
+        (resource.RLIMIT_NOFILE, 64, r"`ulimit -Hn` is 64 .* may use 1024"),
+    ],
+)
+def test_what_the_shell_does_not_allow_is_no_fault_of_the_student(
+    what: int, allowed: int, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = resource.getrlimit
+    monkeypatch.setattr(
+        resource, "getrlimit", lambda one: (1, allowed) if one == what else real(one)
+    )
+    with pytest.raises(GraderFault, match=said):
+        Limits().check_allowed()
+
+
+def test_limits_of_a_usual_shell_are_enough() -> None:
+    Limits().check_allowed()
+    BUILD.check_allowed()

@@ -129,6 +129,22 @@ def test_the_student_s_python_holds_ros_and_nothing_of_ours(tmp_path: Path) -> N
     assert not list(tree.parent.glob(".unfinished*"))
 
 
+def test_a_python_that_somebody_tidied_up_is_found_out_and_made_anew(tmp_path: Path) -> None:
+    sandbox = Sandbox(tmp_path)
+    check = sandbox.watched()
+    check()
+    (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")
+    (site / "rclpy" / "node.py").unlink()
+    with pytest.raises(GraderFault, match="files of the students' Python were deleted"):
+        check()
+    # Whoever ran beside it is not blamed either, although a whole one is there by now.
+    (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")
+    assert (site / "rclpy" / "node.py").is_file()
+    with pytest.raises(GraderFault):
+        check()
+    sandbox.watched()()
+
+
 def test_a_library_that_the_assignment_allows_is_there(tmp_path: Path) -> None:
     sandbox = Sandbox(tmp_path).allowing(("SciPy",))
     (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")

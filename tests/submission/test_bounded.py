@@ -85,6 +85,25 @@ print('done')
 """
 
 
+def test_time_in_which_we_were_stopped_does_not_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, stopped = time.monotonic, [0.0]
+
+    def on_line(_: str) -> None:
+        stopped[0] = 100.0
+
+    monkeypatch.setattr(time, "monotonic", lambda: real() + stopped[0])
+    outcome = run_bounded(
+        [sys.executable, "-I", "-S", "-c", "import time; print(flush=True); time.sleep(1)"],
+        cwd=tmp_path,
+        environment={},
+        wall_s=20.0,
+        on_line=on_line,
+    )
+    assert (outcome.status, outcome.ended_by_us) == (0, None)
+
+
 def test_a_daemon_that_holds_the_output_is_killed_and_not_waited_for(tmp_path: Path) -> None:
     started = time.monotonic()
     outcome = run(DAEMON, tmp_path)

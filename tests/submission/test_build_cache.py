@@ -177,6 +177,17 @@ def test_a_cache_that_cannot_be_used_is_no_fault_of_the_student(tmp_path: Path) 
         pass
 
 
+def test_a_cache_from_which_nothing_can_be_started_is_named(
+    cache: BuildCache, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class NoExec:
+        f_flag = os.ST_NOEXEC
+
+    monkeypatch.setattr(os, "statvfs", lambda _: NoExec)
+    with pytest.raises(GraderFault, match="noexec"), cache.locked("k", 1.0):
+        pass
+
+
 def test_a_tree_is_hashed_without_following_links(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "a/up").symlink_to("..")

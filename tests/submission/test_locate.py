@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -83,6 +84,15 @@ def test_the_copy_is_private(tree: Tree) -> None:
     assert (tree.root / "src/bot_publisher/setup.py").read_text() == PACKAGE["setup.py"]
 
 
+def test_the_copy_is_where_interfaces_can_be_built(
+    tree: Tree, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "josé").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "josé"))
+    with opened(tree.package()) as located:
+        assert str(located.root).isascii()
+
+
 def test_odd_names_are_copied(tree: Tree) -> None:
     names = ["new\nline.py", "🤖.py", os.fsdecode(b"caf\xe9.py")]
     with opened(tree.write(dict.fromkeys(names, "x"))) as located:
@@ -97,19 +107,48 @@ def test_links_are_copied_as_links(tree: Tree) -> None:
 
 
 def test_a_file_that_cannot_be_read_is_named(tree: Tree, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Tests may run as root, who may read everything, so the file is taken away instead.
-    root = tree.write({"a.py": "x"})
+    # Tests may run as root, who may read everything.
+    def forbidden(*_: object) -> bytes:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    def vanish(*_: object) -> object:
+    monkeypatch.setattr("grader.submission.locate._copy_file", forbidden)
+    with pytest.raises(SubmissionError, match=r"a\.py: cannot be read"):
+        sha256(tree.write({"a.py": "x"}))
+
+
+@pytest.mark.parametrize("saved", [None, "y = 1\n", ""])
+def test_what_is_saved_while_it_is_read_is_read_again(
+    tree: Tree, monkeypatch: pytest.MonkeyPatch, saved: str | None
+) -> None:
+    root = tree.write({"a.py": "x", "b.py": "x"})
+
+    def save(*_: object) -> object:
+        monkeypatch.undo()
         (root / "a.py").unlink()
+        if saved is not None:
+            (root / "a.py").write_text(saved)
         return listing
 
     from grader.submission import locate
 
     listing = locate.list_files(root)
-    monkeypatch.setattr(locate, "list_files", vanish)
-    with pytest.raises(SubmissionError, match=r"a\.py: cannot be read"), opened(root):
-        pass
+    monkeypatch.setattr(locate, "list_files", save)
+    with opened(root) as located:
+        there = {path.name: path.read_text() for path in located.root.iterdir()}
+    assert there == ({"b.py": "x"} if saved is None else {"a.py": saved, "b.py": "x"})
+
+
+def test_what_never_comes_to_rest_is_no_fault_of_the_student(
+    tree: Tree, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tree.write({"a.py": "x"})
+    from grader.submission import locate
+
+    listing = locate.list_files(root)
+    (root / "a.py").unlink()
+    monkeypatch.setattr(locate, "list_files", lambda *_: listing)
+    with pytest.raises(GraderFault, match=r"a\.py: changed while the submission was read"):
+        sha256(root)
 
 
 def test_a_full_disk_is_no_fault_of_the_student(
