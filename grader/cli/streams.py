@@ -3,42 +3,58 @@
 from __future__ import annotations
 
 import errno
-import io
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TextIO
+from typing import Any, TextIO, TypeVar, cast
 
 from grader.errors import GraderFault
-
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer
 
 _OUTPUT, _ERRORS = 1, 2
 # Nobody wants to know the rest: `| head`, and a terminal that was closed.
 _UNREAD = frozenset({errno.EPIPE, errno.EIO})
 
+_Answer = TypeVar("_Answer")
 
-class _Lasting(io.FileIO):
-    """A descriptor that leads nowhere once it cannot be written to any more.
+
+class _Lasting:
+    """A text stream that leads nowhere once it cannot be written to any more.
+
+    It stands before Python's own stream, and not below it: what Ctrl-C interrupts there in the
+    middle of a write would be written twice.
 
     Attributes:
         lost: Why, where what was written is missing somewhere; else None.
     """
 
-    lost: OSError | None = None
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self.lost: OSError | None = None
 
-    def write(self, data: ReadableBuffer, /) -> int | None:  # type: ignore[override]
+    def write(self, text: str) -> int:
+        return self._lastingly(self._stream.write, text)
+
+    def writelines(self, lines: Iterable[str]) -> None:
+        for line in lines:
+            self.write(line)
+
+    def flush(self) -> None:
+        self._lastingly(self._stream.flush)
+
+    def _lastingly(self, call: Callable[..., _Answer], *arguments: str) -> _Answer:
         try:
-            return super().write(data)
+            return call(*arguments)
         except OSError as error:
             if error.errno not in _UNREAD:
                 self.lost = error
             nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self.fileno())
+            os.dup2(nowhere, self._stream.fileno())
             os.close(nowhere)
-            return super().write(data)
+            return call(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 @contextmanager
@@ -52,26 +68,17 @@ def lasting_streams() -> Iterator[None]:
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= _ERRORS:
         os.set_inheritable(descriptor, True)
     os.close(descriptor)
-    output = _Lasting(_OUTPUT, "w", closefd=False)
-    sys.stdout = _text(output, sys.stdout)
-    sys.stderr = _text(_Lasting(_ERRORS, "w", closefd=False), sys.stderr)
-    sys.stderr.reconfigure(line_buffering=True)
+    output = _Lasting(sys.stdout or _opened(_OUTPUT))
+    sys.stdout = cast("TextIO", output)
+    sys.stderr = cast("TextIO", _Lasting(sys.stderr or _opened(_ERRORS)))
     try:
         yield
     finally:
-        sys.stdout.flush()
+        output.flush()
         if output.lost is not None:
             raise GraderFault(f"standard output cannot be written: {output.lost.strerror}")
 
 
-def _text(raw: io.FileIO, like: TextIO | None) -> io.TextIOWrapper:
-    """A stream with the encoding and the buffering of one that Python has made, if it has."""
-    if not isinstance(like, io.TextIOWrapper):
-        return io.TextIOWrapper(io.BufferedWriter(raw), "utf-8", "backslashreplace")
-    return io.TextIOWrapper(
-        io.BufferedWriter(raw),
-        like.encoding,
-        like.errors,
-        line_buffering=like.line_buffering,
-        write_through=like.write_through,
-    )
+def _opened(descriptor: int) -> TextIO:
+    """A stream where Python has made none, because there was nothing to write to."""
+    return open(descriptor, "w", encoding="utf-8", errors="backslashreplace", closefd=False)
