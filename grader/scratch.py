@@ -38,7 +38,9 @@ class Scratch:
         self._folder = tempfile.TemporaryDirectory(prefix=f"{PREFIX}{kind}-", dir=place)
         self.path = Path(self._folder.name)
         self._lock: int | None = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
-        fcntl.flock(self._lock, fcntl.LOCK_SH)
+        # Some file systems of clusters have no locks; nobody can take one away there either.
+        with contextlib.suppress(OSError):
+            fcntl.flock(self._lock, fcntl.LOCK_SH)
 
     def __enter__(self) -> Path:
         """Use it for a block."""
@@ -55,10 +57,12 @@ class Scratch:
 
     def remove(self) -> None:
         """Remove it with all that is in it, if it is still there."""
-        self._folder.cleanup()
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        try:
+            self._folder.cleanup()
+        finally:
+            if self._lock is not None:
+                os.close(self._lock)
+                self._lock = None
 
 
 def remove_stale(folder: Path, age_s: float = _STALE_S) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import signal
 import subprocess
@@ -61,3 +63,16 @@ def test_a_link_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "rosgrade-scratch-x").symlink_to(precious)
     remove_stale(tmp_path, age_s=0.0)
     assert precious.is_dir()
+
+
+def test_a_file_system_without_locks_is_no_obstacle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(_file: int, _how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with Scratch("test") as path:
+        remove_stale(tmp_path, age_s=0.0)
+        assert path.is_dir()

@@ -36,6 +36,7 @@ RECORDINGS_FOLDER = "recordings"
 SUBMISSION_FILE = "submission.json"
 MOST_RUNS = 3
 """Runs of a scenario before it is given up as disturbed."""
+_LONGEST_WORDS = 300
 
 
 @dataclass(frozen=True)
@@ -251,19 +252,23 @@ class Grading:
         assignment = self._loaded.assignment
         scenario = next(item for item in self._scenarios if item.id == name)
         file = folder / f"{name}.mcap"
-        self._runner.run(
-            assignment,
-            scenario,
-            prepared.record,
-            prepared.install,
-            file,
-            seed=scenario_seed(assignment.id, name, prepared.record.sha256, self._seed),
-            worlds=self._loaded.folder,
-            underlays=prepared.underlays,
-            type_support=self._type_support.prefixes(),
-            alone=alone,
-        )
-        return read_recording(file)
+        try:
+            self._runner.run(
+                assignment,
+                scenario,
+                prepared.record,
+                prepared.install,
+                file,
+                seed=scenario_seed(assignment.id, name, prepared.record.sha256, self._seed),
+                worlds=self._loaded.folder,
+                underlays=prepared.underlays,
+                type_support=self._type_support.prefixes(),
+                alone=alone,
+            )
+            return read_recording(file)
+        except OSError as error:
+            # A full disk, a folder that somebody removed: it is tried again, and the others go on.
+            raise GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}") from error
 
 
 def _has_died(recording: Recording) -> bool:

@@ -34,7 +34,7 @@ class TypeSupport:
         self._prefixes: tuple[Path, ...] | None = None
 
     def prefixes(self, on_build: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
-        """Install spaces of ours for the cell; built at the first call, unless cached.
+        """Install spaces of ours for the cell; built where they are not there yet, or any more.
 
         Args:
             on_build: Told the progress of the build.
@@ -43,7 +43,8 @@ class TypeSupport:
             GraderFault: They cannot be built here.
         """
         with self._lock:
-            if self._prefixes is None:
+            # Somebody may empty the cache while a class is graded, or while rosgrade watches.
+            if self._prefixes is None or not all(path.is_dir() for path in self._prefixes):
                 self._prefixes = self._built(on_build)
             return self._prefixes
 

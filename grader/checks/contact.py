@@ -6,7 +6,7 @@ from pydantic import Field
 
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.command import commands
+from grader.checks.command import commands, scans
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.immobility import why_cut_short, why_not_judged, why_not_moved
 from grader.checks.measure import metres, speed, turn
@@ -99,7 +99,7 @@ def why_touched(recording: Recording) -> Cause | None:
     return Cause(
         f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, "
         f"{_told(before)}{held}{blind}",
-        _BLIND_HINT if blind else _HELD_HINT if held else _hint(before),
+        _BLIND_HINT if blind else _HELD_HINT if held else _hint(recording, before),
         Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
     )
 
@@ -120,8 +120,9 @@ def _held_ns(recording: Recording, step: Truth, before: Truth) -> int:
     return since_ns if since_ns > _HELD_NS else 0
 
 
-def _hint(before: Truth) -> str:
-    return _DECIDED_HINT if before.command_m_s else _HINT
+def _hint(recording: Recording, before: Truth) -> str:
+    saw = bool(scans(recording))
+    return _DECIDED_HINT if saw and before.command_m_s > 0.0 else _HINT
 
 
 def _told(step: Truth) -> str:

@@ -74,8 +74,8 @@ _HINTS = {
 
 
 _EMPTY_HINT = (
-    "The list is empty: ranges[-10:10] holds nothing, for -10 counts from the end; the beams on "
-    "both sides of the first are ranges[-10:] + ranges[:10]. After a filter, test `if values:`."
+    "The list is empty. After a filter, test `if values:`. A slice such as ranges[-10:10] holds "
+    "nothing, for -10 counts from the end: ranges[-10:] + ranges[:10] is what is around the first."
 )
 
 # What the system says where a limit of the sandbox is in the way, whatever raises it.

@@ -68,6 +68,9 @@ def lasting_streams() -> Iterator[None]:
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= _ERRORS:
         os.set_inheritable(descriptor, True)
     os.close(descriptor)
+    # Somebody who shares a pipe or a terminal with us may have made it non-blocking.
+    os.set_blocking(_OUTPUT, True)
+    os.set_blocking(_ERRORS, True)
     output = _Lasting(sys.stdout or _opened(_OUTPUT))
     sys.stdout = cast("TextIO", output)
     sys.stderr = cast("TextIO", _Lasting(sys.stderr or _opened(_ERRORS)))

@@ -53,7 +53,7 @@ class Admission:
 
     @contextmanager
     def cell(self, *, alone: bool = False) -> Iterator[Ticket]:
-        """Wait for a place, first come, first served; who wants to be alone goes before.
+        """Wait for a place, first come, first served; the newest who wants to be alone goes before.
 
         Args:
             alone: Wait until no other cell runs, and let none start meanwhile.

@@ -187,6 +187,7 @@ class Runner:
     _cells: set[CellProcess] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _nursery: Nursery | None = None
+    _retired: list[Nursery] = field(default_factory=list)
     _aborted: bool = False
 
     def get_ready(self) -> None:
@@ -269,8 +270,8 @@ class Runner:
                 cell.abandon()
         for cell in ready:
             cell.close()
-        if self._nursery is not None:
-            self._nursery.close()
+        for nursery in (*self._retired, *filter(None, (self._nursery,))):
+            nursery.close()
 
     def successor(self) -> Runner:
         """End every cell, and hand what is warm on to a runner that begins anew.
@@ -287,6 +288,7 @@ class Runner:
             _cells=set(),
             _lock=threading.Lock(),
             _nursery=nursery,
+            _retired=[],
             _aborted=False,
         )
 
@@ -300,7 +302,8 @@ class Runner:
 
     def _new_cell(self, imports: Sequence[str]) -> CellProcess:
         if self._nursery is not None and not self._nursery.is_alive:
-            self._nursery.close()
+            # Its cells may still run and need their folders, and nobody may wait for them here.
+            self._retired.append(self._nursery)
             self._nursery = None
         if self._nursery is None:
             self._nursery = Nursery(self.ros, self.sandbox)

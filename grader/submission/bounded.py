@@ -187,7 +187,9 @@ def _drain(
                 passed = excess(process.pid)
                 if passed is not None:
                     return passed
-                next_look = time.monotonic() + _POLL_S
+                # To look may take long where there is much to count; that is not a stop.
+                seen = time.monotonic()
+                next_look = seen + _POLL_S
             if selector.select(min(left, _POLL_S)):
                 block = os.read(process.stdout.fileno(), _CHUNK)
                 if not block:

@@ -93,15 +93,15 @@ def recording(stop_s: float = 0.1, taken_s: float = 0.0, faults: tuple[str, ...]
 class ScriptedRunner(Runner):
     """Leaves one prepared recording after the other, or raises."""
 
-    def __init__(self, *outcomes: Recording | GraderFault) -> None:
+    def __init__(self, *outcomes: Recording | Exception) -> None:
         super().__init__(ros.RosInstallation("wheels", Path("python"), ()))
-        self._outcomes: Iterator[Recording | GraderFault] = iter(outcomes)
+        self._outcomes: Iterator[Recording | Exception] = iter(outcomes)
         self.alone: list[bool] = []
 
     def run(self, *arguments: object, alone: bool = False, **more: object) -> None:
         outcome = next(self._outcomes)
         self.alone.append(alone)
-        if isinstance(outcome, GraderFault):
+        if isinstance(outcome, Exception):
             raise outcome
         file = arguments[4]
         assert isinstance(file, Path)
@@ -122,7 +122,7 @@ Grade = Callable[..., tuple[Graded, ScriptedRunner]]
 
 @pytest.fixture
 def grade(lesson: LoadedAssignment, tmp_path: Path) -> Grade:
-    def run(*outcomes: Recording | GraderFault) -> tuple[Graded, ScriptedRunner]:
+    def run(*outcomes: Recording | Exception) -> tuple[Graded, ScriptedRunner]:
         runner = ScriptedRunner(*outcomes)
         grading = Grading(lesson, runner, tmp_path / "cache")
         prepared = Prepared(record=SUBMISSION, install=tmp_path)
@@ -207,6 +207,13 @@ def test_a_cell_that_fails_is_an_error_and_not_the_student_s(grade: Grade) -> No
     assert not graded.grade.graded
     assert graded.grade.result("alive").status is Status.ERROR
     assert "status -9" in graded.grade.result("alive").decisive.finding.observed
+
+
+def test_a_full_disk_in_one_run_ends_no_other(grade: Grade) -> None:
+    graded, runner = grade(OSError(28, "No space left on device"), recording())
+    assert graded.grade.full_points
+    assert runner.alone == [False, True]
+    assert not runner._aborted
 
 
 def test_a_cache_that_is_emptied_while_nodes_run_costs_nobody_points(

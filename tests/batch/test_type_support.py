@@ -28,6 +28,24 @@ def test_the_copy_is_that_of_the_reference() -> None:
         assert copy.read_bytes() == reference.read_bytes(), copy
 
 
+def test_what_somebody_has_deleted_is_built_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built: list[Path] = []
+
+    def build(_support: TypeSupport, _on_build: object) -> tuple[Path, ...]:
+        built.append(tmp_path / f"prefix{len(built)}")
+        built[-1].mkdir()
+        return (built[-1],)
+
+    monkeypatch.setattr(TypeSupport, "_built", build)
+    installation = RosInstallation("wheels", tmp_path / "python", (tmp_path,))
+    support = TypeSupport(load_assignment("timed_publisher"), installation, tmp_path / "cache")
+    assert support.prefixes() == support.prefixes() == (built[0],)
+    built[0].rmdir()
+    assert support.prefixes() == (built[1],)
+
+
 @pytest.mark.compiles
 @pytest.mark.ros
 @pytest.mark.slow

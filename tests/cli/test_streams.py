@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -77,3 +79,35 @@ def test_output_that_is_lost_on_a_full_disk_is_told(tmp_path: Path) -> None:
 def test_what_nobody_reads_to_the_end_is_no_fault(tmp_path: Path) -> None:
     ended = shell(tmp_path, f"{ROSGRADE} schema | head -1")
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "{\n", "")
+
+
+def test_a_pipe_that_somebody_made_non_blocking_is_waited_for() -> None:
+    program = (
+        "import os; os.set_blocking(1, False)\n"
+        "from grader.cli.streams import lasting_streams\n"
+        "with lasting_streams(): print('x' * 300_000)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT
+    ) as process:
+        time.sleep(1.0)
+        told, errors = process.communicate(timeout=60)
+    assert (process.returncode, len(told), errors) == (0, 300_001, b"")
+
+
+def test_unbuffered_output_comes_at_once() -> None:
+    program = (
+        "import time; from grader.cli.streams import lasting_streams\n"
+        "with lasting_streams(): print('now'); time.sleep(60)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    ) as process:
+        assert process.stdout is not None
+        began_s = time.monotonic()
+        assert process.stdout.readline() == b"now\n"
+        process.kill()
+    assert time.monotonic() - began_s < 30.0

@@ -18,6 +18,7 @@ from grader.recording.mcap_reader import read_recording
 from grader.recording.model import NS
 from grader.run.replay import ReplayOrder, make_order
 from grader.run.runner import Runner
+from grader.scratch import PREFIX
 from tests.recording.written import write_robot_run
 from tests.run.conftest import SUBMISSION, assignment, install
 from tests.run.nodes import HEADER
@@ -114,7 +115,7 @@ def test_ctrl_c_ends_the_node_and_leaves_nothing(run: tuple[Path, Path], tmp_pat
     assert player.returncode == 130, told
     assert "Traceback" not in re.sub(r"bot_pub  .*", "", told)
     assert not _running(str(tmp_path)) and not _running(str(place))
-    assert not list(tmp_path.glob("rosgrade-replay-*"))
+    assert not list(tmp_path.glob(f"{PREFIX}replay-*"))
 
 
 @pytest.mark.ros

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import GraderFault
+from grader.submission import bounded
 from grader.submission.bounded import CappedOutput, Outcome, OutputLimits, run_bounded
 
 
@@ -83,6 +84,20 @@ if os.fork() == 0:
     os._exit(0)
 print('done')
 """
+
+
+def test_a_look_that_takes_long_prolongs_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bounded, "_FROZEN_S", 0.2)
+    outcome = run_bounded(
+        [sys.executable, "-I", "-S", "-c", "import time; time.sleep(10)"],
+        cwd=tmp_path,
+        environment={},
+        wall_s=1.0,
+        excess=lambda _: time.sleep(0.4),
+    )
+    assert outcome.ended_by_us == "time"
 
 
 def test_time_in_which_we_were_stopped_does_not_count(

@@ -1,0 +1,41 @@
+"""What a runner does with the process that forks its cells: no ROS needed for that."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader import ros
+from grader.run import runner as runner_module
+from grader.run.runner import Runner
+
+
+class FakeNursery:
+    """A nursery whose cells run on."""
+
+    def __init__(self, *_: object) -> None:
+        self.is_alive = True
+        self.is_closed = False
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+def test_cells_that_run_keep_their_folders_where_a_nursery_is_replaced(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(runner_module, "Nursery", FakeNursery)
+    monkeypatch.setattr(runner_module, "CellProcess", lambda nursery, _imports: nursery)
+    runner = Runner(ros.RosInstallation("wheels", Path("python"), ()))
+    first = runner._new_cell(())
+    assert isinstance(first, FakeNursery)
+    first.is_alive = False
+    second = runner._new_cell(())
+    assert isinstance(second, FakeNursery)
+    assert second is not first
+    # Closing waits for its cells, with the lock held that whoever interrupts needs.
+    assert not first.is_closed
+    runner.close()
+    assert first.is_closed
+    assert second.is_closed
