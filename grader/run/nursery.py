@@ -7,8 +7,8 @@ by it, and it has neither a node nor a thread of its own, so that a fork of it i
 process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without them.)
 
 Students' programs are not forked from it. A sandbox begins with an exec, which drops all that was
-imported; and who forks from what was imported before does not import in the order of his own
-PYTHONPATH, where a package of his may well come before one of ROS.
+imported; and a program that is forked after the imports does not import in the order of its own
+PYTHONPATH, where a package of the student's may well come before one of ROS.
 """
 
 from __future__ import annotations
