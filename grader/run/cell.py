@@ -33,7 +33,7 @@ from grader.submission.record import SubmissionRecord
 if TYPE_CHECKING:
     from grader.run.simulator import SimulatedRobot
 
-_TICK_S = 0.02
+_TICK_S = 0.05
 _CALM_TICK_S = 0.1
 _GRAPH_PERIOD_S = 0.1
 # Who comes and goes later than the first match matters to no wait.

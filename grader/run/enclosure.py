@@ -91,6 +91,7 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         self._status, status = os.pipe()
         os.set_blocking(self._status, False)
         self._told = b""
+        self._group: int | None = None
         arguments = [*enclosure.arguments, "--clearenv"]
         for name, value in environment.items():
             arguments += ["--setenv", name, value]
@@ -118,8 +119,10 @@ class EnclosedProcess(subprocess.Popen[bytes]):
     @property
     def group(self) -> int | None:
         """Process group of the student's process and id of its init; None before there is one."""
-        told = self._read_status().get("child-pid")
-        return told if isinstance(told, int) else None
+        if self._group is None:
+            told = self._read_status().get("child-pid")
+            self._group = told if isinstance(told, int) else None
+        return self._group
 
     @property
     def was_set_up(self) -> bool:

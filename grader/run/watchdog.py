@@ -15,10 +15,9 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from grader.recording.model import Breach
-from grader.run.descendants import descendants
 from grader.sandbox.limits import Limits, size_words
 from grader.sandbox.namespaces import STUDENT
-from grader.sandbox.usage import cpu_time_s, memory_bytes, thread_count
+from grader.sandbox.usage import memory_bytes, usage_of
 
 _POLL_S = 0.1
 _FULL = 0.99
@@ -70,19 +69,19 @@ class Watchdog:
 
     def _look(self) -> None:
         limits = self._limits
-        pids = [pid for init in self._inits() for pid in (init, *descendants(init))]
-        taken = memory_bytes(pids, limits.memory_bytes)
+        usages = usage_of(self._inits())
+        taken = memory_bytes(usages, limits.memory_bytes)
         if taken > limits.memory_bytes:
             self._note("memory", f"{size_words(taken)} of memory", size_words(limits.memory_bytes))
             self._end_all()
-        if cpu_time_s(pids) > limits.cpu_s:
+        if sum(usage.cpu_s for usage in usages) > limits.cpu_s:
             self._note("cpu time", f"more than {limits.cpu_s} s of CPU time", f"{limits.cpu_s} s")
             self._end_all()
-        threads = thread_count(pids)
+        threads = sum(usage.threads for usage in usages)
         # The last ones that it may start count as too many: no more can be seen.
         if threads >= limits.processes:
             self._note("processes", f"{threads} processes and threads", str(limits.processes))
-        if len({_session(pid) for pid in pids}) > _MOST_SESSIONS:
+        if len({usage.session for usage in usages}) > _MOST_SESSIONS:
             self._note("sessions", f"more than {_MOST_SESSIONS} sessions", str(_MOST_SESSIONS))
             self._end_all()
         written = self._output_bytes()
@@ -113,10 +112,3 @@ class Watchdog:
                 os.kill(init, signal.SIGKILL)
             except ProcessLookupError:
                 continue
-
-
-def _session(pid: int) -> int:
-    try:
-        return os.getsid(pid)
-    except ProcessLookupError:
-        return 0

@@ -22,7 +22,7 @@ from grader.sandbox.limits import BUILD, Limits, size_words
 from grader.sandbox.namespaces import MOUNT_POINTS
 from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
 from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
-from grader.sandbox.usage import cpu_time_s, descendants, folder_usage, memory_bytes, thread_count
+from grader.sandbox.usage import folder_usage, memory_bytes, usage_of
 
 LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
 
@@ -244,12 +244,12 @@ class BuildRoom:
             pid: Of the process that all its processes descend from.
         """
         limits = self.limits
-        pids = descendants(pid)
-        if memory_bytes(pids, limits.memory_bytes) > limits.memory_bytes:
+        usages = usage_of([pid])
+        if memory_bytes(usages, limits.memory_bytes) > limits.memory_bytes:
             return f"it took more than {size_words(limits.memory_bytes)} of memory"
-        if cpu_time_s(pids) > limits.cpu_s:
+        if sum(usage.cpu_s for usage in usages) > limits.cpu_s:
             return f"it took more than {limits.cpu_s} s of CPU time"
-        if thread_count(pids) >= _NEARLY_ALL * limits.processes:
+        if sum(usage.threads for usage in usages) >= _NEARLY_ALL * limits.processes:
             return f"it started {limits.processes} processes"
         size, files = folder_usage(self.folders, limits.disk_bytes, limits.files)
         if size > limits.disk_bytes:

@@ -3,55 +3,64 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PROC = "/proc"
 
 
-def descendants(of: int) -> list[int]:
-    """Processes that descend from one."""
-    children: dict[int, list[int]] = {}
+class Usage(NamedTuple):
+    """What a process takes; all of it stands in one file, which is read often.
+
+    Attributes:
+        pid: Its id.
+        parent: Of its parent.
+        session: Of its session.
+        cpu_s: CPU time of it, and of its children that have ended and were waited for.
+        threads: How many it has.
+        resident_bytes: Its resident set, pages that it shares with others among them.
+    """
+
+    pid: int
+    parent: int
+    session: int
+    cpu_s: float
+    threads: int
+    resident_bytes: int
+
+
+def usage_of(roots: Iterable[int]) -> list[Usage]:
+    """What processes take, and all that descend from them; those that have ended take nothing."""
+    below: dict[int, list[int]] = {}
+    found: dict[int, Usage] = {}
     for name in filter(str.isdigit, os.listdir(_PROC)):  # noqa: PTH208  often
-        try:
-            with open(f"{_PROC}/{name}/stat", "rb") as file:  # noqa: PTH123  often
-                # The command's name may contain anything, but the last ")" ends it.
-                parent = int(file.read().rpartition(b")")[2].split()[1])
-        except OSError:
-            continue
-        children.setdefault(parent, []).append(int(name))
-    found: list[int] = []
-    pending = [of]
+        usage = _usage(int(name))
+        if usage is not None:
+            found[usage.pid] = usage
+            below.setdefault(usage.parent, []).append(usage.pid)
+    wanted: list[Usage] = []
+    pending = list(roots)
     while pending:
-        below = children.get(pending.pop(), [])
-        found += below
-        pending += below
-    return found
+        pid = pending.pop()
+        pending += below.get(pid, [])
+        if pid in found:
+            wanted.append(found.pop(pid))
+    return wanted
 
 
-def memory_bytes(pids: Iterable[int], enough: int) -> int:
+def memory_bytes(usages: Sequence[Usage], enough: int) -> int:
     """Memory of processes, pages that they share counted once.
 
     Args:
-        pids: Processes; those that have ended count nothing.
+        usages: Of the processes.
         enough: Below this a quick upper bound is returned (see proc(5): the sum of resident sets
             counts shared pages several times, the proportional ones of smaps_rollup do not).
     """
-    alive = list(pids)
-    upper = sum(_resident_bytes(pid) for pid in alive)
-    return upper if upper <= enough else sum(_proportional_bytes(pid) for pid in alive)
-
-
-def thread_count(pids: Iterable[int]) -> int:
-    """Threads of processes."""
-    return sum(_threads(pid) for pid in pids)
-
-
-def cpu_time_s(pids: Iterable[int]) -> float:
-    """CPU time of processes, and of their children that have ended and were waited for."""
-    return sum(map(_ticks, pids)) / _TICKS_PER_S
+    upper = sum(usage.resident_bytes for usage in usages)
+    return upper if upper <= enough else sum(map(_proportional_bytes, usages))
 
 
 def folder_usage(folders: Iterable[Path], most_bytes: int, most_files: int) -> tuple[int, int]:
@@ -72,36 +81,30 @@ def folder_usage(folders: Iterable[Path], most_bytes: int, most_files: int) -> t
     return total, count
 
 
-def _resident_bytes(pid: int) -> int:
+def _usage(pid: int) -> Usage | None:
     try:
-        with open(f"{_PROC}/{pid}/statm", "rb") as file:  # noqa: PTH123  often
-            return int(file.read().split()[1]) * _PAGE
-    except (OSError, IndexError):
-        return 0
+        with open(f"{_PROC}/{pid}/stat", "rb") as file:  # noqa: PTH123  often
+            # The command's name may contain anything, but the last ")" ends it.
+            fields = file.read().rpartition(b")")[2].split()
+        # The numbers of the fields are those of proc(5), less three.
+        return Usage(
+            pid=pid,
+            parent=int(fields[1]),
+            session=int(fields[3]),
+            cpu_s=sum(map(int, fields[11:15])) / _TICKS_PER_S,
+            threads=int(fields[17]),
+            resident_bytes=int(fields[21]) * _PAGE,
+        )
+    except (OSError, IndexError, ValueError):
+        return None
 
 
-def _proportional_bytes(pid: int) -> int:
+def _proportional_bytes(usage: Usage) -> int:
     try:
-        with open(f"{_PROC}/{pid}/smaps_rollup", "rb") as file:  # noqa: PTH123  often
+        with open(f"{_PROC}/{usage.pid}/smaps_rollup", "rb") as file:  # noqa: PTH123  often
             for line in file:
                 if line.startswith(b"Pss:"):
                     return int(line.split()[1]) * 1024
     except (OSError, IndexError):
-        return _resident_bytes(pid)
+        return usage.resident_bytes
     return 0
-
-
-def _ticks(pid: int) -> int:
-    try:
-        with open(f"{_PROC}/{pid}/stat", "rb") as file:  # noqa: PTH123  often
-            # utime, stime, cutime, cstime: proc(5).
-            return sum(map(int, file.read().rpartition(b")")[2].split()[11:15]))
-    except (OSError, ValueError):
-        return 0
-
-
-def _threads(pid: int) -> int:
-    try:
-        return len(os.listdir(f"{_PROC}/{pid}/task"))  # noqa: PTH208  often
-    except OSError:
-        return 0

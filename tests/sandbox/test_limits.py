@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 import resource
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from grader.errors import GraderFault
 from grader.recording.model import Breach
 from grader.run.enclosure import Enclosure
 from grader.sandbox.limits import BUILD, Limits
-from grader.sandbox.usage import cpu_time_s, descendants, folder_usage, memory_bytes, thread_count
+from grader.sandbox.usage import folder_usage, memory_bytes, usage_of
 
 
 def test_an_author_s_limits_reach_the_command_in_front_of_the_program() -> None:
@@ -89,12 +90,22 @@ def test_usage_is_measured(tmp_path: Path) -> None:
     assert files == 3
     assert 2**20 <= size < 2**21
     assert folder_usage([tmp_path], 2**30, 0)[1] >= 1
-    assert memory_bytes([os.getpid()], 0) > 2**20
-    assert memory_bytes([0], 0) == 0
-    assert thread_count([os.getpid()]) >= 1
-    assert cpu_time_s([os.getpid()]) > 0
-    assert cpu_time_s([0]) == 0
-    assert os.getpid() in descendants(os.getppid())
+    assert memory_bytes([], 0) == 0
+    assert usage_of([2**30]) == []
+
+
+def test_usage_counts_a_process_and_what_it_started() -> None:
+    with subprocess.Popen(["cat"], stdin=subprocess.PIPE, start_new_session=True) as child:
+        below = {usage.pid: usage for usage in usage_of([os.getpid()])}
+        own = below[os.getpid()]
+        assert own.parent == os.getppid()
+        assert own.session == os.getsid(0)
+        assert own.threads == len(os.listdir("/proc/self/task"))  # noqa: PTH208
+        assert own.cpu_s > 0
+        assert below[child.pid].parent == os.getpid()
+        assert below[child.pid].session == child.pid
+        quick, shared_once = memory_bytes([own], 2**60), memory_bytes([own], 0)
+        assert 2**20 < shared_once <= 1.1 * quick
 
 
 @pytest.mark.parametrize(
