@@ -43,6 +43,8 @@ from grader.run.admission import Admission
 from grader.run.domain import lock_domain
 from grader.run.load import cpu_count
 from grader.run.runner import Runner
+from grader.sandbox.choice import Choice
+from grader.sandbox.trial import choose
 from grader.submission.build_cache import BUILDS
 from grader.submission.prepare import Prepared, prepare
 
@@ -57,6 +59,23 @@ _TOLD_EACH = 20
 _SERIAL = 10
 """Submissions that are graded one after the other."""
 OUTPUT = Path("rosgrade-bench.json")
+_PLAIN_TEST = """
+import signal, subprocess, sys
+import rclpy
+from geometry_msgs.msg import Twist
+
+rclpy.init()
+node = rclpy.create_node("plain_test")
+heard = []
+node.create_subscription(Twist, "/cmd_vel", heard.append, 10)
+program = subprocess.Popen(sys.argv[2:])
+while len(heard) < int(sys.argv[1]):
+    rclpy.spin_once(node, timeout_sec=0.1)
+program.send_signal(signal.SIGINT)
+program.wait()
+rclpy.shutdown()
+"""
+"""What a course without an autograder would write; argv: how many messages, the program."""
 T = TypeVar("T")
 
 
@@ -146,13 +165,21 @@ def _parts(samples: Samples, folder: Path, runner: Runner) -> None:
 
 
 def _batch(samples: Samples, folder: Path, _: int) -> None:
-    """A class of one and the same submission, all at once and one after the other."""
+    """A class of one and the same submission, all at once and one after the other.
+
+    In the sandbox, as `rosgrade batch` does it, where this machine has one; and the same run by a
+    plain test program.
+    """
     loaded = load_assignment(ASSIGNMENT)
-    prepared = prepare(reference_of(ASSIGNMENT), ros.find(), cache=folder / "batch-cache")
+    cache = folder / "batch-cache"
+    sandbox, notice = choose(Choice.AUTO, cache)
+    if notice:
+        print(notice, file=sys.stderr)
+    prepared = prepare(reference_of(ASSIGNMENT), ros.find(), cache=cache, sandbox=sandbox)
     rates: list[float] = []
     for name, count, jobs in (("all at once", CLASS, None), ("one after the other", _SERIAL, 1)):
-        with Runner(ros.find(), Admission(cells=jobs)) as runner:
-            grading = Grading(loaded, runner, folder / "batch-cache")
+        with Runner(ros.find(), Admission(cells=jobs), sandbox=sandbox) as runner:
+            grading = Grading(loaded, runner, cache)
             work = partial(_grade_into, grading, prepared, folder / "class")
             with ThreadPoolExecutor(max_workers=runner.admission.most) as pool:
                 work(0)
@@ -169,7 +196,35 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
         samples.add(f"batch, {name}: submissions per minute", rates[-1])
         samples.add(f"batch, {name}: CPU of each", cpu_s / count)
         samples.add(f"batch, {name}: share of what the CPUs bound", cpu_s / cpu_count() / wall_s)
-    samples.add("batch: times the rate of one after the other", rates[0] / rates[1])
+    plain_s = median(_plain(samples, prepared) for _ in range(_SERIAL))
+    samples.add("batch: times our own rate of one after the other", rates[0] / rates[1])
+    samples.add("batch: times the rate of the plain test program", rates[0] * plain_s / 60)
+
+
+def _plain(samples: Samples, prepared: Prepared) -> float:
+    """Start the student's program, wait for what the assignment waits for, and stop it.
+
+    Returns:
+        Wall time in seconds.
+    """
+    found = ros.find()
+    (until,) = (scenario.until for scenario in load_assignment(ASSIGNMENT).assignment.scenarios)
+    assert prepared.install is not None
+    (program,) = prepared.install.glob("lib/bot_publisher/bot_pub")
+    command = [str(found.python), "-c", _PLAIN_TEST, str(until.messages), str(program)]
+    with lock_domain() as domain:
+        environment = found.environment(os.environ, (prepared.install,))
+        environment["ROS_DOMAIN_ID"] = str(domain.domain_id)
+        began_s = time.monotonic()
+        process = subprocess.Popen(command, env=environment)
+        _, status, usage = os.wait4(process.pid, 0)
+        wall_s = time.monotonic() - began_s
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"the plain test program ended with {process.returncode}")
+    samples.add("plain test program: wall", wall_s)
+    samples.add("plain test program: CPU", usage.ru_utime + usage.ru_stime)
+    return wall_s
 
 
 def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int) -> None:
