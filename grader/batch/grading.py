@@ -243,8 +243,10 @@ class Grading:
                         recordings[name] = future.result()
                     except GraderFault as fault:
                         faults[name] = str(fault)
-            except BaseException:
-                self._runner.close()
+            except BaseException as error:
+                # An interrupt ends all that runs; a bug of ours costs nobody else's run.
+                if not isinstance(error, Exception):
+                    self._runner.close()
                 raise
 
     def _run(self, name: str, prepared: Prepared, folder: Path, alone: bool) -> Recording:

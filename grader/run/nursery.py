@@ -48,6 +48,8 @@ _REQUEST_BYTES = 65_536
 _TOLD = struct.Struct("=id")
 """Process id and 0, then exit status and CPU time in seconds."""
 _FORK_LIMIT_S = 10.0
+_CLOSING_LIMIT_S = 20.0
+"""More than a cell may take to end what it started."""
 _ALWAYS = (
     "grader.run.cell_main",
     "rcl_interfaces/msg/Log",
@@ -210,10 +212,18 @@ class Nursery:
         if self._sandbox is not None:
             bubblewrap.give(folder)
 
-    def close(self) -> None:
-        """Wait for the cells that it has forked, and for itself, to end."""
+    def close(self, limit_s: float = _CLOSING_LIMIT_S) -> None:
+        """Wait for the cells that it has forked, and for itself, to end.
+
+        Args:
+            limit_s: What has not ended by then is killed.
+        """
         self._socket.close()
-        self._popen.wait()
+        try:
+            self._popen.wait(limit_s)
+        except subprocess.TimeoutExpired:
+            kill_tree(self._popen.pid)
+            self._popen.wait()
         self._cells.remove()
 
     def _kill(self, pid: int) -> None:

@@ -216,6 +216,16 @@ def test_a_full_disk_in_one_run_ends_no_other(grade: Grade) -> None:
     assert not runner._aborted
 
 
+def test_a_bug_in_one_run_ends_no_other(lesson: LoadedAssignment, tmp_path: Path) -> None:
+    prepared = Prepared(SUBMISSION, install=tmp_path)
+    runner = ScriptedRunner(ZeroDivisionError("a bug"), recording())
+    grading = Grading(lesson, runner, tmp_path / "cache")
+    with pytest.raises(ZeroDivisionError):
+        grading.grade_prepared(prepared, tmp_path / "one")
+    assert grading.grade_prepared(prepared, tmp_path / "another").grade.full_points
+    assert not runner._aborted
+
+
 def test_a_cache_that_is_emptied_while_nodes_run_costs_nobody_points(
     lesson: LoadedAssignment, tmp_path: Path
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import tempfile
 from pathlib import Path
@@ -12,11 +13,14 @@ import pytest
 from grader import ros
 from grader.errors import GraderFault
 from grader.recording.mcap_reader import read_recording
+from grader.run.cell_process import CellProcess
 from grader.run.descendants import descendants
+from grader.run.nursery import Nursery
 from grader.run.runner import Runner
 from grader.sandbox import bubblewrap
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
+from grader.sandbox.usage import usage_of
 from tests.run import nodes
 from tests.run.conftest import SUBMISSION, RunNode, assignment, install
 
@@ -51,6 +55,25 @@ def test_a_run_whose_nursery_is_killed_is_a_fault_and_the_next_one_is_not(tmp_pa
         runner.progress = lambda _scenario, _event: None
         runner.run(course, scenario, SUBMISSION, space, file, seed=1)
         assert len(read_recording(file).on("/cmd_vel")) >= 3
+
+
+@pytest.mark.parametrize("boxed", [False, True])
+def test_a_cell_that_hangs_keeps_nobody_waiting_for_the_end(boxed: bool, tmp_path: Path) -> None:
+    found = try_sandbox()
+    if boxed and found.problem:
+        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
+    nursery = Nursery(ros.find(), Sandbox(tmp_path / "cache") if boxed else None)
+    cell = CellProcess(nursery)
+    cell._forked._await_fork(timeout=None)
+    usages = usage_of([nursery._popen.pid])
+    (hung,) = {usage.pid for usage in usages} - {usage.parent for usage in usages}
+    its_end = os.pidfd_open(hung)
+    os.kill(hung, signal.SIGSTOP)
+    nursery.close(limit_s=0.1)
+    cell.close()
+    assert select.select([its_end], [], [], 10.0)[0]
+    os.close(its_end)
+    assert not nursery.cells.exists()
 
 
 def test_whoever_installs_a_package_meanwhile_spoils_no_run(
