@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+
+import numpy as np
 
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
@@ -16,7 +19,7 @@ from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
 from grader.checks.reference import Goal, UnknownValue
 from grader.checks.sighting import until_the_end
-from grader.checks.track import is_at_rest, over_time, turned_rad
+from grader.checks.track import is_at_rest, over_time, turned_rad, turns_one_way
 from grader.recording.model import NS, Ending, Recording, Truth
 from sim.motion import Pose, wrap_angle
 
@@ -27,6 +30,14 @@ _A_LITTLE = 0.25
 _A_LITTLE_RAD = 0.15
 _STRAIGHT_RAD_S = 0.02
 _ASTRAY_RAD = math.radians(30.0)
+_FEW_COMMANDS = 3
+# A command that only depends on where the robot is goes up and down once in a circle; such a wave
+# and a ramp are correlated by 0.78 at most.
+_FALLING = -0.85
+_YAW_HINT = (
+    "Print yaw while it turns: it has to go with the robot, from -pi to pi. A quaternion in ROS is "
+    "x, y, z, w; yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z)), and z alone is no angle."
+)
 NO_SPEED_M_S = 1e-3
 
 
@@ -169,6 +180,9 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
         )
     moving = f"at {speed(last.linear_m_s)} and {turn(last.angular_rad_s)}"
     far = [step for step in truth if run.distance_m(step) > position_m]
+    circles = turns_one_way(far)
+    if circles and not _follows_the_heading(far):
+        return Cause(f"{seen}: {_circling(circles)}", f"{_YAW_HINT} {WRAP_HINT}", evidence)
     detours = list(away(far, run.bearing_error_rad, _ASTRAY_RAD, "the goal"))
     if detours:
         times = "once" if len(detours) == 1 else f"{len(detours)} times"
@@ -224,6 +238,26 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
         f"{seen}, {moving}, after {format_duration(watched_s)}",
         "If it is on its way, it is too slow: a larger gain, within the limits of the robot.",
         evidence,
+    )
+
+
+def _circling(turns: float) -> str:
+    side = "left" if turns > 0.0 else "right"
+    return f"it turned {abs(turns):.1f} times around, always to the {side}"
+
+
+def _follows_the_heading(steps: Sequence[Truth]) -> bool:
+    """Whether the turn that is commanded falls as the robot turns left, but for one jump a turn.
+
+    It does where the error is taken from the right yaw and is not wrapped.
+    """
+    commands = [step.command_rad_s for step in steps]
+    if len(set(commands)) < _FEW_COMMANDS:
+        return False
+    return any(
+        np.corrcoef([(step.yaw_rad - cut_rad) % math.tau for step in steps], commands)[0, 1]
+        < _FALLING
+        for cut_rad in (0.0, math.pi)
     )
 
 
@@ -291,11 +325,13 @@ def why_not_aligned(run: Approach, heading_rad: float) -> Cause | None:
         f"{degrees(run.goal.yaw_rad)}"
     )
     if not is_at_rest(last):
-        turns = abs(turned_rad(run.truth)) / math.tau
-        more = f", {turns:.1f} turns in all" if turns >= 1.5 else ""
+        circles = turns_one_way(run.truth)
         return Cause(
-            f"{seen} and still turns at {turn(last.angular_rad_s)} when the observation ends{more}",
-            "Normalise the error to [-pi, pi] with atan2(sin(e), cos(e)), and make the gain "
+            f"{seen} and still turns at {turn(last.angular_rad_s)} when the observation ends"
+            + (f": {_circling(circles)}" if circles else ""),
+            f"{_YAW_HINT} {WRAP_HINT}"
+            if circles
+            else "Normalise the error to [-pi, pi] with atan2(sin(e), cos(e)), and make the gain "
             "smaller if it oscillates.",
             evidence,
         )

@@ -17,6 +17,8 @@ MOVED_M = 1e-3
 MOVED_RAD = 1e-2
 # A pause shorter than this is no rest: on-off driving rests again and again.
 _REST_NS = NS // 2
+_ONE_WAY = 0.9
+"""Share of all turning that leads around: a controller that settles turns back a little."""
 _MOST_POINTS = 400
 
 
@@ -53,6 +55,18 @@ def gone_ahead_m(truth: Sequence[Truth]) -> float:
 def turned_rad(truth: Sequence[Truth]) -> float:
     """Net turn along the path, counter-clockwise, full turns counted."""
     return sum(wrap_angle(b.yaw_rad - a.yaw_rad) for a, b in pairwise(truth))
+
+
+def turns_one_way(truth: Sequence[Truth]) -> float:
+    """Whole turns of a robot that turns on and on in one sense, counter-clockwise positive.
+
+    Returns:
+        Their number, or 0.0 where it is less than one and a half, or the sense changes.
+    """
+    net_rad = turned_rad(truth)
+    gross_rad = sum(abs(wrap_angle(b.yaw_rad - a.yaw_rad)) for a, b in pairwise(truth))
+    is_one_way = abs(net_rad) >= max(1.5 * math.tau, _ONE_WAY * gross_rad)
+    return net_rad / math.tau if is_one_way else 0.0
 
 
 def headings(truth: Sequence[Truth]) -> list[float]:

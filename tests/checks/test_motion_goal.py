@@ -50,6 +50,7 @@ class Student:
         self.align_law = style.pop("align_law", self.law)
         self.creep = style.pop("creep", 0.0)
         self.forgets = style.pop("forgets", False)
+        self.yaw = style.pop("yaw", lambda yaw_rad: yaw_rad)
         self.arrived = False
         assert not style
 
@@ -58,13 +59,13 @@ class Student:
         dx, dy = x - pose.x_m, y - pose.y_m
         distance = math.hypot(dx, dy)
         if not self.arrived and distance > self.near:
-            error = self.wrap(math.atan2(dy, dx) - pose.yaw_rad)
+            error = self.wrap(math.atan2(dy, dx) - self.yaw(pose.yaw_rad))
             speed = self.constant or clamp(self.linear * distance, self.top)
             if self.turn_first is not None and abs(error) > self.turn_first:
                 speed = 0.0
             return speed, clamp(self.law(error), self.spin)
         self.arrived = not self.forgets
-        error = self.wrap_theta(theta - pose.yaw_rad)
+        error = self.wrap_theta(theta - self.yaw(pose.yaw_rad))
         if abs(error) < self.straight:
             return 0.0, 0.0
         return self.creep, clamp(self.align_law(error), self.spin)
@@ -446,3 +447,20 @@ def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_th
     assert finding.status is Status.FAILED
     assert "turned away from the goal through half a turn, 10 times" in finding.observed
     assert "atan2(sin(e), cos(e))" in finding.hint
+
+
+@pytest.mark.parametrize(
+    ("goal", "yaw", "seen"),
+    [
+        # (w, x, y, z) taken for (x, y, z, w): of a robot on the ground that is always 0.
+        ((0.6, 0.4, math.pi / 2), lambda _: 0.0, "m from the goal when the observation ends"),
+        ((0.6, 0.4, math.pi / 2), lambda yaw: math.sin(yaw / 2), "is at the goal's position"),
+    ],
+)
+def test_a_robot_that_turns_on_and_on_is_told_to_look_at_its_yaw(goal, yaw, seen):
+    run = run_to(goal, yaw=yaw)
+    finding = judge("motion.reaches", run, goal=yaml(goal), **REACHES)
+    assert finding.status is Status.FAILED
+    assert seen in finding.observed
+    assert "times around, always to the" in finding.observed
+    assert "x, y, z, w" in finding.hint
