@@ -17,6 +17,7 @@ from grader.checks.finding import Evidence, Moment, Plot
 from grader.checks.immobility import why_cut_short, why_not_moved
 from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
+from grader.checks.misread_yaw import misread_yaw
 from grader.checks.reference import Goal, UnknownValue
 from grader.checks.sighting import until_the_end
 from grader.checks.track import is_at_rest, over_time, turned_rad, turns_one_way
@@ -180,6 +181,9 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
         )
     moving = f"at {speed(last.linear_m_s)} and {turn(last.angular_rad_s)}"
     far = [step for step in truth if run.distance_m(step) > position_m]
+    misread = misread_yaw(recording, run.goal, position_m)
+    if misread is not None:
+        return Cause(f"{seen}: {misread}", misread.hint, evidence)
     circles = turns_one_way(far)
     if circles and not _follows_the_heading(far):
         return Cause(f"{seen}: {_circling(circles)}", f"{_YAW_HINT} {WRAP_HINT}", evidence)
@@ -307,7 +311,7 @@ def _wrong_place(run: Approach, position_m: float) -> tuple[str, str] | None:
     return None
 
 
-def why_not_aligned(run: Approach, heading_rad: float) -> Cause | None:
+def why_not_aligned(run: Approach, position_m: float, heading_rad: float) -> Cause | None:
     """Why the robot does not look as the goal does in the end; None if it does."""
     last = run.truth[-1]
     off_rad = run.heading_error_rad(last)
@@ -324,6 +328,9 @@ def why_not_aligned(run: Approach, heading_rad: float) -> Cause | None:
         f"is at the goal's position, but looks to {degrees(last.yaw_rad)} instead of "
         f"{degrees(run.goal.yaw_rad)}"
     )
+    misread = misread_yaw(run.recording, run.goal, position_m)
+    if misread is not None:
+        return Cause(f"{seen}: {misread}", misread.hint, evidence)
     if not is_at_rest(last):
         circles = turns_one_way(run.truth)
         return Cause(

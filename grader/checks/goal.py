@@ -59,7 +59,7 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
         expected += f" and {degrees(heading)} of the heading {degrees(run.goal.yaw_rad)}"
     cause = why_not_there(run, parameters.position)
     if cause is None and heading is not None:
-        cause = why_not_aligned(run, heading)
+        cause = why_not_aligned(run, parameters.position, heading)
     if cause is None and not is_at_rest(run.truth[-1]):
         cause = _restless(run)
     if cause is not None:

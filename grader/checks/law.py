@@ -112,7 +112,7 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> V
         if abs(item.command_rad_s) > _ZERO_RAD_S or abs(item.error_rad) > _PAUSE_RAD
     ]
     wrong = sum(item.is_wrong for item in telling) / len(telling) if telling else 0.0
-    best = _fit(telling, limit_rad_s)
+    best = fit(telling, limit_rad_s)
     if wrong <= _FEW_WRONG and best.r2 >= least_r2 and best.gain > 0.0:
         return best
     return _otherwise(telling, limit_rad_s, least_r2, wrong) or best
@@ -142,15 +142,15 @@ def _otherwise(
         else item
         for item in samples
     ]
-    turned = _fit(raw, limit_rad_s)
-    mirrored = _fit([Sample(-item.error_rad, item.command_rad_s) for item in samples], limit_rad_s)
+    turned = fit(raw, limit_rad_s)
+    mirrored = fit([Sample(-item.error_rad, item.command_rad_s) for item in samples], limit_rad_s)
     if turned.gain > 0.0 and turned.r2 >= max(0.8 * least_r2, mirrored.r2):
         return Verdict(Law.NOT_NORMALISED, turned.gain, turned.r2, turned.used, share=wrong)
     if mirrored.gain > 0.0 and wrong > 0.5:
         return Verdict(Law.WRONG_SIGN, -mirrored.gain, mirrored.r2, mirrored.used)
     # The line of those that turn the right way, with no merit for the others.
-    fit = _fit(samples, limit_rad_s)
-    return Verdict(Law.PROPORTIONAL, fit.gain, min(fit.r2, 1.0 - wrong - least_r2), fit.used)
+    line = fit(samples, limit_rad_s)
+    return Verdict(Law.PROPORTIONAL, line.gain, min(line.r2, 1.0 - wrong - least_r2), line.used)
 
 
 def _toward(item: Sample) -> Sample:
@@ -162,11 +162,15 @@ def _toward(item: Sample) -> Sample:
     return item
 
 
-def _fit(samples: Sequence[Sample], limit_rad_s: float) -> Verdict:
+def fit(samples: Sequence[Sample], limit_rad_s: float) -> Verdict:
     """Lay a line through the origin and the commands that are at no limit.
 
     A command at a limit is left out only if the line asks for at least that much there, so that
     a step does not pass for a clamp.
+
+    Args:
+        samples: Finite.
+        limit_rad_s: What the robot can do.
     """
     if not samples:
         return Verdict(Law.TOO_FEW)

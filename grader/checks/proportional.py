@@ -9,6 +9,7 @@ from typing import Literal
 from pydantic import Field
 
 from grader.assignment.quantity import Frequency, PositiveLength, Ratio
+from grader.checks.answer import MOST_BEHIND, answers
 from grader.checks.approach import Approach, approach, why_not_there
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
@@ -17,15 +18,15 @@ from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.immobility import why_cut_short
 from grader.checks.law import Law, Sample, Verdict, examine
 from grader.checks.measure import metres
+from grader.checks.misread_yaw import misread_yaw
 from grader.checks.reference import GoalPose
 from grader.checks.silence import why_silent
-from grader.checks.steering import LEAST_SAMPLES, answers, at_the_goal, on_the_way
+from grader.checks.steering import LEAST_SAMPLES, at_the_goal, on_the_way
 from grader.checks.wording import counted, percent
 from grader.recording.model import Recording
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 _MOST_POINTS = 400
-_MOST_BEHIND = 2
 _WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
 _FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
 
@@ -80,8 +81,7 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
         return (cause or Cause("never near the goal")).finding(expected)
     scene = recording.scene
     limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
-    # Odometry that is on its way, or waits for a busy callback, is not yet known.
-    tried = [_samples(run, parameters, behind, limit_rad_s) for behind in range(_MOST_BEHIND + 1)]
+    tried = [_samples(run, parameters, behind, limit_rad_s) for behind in range(MOST_BEHIND + 1)]
     verdicts = [examine(samples, limit_rad_s, parameters.r2) for samples in tried]
     good = [index for index, item in enumerate(verdicts) if _is_good(item, parameters)]
     index = max(good, key=lambda i: verdicts[i].r2, default=0)
@@ -102,6 +102,11 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
             evidence,
         )
     observed, hint = _words(verdict, parameters, len(samples))
+    misread = misread_yaw(recording, run.goal, parameters.position)
+    if misread is not None:
+        return Finding.failed(
+            expected, f"the commands do not follow the error: {misread}", misread.hint, evidence
+        )
     return Finding.failed(expected, observed, hint, evidence)
 
 
@@ -121,7 +126,7 @@ def _is_good(verdict: Verdict, parameters: Proportional) -> bool:
 def _samples(
     run: Approach, parameters: Proportional, behind: int, limit_rad_s: float
 ) -> list[Sample]:
-    known = answers(run, behind)
+    known = answers(run.recording, behind)
     if parameters.phase == "position":
         return on_the_way(run, known, parameters.position)
     return at_the_goal(run, known, parameters.position, limit_rad_s)

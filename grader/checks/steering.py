@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from grader.checks.answer import Answer
 from grader.checks.approach import NO_SPEED_M_S, Approach
-from grader.checks.command import Command, commands, number, odometry
 from grader.checks.law import Law, Sample, examine
-from grader.checks.track import pose_at
-from grader.recording.model import NS, Message
-from sim.motion import Pose
 
 LEAST_SAMPLES = 8
 # A command is in force from the step after it.
@@ -22,45 +17,12 @@ _SAME = 0.03
 _GOOD_R2 = 0.9
 
 
-@dataclass(frozen=True)
-class Answer:
-    """A command with what its sender can have known.
-
-    Attributes:
-        command: As published.
-        seen_ns: When the odometry was measured that it answers.
-        pose: The robot's then.
-    """
-
-    command: Command
-    seen_ns: int
-    pose: Pose
-
-
-def answers(run: Approach, behind: int) -> list[Answer]:
-    """Every command that knows an error.
-
-    Args:
-        run: The run.
-        behind: By how many messages the student was behind the newest odometry.
-    """
-    told = odometry(run.recording)
-    found = []
-    for item in commands(run.recording):
-        # What was sent before the first odometry, or after the end, knows no error.
-        seen_ns = _seen_ns(told, item.time_ns, behind)
-        if seen_ns is None or item.time_ns > run.truth[-1].time_ns or not item.twist.is_finite:
-            continue
-        found.append(Answer(item, seen_ns, pose_at(run.truth, seen_ns)))
-    return found
-
-
 def on_the_way(run: Approach, known: Sequence[Answer], position_m: float) -> list[Sample]:
     """Commands until the robot is near the goal, with the error to the goal's direction.
 
     Args:
         run: The run.
-        known: As :func:`answers` finds them.
+        known: As :func:`~grader.checks.answer.answers` finds them.
         position_m: How near.
     """
     arrival = run.arrival(position_m)
@@ -77,7 +39,7 @@ def at_the_goal(
 
     Args:
         run: The run.
-        known: As :func:`answers` finds them.
+        known: As :func:`~grader.checks.answer.answers` finds them.
         position_m: How near.
         limit_rad_s: The robot's.
     """
@@ -127,19 +89,3 @@ def _to_goal(run: Approach, item: Answer) -> Sample:
 
 def _to_heading(run: Approach, item: Answer) -> Sample:
     return Sample(run.heading_error_rad(item.pose), item.command.twist.angular_rad_s)
-
-
-def _seen_ns(told: Sequence[Message], time_ns: int, behind: int) -> int | None:
-    """Time at which the newest odometry that was known was measured, or None before the first."""
-    if not told:
-        return time_ns
-    index = bisect_right(told, time_ns, key=_stamp_ns)
-    if index <= behind:
-        return None
-    message = told[index - 1 - behind]
-    sec, nanosec = (number(message.value, "header", "stamp", key) for key in ("sec", "nanosec"))
-    return message.stamp_ns if sec is None or nanosec is None else int(sec) * NS + int(nanosec)
-
-
-def _stamp_ns(message: Message) -> int:
-    return message.stamp_ns

@@ -450,17 +450,36 @@ def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_th
 
 
 @pytest.mark.parametrize(
-    ("goal", "yaw", "seen"),
+    ("yaw", "words", "hint"),
     [
         # (w, x, y, z) taken for (x, y, z, w): of a robot on the ground that is always 0.
-        ((0.6, 0.4, math.pi / 2), lambda _: 0.0, "m from the goal when the observation ends"),
-        ((0.6, 0.4, math.pi / 2), lambda yaw: math.sin(yaw / 2), "is at the goal's position"),
+        (lambda _: 0.0, "as if yaw were always 0", "x, y, z, w"),
+        (math.degrees, "as if yaw were in degrees", "radians"),
+        (lambda yaw: yaw / 2, "as if yaw were half of what it is", "2 * atan2(z, w)"),
+        (lambda yaw: math.sin(yaw / 2), "as if yaw were z of the quaternion", "half the angle"),
+        (lambda yaw: -yaw, "with its sign changed", "Counter-clockwise"),
+        (abs, "as if yaw were never negative", "acos loses the sign"),
     ],
 )
-def test_a_robot_that_turns_on_and_on_is_told_to_look_at_its_yaw(goal, yaw, seen):
-    run = run_to(goal, yaw=yaw)
-    finding = judge("motion.reaches", run, goal=yaml(goal), **REACHES)
+@pytest.mark.parametrize("style", [{}, {"wrap": lambda error: error}, {"spin": 1.0}])
+def test_a_yaw_that_was_read_wrongly_is_named(yaw, words, hint, style):
+    goal = (0.5, -0.5, math.pi / 2)
+    finding = judge("motion.reaches", run_to(goal, yaw=yaw, **style), goal=yaml(goal), **REACHES)
     assert finding.status is Status.FAILED
-    assert seen in finding.observed
+    assert words in finding.observed
+    assert hint in finding.hint
+
+
+def test_a_yaw_that_knows_half_of_the_circle_is_named():
+    goal = (-0.6, 0.15, 0.0)
+    run = run_to(goal, yaw=lambda yaw: math.asin(math.sin(yaw)))
+    finding = judge("motion.reaches", run, goal=yaml(goal), **REACHES)
+    assert "as if yaw were never beyond -90° and 90°" in finding.observed
+
+
+def test_a_robot_that_turns_on_and_on_is_told_to_look_at_its_yaw():
+    """Its commands are all the same, and say nothing of what it took for its yaw."""
+    run = run_to((0.6, 0.4, 1.0), law=lambda _: 0.5)
+    finding = judge("motion.reaches", run, goal=yaml((0.6, 0.4, 1.0)), **REACHES)
     assert "times around, always to the" in finding.observed
     assert "x, y, z, w" in finding.hint

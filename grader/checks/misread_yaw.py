@@ -1,0 +1,132 @@
+"""A yaw that was read wrongly, found by which one the commands of a controller are right for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from grader.checks.answer import MOST_BEHIND, Answer, answers
+from grader.checks.law import Sample, fit
+from grader.recording.model import Recording
+from sim.motion import Pose, wrap_angle
+
+# Chance does not come near it: nothing is read from fewer commands, or a worse fit.
+_LEAST_COMMANDS = 20
+_GOOD_R2 = 0.97
+_RIGHT_R2 = 0.9
+# Readings differ by less where the robot hardly turns.
+_TURNED_RAD = 0.5
+_FORMULA = "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z))"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A way to read yaw.
+
+    Attributes:
+        words: What comes out.
+        hint: What to do about it.
+        of: From the true yaw, in rad.
+    """
+
+    words: str
+    hint: str
+    of: Callable[[float], float]
+
+    def __str__(self) -> str:
+        """What was seen, to be put behind a colon."""
+        return f"it turns as if yaw were {self.words}"
+
+
+_READINGS = (
+    Reading(
+        "always 0",
+        "A quaternion in ROS is x, y, z, w: read as w, x, y, z, no turn on the ground is left of "
+        f"it. {_FORMULA}.",
+        lambda _: 0.0,
+    ),
+    Reading(
+        "in degrees",
+        "Angles in ROS are radians (REP-103), and so are those of atan2: convert none of them.",
+        math.degrees,
+    ),
+    Reading(
+        "half of what it is",
+        f"A quaternion holds half of the angle: {_FORMULA}, or 2 * atan2(z, w) on flat ground.",
+        lambda yaw_rad: yaw_rad / 2.0,
+    ),
+    Reading(
+        "z of the quaternion",
+        f"z alone is the sine of half the angle: {_FORMULA}.",
+        lambda yaw_rad: math.sin(yaw_rad / 2.0),
+    ),
+    Reading(
+        "what it is with its sign changed",
+        f"Counter-clockwise is positive (REP-103): {_FORMULA}.",
+        lambda yaw_rad: -yaw_rad,
+    ),
+    Reading(
+        "never beyond -90° and 90°",
+        f"asin and atan know only half of the circle: {_FORMULA}, with atan2.",
+        lambda yaw_rad: math.asin(math.sin(yaw_rad)),
+    ),
+    Reading("never negative", f"acos loses the sign: {_FORMULA}.", abs),
+)
+
+
+def misread_yaw(recording: Recording, goal: Pose, position_m: float) -> Reading | None:
+    """How yaw was read wrongly, if that alone explains the turns on the way to a goal.
+
+    The commands then are in proportion to the direction of the goal less that yaw, and not in
+    proportion to the direction less the true one.
+
+    Args:
+        recording: Of a run whose robot moved.
+        goal: In the world's frame.
+        position_m: How near the goal the way to it ends.
+    """
+    scene = recording.scene
+    limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
+    fits: list[tuple[float, Reading]] = []
+    for behind in range(MOST_BEHIND + 1):
+        way = _on_the_way(answers(recording, behind), goal, position_m)
+        yaws = [answer.pose.yaw_rad for answer in way]
+        if len(way) < _LEAST_COMMANDS or max(yaws) - min(yaws) < _TURNED_RAD:
+            return None
+        if _r2(way, goal, lambda yaw_rad: yaw_rad, limit_rad_s) > _RIGHT_R2:
+            return None
+        fits += [(_r2(way, goal, one.of, limit_rad_s), one) for one in _READINGS]
+    best = max(fits, key=lambda item: item[0])
+    return best[1] if best[0] >= _GOOD_R2 else None
+
+
+def _on_the_way(known: Sequence[Answer], goal: Pose, position_m: float) -> list[Answer]:
+    end = next((i for i, item in enumerate(known) if _distance_m(item, goal) <= position_m), None)
+    return list(known[:end])
+
+
+def _distance_m(answer: Answer, goal: Pose) -> float:
+    return math.hypot(goal.x_m - answer.pose.x_m, goal.y_m - answer.pose.y_m)
+
+
+def _r2(
+    way: Sequence[Answer], goal: Pose, read: Callable[[float], float], limit_rad_s: float
+) -> float:
+    """How well the commands are in proportion to the error, wrapped or not; at most 1."""
+    found = -math.inf
+    for wrap in (wrap_angle, lambda error_rad: error_rad):
+        samples = [
+            Sample(
+                wrap(
+                    math.atan2(goal.y_m - item.pose.y_m, goal.x_m - item.pose.x_m)
+                    - read(item.pose.yaw_rad)
+                ),
+                item.command.twist.angular_rad_s,
+            )
+            for item in way
+        ]
+        line = fit(samples, limit_rad_s)
+        if line.gain > 0.0 and line.used >= _LEAST_COMMANDS:
+            found = max(found, line.r2)
+    return found
