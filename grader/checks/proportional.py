@@ -62,7 +62,8 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     do not count.
 
     Explains commands that know only a few values (bang-bang), an error that is not normalised,
-    a wrong sign, commands that have nothing to do with the error, and a gain out of range.
+    a wrong sign, a yaw that was read wrongly, commands that have nothing to do with the error, and
+    a gain out of range.
     """
     phase = parameters.phase
     expected = (
