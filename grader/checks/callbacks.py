@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
@@ -23,6 +24,8 @@ from grader.recording.model import NS, Recording
 
 # Between two callbacks of a busy executor.
 _PAUSE_S = 0.1
+_GAINED = 0.25
+"""Share of its period by which a timer may seem to have gained."""
 
 
 class Runs(Reported):
@@ -56,7 +59,8 @@ def run(recording: Recording, parameters: Runs) -> Finding:
     a subscription's callback runs once for each message that the probe sent; messages that still
     wait at the end because other callbacks work without a pause do not count. Each run must have
     reported its start and its end. A start that is late because callbacks worked without a pause
-    until then counts as on time: whether they should have run at once is judged elsewhere.
+    until then counts as on time: whether they should have run at once is judged elsewhere. One
+    that comes before its time is never right, whatever the median is.
 
     Explains reports in another form or with other names, periods in milliseconds, callbacks that
     never end or never run, messages that were dropped, and a callback that is registered twice.
@@ -110,9 +114,17 @@ def _judge_period(
     limits = Limits(period_s, parameters.tolerance.of(period_s), math.inf, 0.0)
     seconds = [item.seconds for item in measured]
     good = bool(seconds) and judge(seconds, limits).good
+    evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))
+    if good and _gained_s(recording, begins, period_s) > _GAINED * period_s:
+        return Finding.failed(
+            expected,
+            f"{code(callback)} starts {counted(len(begins), 'time')} in "
+            f"{format_duration((begins[-1] - begins[0]) / NS)}: too often, and held up by others",
+            _period_hint(recording, 0.0, period_s),
+            evidence,
+        )
     if good and len(reports.ended([callback])) >= parameters.at_least:
         return None
-    evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))
     if seconds and not good:
         middle_s = median(seconds)
         observed = f"{code(callback)} starts every {format_duration(middle_s)} (median)"
@@ -129,6 +141,21 @@ def _judge_period(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
     return None if cause is None else cause.finding(expected)
+
+
+def _gained_s(recording: Recording, begins: Sequence[int], period_s: float) -> float:
+    """By how much the later starts come before their time, if the earlier ones came on time.
+
+    A timer's starts may be late but never early: once one of the first half was on time, nothing
+    of what holds it up brings another forward. The median of an executor that is never free may
+    have any value, its period among them.
+    """
+    phases = [(begin - begins[0]) / NS - number * period_s for number, begin in enumerate(begins)]
+    half = len(phases) // 2
+    if not half:
+        return 0.0
+    taken_s = recording.taken_s(begins[0] - round(period_s * NS), begins[half])
+    return min(phases[:half]) - min(phases[half:]) - taken_s
 
 
 def _unhindered(

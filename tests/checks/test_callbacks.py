@@ -1,5 +1,7 @@
 """callbacks.*: reports of starts and ends become runs, and runs are judged."""
 
+import dataclasses
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -159,6 +161,25 @@ class TestRun:
         runs = [(name, begin, begin + 0.4) for name, begin in zip(names, begins, strict=True)]
         finding = judged("run", run(*runs), TIMERS, period="1 s")
         assert finding.status is Status.PASSED
+
+    def test_a_short_period_is_told_where_the_median_is_right_by_chance(self):
+        """Two timers of 0.5 s that work 0.4 s, and a message in every second round of them."""
+        runs, now_s = [], 1.0
+        for number in range(7):
+            for name in TIMERS:
+                runs.append((name, now_s, now_s + 0.4))
+                now_s += 0.4
+            if number % 2:
+                runs.append(("chatter", now_s, now_s + 0.2))
+                now_s += 0.2
+        words = failed("run", run(*runs, stop_s=8.0, end_s=8.1), TIMERS, period="1 s")
+        assert "`timer_1` starts 7 times in 5.4 s: too often" in words
+
+    @given(late_s=st.lists(st.floats(0.0, 0.24), min_size=4, max_size=8))
+    def test_starts_that_are_late_are_not_too_often(self, late_s):
+        runs = [("timer_1", 1 + i + late, 1.4 + i + late) for i, late in enumerate(late_s)]
+        finding = judged("run", run(*runs, stop_s=10.0, end_s=10.1), ["timer_1"], period="1 s")
+        assert "too often" not in finding.observed
 
     @pytest.mark.parametrize("period_s", [1.2, 1.5])
     def test_a_wrong_period_beside_the_work_of_others_is_told(self, period_s):
@@ -424,6 +445,16 @@ class TestOverlap:
         finding = self.overlap(run(*runs, disturbance=disturbed))
         assert finding.status is Status.ERROR
         assert finding.disturbed
+
+    def test_one_thread_is_no_fault_of_the_machine(self):
+        disturbed = (*taken(1.1, 1.3, waited_s=0.45), *taken(2.1, 2.3, waited_s=0.45))
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
+        subject = run(*serial(), disturbance=disturbed, environment={"cpus": "2"})
+        assert self.overlap(subject).status is Status.ERROR
+        subject = dataclasses.replace(subject, declarations=(spin,))
+        assert self.overlap(subject).status is Status.FAILED
+        subject = dataclasses.replace(subject, declarations=(spin, spin))
+        assert self.overlap(subject).status is Status.ERROR
 
     def test_a_little_disturbance_explains_nothing(self):
         subject = run(*serial(), disturbance=taken(1.0, 5.0, waited_s=0.01))
