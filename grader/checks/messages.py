@@ -10,7 +10,7 @@ from grader.assignment.model import TopicName
 from grader.checks import slip
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
-from grader.checks.silence import why_few, why_silent
+from grader.checks.silence import why_few, why_silent, why_unreadable
 from grader.checks.value import Difference, NoSuchField, differences, expected_leaves, leaves
 from grader.checks.wording import code, codes, counted, value_text
 from grader.recording.model import Kind, Message, Recording
@@ -151,6 +151,9 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
     expected = _expected_words(parameters)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
+    unreadable = why_unreadable(recording, parameters.topic)
+    if unreadable is not None:
+        return unreadable.finding(expected)
     try:
         wanted = expected_leaves(parameters.value, messages[0].value)
     except NoSuchField as error:

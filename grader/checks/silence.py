@@ -45,6 +45,7 @@ def why_silent(recording: Recording, topic: str) -> Cause:
     cause = (
         _other_type(recording, topic, publishers, readers)
         or _other_definition(recording, topic, publishers)
+        or why_unreadable(recording, topic)
         or _unmatched(recording, topic, publishers, readers)
         or _held_in_vain(recording, topic)
     )
@@ -67,6 +68,20 @@ def why_silent(recording: Recording, topic: str) -> Cause:
     )
 
 
+def why_unreadable(recording: Recording, topic: str) -> Cause | None:
+    """Why messages on a topic could not be read, or None where all could."""
+    number = recording.unreadable.get(topic, 0)
+    if not number:
+        return None
+    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
+    return Cause(
+        f"{counted(number, 'message')} on {code(topic)} cannot be read: what was published are "
+        "other bytes than a message of its type has",
+        "Give publish() a message object: bytes are published as they are.",
+        Evidence(moments=endpoints_seen(recording, publishers)),
+    )
+
+
 def why_few(recording: Recording, topic: str, needed: int) -> Cause:
     """Why fewer messages than needed were recorded on a topic.
 
@@ -78,6 +93,9 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
     messages = recording.on(topic)
     if not messages:
         return why_silent(recording, topic)
+    unreadable = why_unreadable(recording, topic)
+    if unreadable is not None:
+        return unreadable
     begin_ns = recording.matched_ns or recording.launched_ns
     watched_s = (recording.stop_ns - begin_ns) / NS
     seen = f"{counted(len(messages), 'message')} on {code(topic)} in {format_duration(watched_s)}"

@@ -281,15 +281,18 @@ class Intervention:
     signal: str = ""
 
 
+_ENDING = ("memory", "cpu time", "open files", "sessions", "output")
+
+
 @dataclass(frozen=True)
 class Breach:
     """A limit of the sandbox that the student's processes reached, or what they must never do.
 
     Attributes:
         time_ns: When it was first seen.
-        what: Of a limit: ``memory``, ``cpu time``, ``processes``, ``sessions``, ``output``,
-            ``disk``, ``shared memory``, ``files in disk`` or ``files in shared memory``. Else
-            ``forbidden call``, ``forbidden packets`` or ``forged report``.
+        what: Of a limit: ``memory``, ``cpu time``, ``processes``, ``open files``, ``sessions``,
+            ``output``, ``disk``, ``shared memory``, ``files in disk`` or ``files in shared
+            memory``. Else ``forbidden call``, ``forbidden packets`` or ``forged report``.
         taken: Such as ``1056 MiB of memory``; without a limit what they did, such as ``called
             `reboot```.
         allowed: Such as ``1024 MiB``; empty where there is no limit, because it is never allowed.
@@ -303,7 +306,7 @@ class Breach:
     @property
     def ended(self) -> bool:
         """Whether the processes were ended for it; the kernel itself bounds the others."""
-        return not self.allowed or self.what in ("memory", "cpu time", "sessions", "output")
+        return not self.allowed or self.what in _ENDING
 
     @property
     def deed(self) -> str:
@@ -446,6 +449,8 @@ class Recording:
         answers: Topic in ``sent`` -> topic on which the answers are expected, where the scenario
             names one.
         joined: What late joiners received, by their names, in the order of their reception.
+        unreadable: Topic -> how many messages on it hold other bytes than its type has; they are
+            not among ``messages``.
         services: What the student's nodes offer.
         goals: Goals that the probe sent.
         faults: What of ours or of the machine went wrong, one sentence each.
@@ -469,6 +474,7 @@ class Recording:
     sent: Mapping[str, tuple[Message, ...]] = field(default_factory=dict)
     answers: Mapping[str, str] = field(default_factory=dict)
     joined: Mapping[str, tuple[Message, ...]] = field(default_factory=dict)
+    unreadable: Mapping[str, int] = field(default_factory=dict)
     nodes: tuple[Node, ...] = ()
     endpoints: tuple[Endpoint, ...] = ()
     processes: tuple[Process, ...] = ()

@@ -19,6 +19,11 @@ _LONGEST_LINE = 8192
 _MOST_DECLARATIONS = 2000
 _MOST_TOLD = 2000
 _LARGEST_NUMBER = 2**63
+_OF_ENDPOINTS = ("publisher", "subscription")
+_KINDS = frozenset(
+    {*_OF_ENDPOINTS, "started", "init", "node", "timer", "spin", "held", "leaving", "exiting"}
+)
+"""What a tracer tells of; see ``tracer/sitecustomize.py``."""
 
 
 @dataclass
@@ -223,9 +228,9 @@ class OutputReader:
         stream.kept = KeptLines(self._limit)
         for line in lines:
             data = _parsed(line.text)
-            if not isinstance(data.get("kind"), str) or not isinstance(data.get("pid"), int):
+            if not _is_of_tracer(data):
                 self._tell_foreign(line)
-            if isinstance(data.get("kind"), str) and _is_fit(data):
+            elif _is_fit(data):
                 self._declare(line, data.pop("kind"), data)
 
     def _tell_foreign(self, line: LogLine) -> None:
@@ -246,6 +251,14 @@ def _parsed(text: str) -> dict[str, Any]:
     except (ValueError, RecursionError):
         return {}
     return data if isinstance(data, dict) else {}
+
+
+def _is_of_tracer(data: dict[str, Any]) -> bool:
+    """Whether a tracer can have written it, as far as that shows."""
+    kind = data.get("kind")
+    if not isinstance(kind, str) or kind not in _KINDS or not isinstance(data.get("pid"), int):
+        return False
+    return kind not in _OF_ENDPOINTS or type(data.get("depth")) is int
 
 
 def _is_fit(data: dict[str, Any]) -> bool:

@@ -24,6 +24,8 @@ from grader.run.order import Limits, Topic
 from grader.run.rosout import RosoutLog, told_of_matches
 
 NAME = "rosgrade_probe"
+_BEFORE_ALL_NS = 1
+_LAST_SEQUENCE = 2**32 - 1
 # One lost answer must not end the observation, and a blocked node must not be flooded.
 _MOST_UNANSWERED = 5
 _LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
@@ -266,12 +268,15 @@ class Probe:
 
 
 def _raw(topic: str, type: str, data: bytes, info: Any, join: str = "") -> RawMessage:
+    # Both come from the writer, who may have written the packet by hand: a recording holds what
+    # its format has room for, which no check believes to be the time of anything.
+    stamp_ns, sequence = info["source_timestamp"], info["publication_sequence_number"] or 0
     return RawMessage(
         topic=topic,
         type=type,
         cdr=bytes(data),
-        stamp_ns=info["source_timestamp"],
+        stamp_ns=stamp_ns if stamp_ns >= 0 else _BEFORE_ALL_NS,
         received_ns=info["received_timestamp"],
-        sequence=info["publication_sequence_number"] or 0,
+        sequence=sequence if 0 <= sequence <= _LAST_SEQUENCE else 0,
         join=join,
     )

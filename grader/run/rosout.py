@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,7 @@ from grader.run.output import KeptLines
 _TOPIC = "/rosout"
 _DEPTH = 1000
 _LONGEST = 8192
+_LONGEST_NAME = 256
 _LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
 
 
@@ -59,6 +61,12 @@ class RosoutLog:
 
     def _take(self, record: Any) -> None:
         stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
-        text = str(record.msg)[:_LONGEST].encode(errors="replace").decode()
+        if stamp_ns < 0:
+            # Nobody's clock; what is recorded has a time after 1970.
+            stamp_ns = time.time_ns()
+        name, text = (
+            str(said)[:longest].encode(errors="replace").decode()
+            for said, longest in ((record.name, _LONGEST_NAME), (record.msg, _LONGEST))
+        )
         level = _LEVELS.get(int(record.level), str(record.level))
-        self._kept.add(LogLine(stamp_ns, str(record.name), "rosout", text, level))
+        self._kept.add(LogLine(stamp_ns, name, "rosout", text, level))

@@ -15,11 +15,15 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from grader.recording.model import Breach
-from grader.sandbox.limits import Limits, size_words
+from grader.sandbox.limits import MIB, Limits, size_words
 from grader.sandbox.namespaces import STUDENT
-from grader.sandbox.usage import memory_bytes, usage_of
+from grader.sandbox.usage import hidden_bytes, memory_bytes, open_files, own_bytes, usage_of
 
 _POLL_S = 0.1
+_LOOKS_PER_SEARCH = 5
+"""What is mapped takes longer to read than what is resident."""
+_OWN_BYTES = 2048 * MIB
+"""Of the cell itself: messages wait in it, and it is in no sandbox of a student's."""
 _FULL = 0.99
 # Some for subprocesses of good manners; every session gets a share of the CPU of its own.
 _MOST_SESSIONS = 16
@@ -49,6 +53,8 @@ class Watchdog:
         self._output_bytes = output_bytes
         self._deeds = deeds
         self._breaches: dict[str, Breach] = {}
+        self._looks = 0
+        self._hidden_bytes = 0
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
 
@@ -70,9 +76,17 @@ class Watchdog:
     def _look(self) -> None:
         limits = self._limits
         usages = usage_of(self._inits())
-        taken = memory_bytes(usages, limits.memory_bytes)
+        if self._looks % _LOOKS_PER_SEARCH == 0:
+            self._hidden_bytes = hidden_bytes(usages)
+        self._looks += 1
+        taken = memory_bytes(usages, limits.memory_bytes, self._hidden_bytes)
         if taken > limits.memory_bytes:
             self._note("memory", f"{size_words(taken)} of memory", size_words(limits.memory_bytes))
+            self._end_all()
+        own = own_bytes()
+        if own > _OWN_BYTES:
+            words = f"{size_words(own)} of memory where messages wait"
+            self._note("memory", words, size_words(_OWN_BYTES))
             self._end_all()
         if sum(usage.cpu_s for usage in usages) > limits.cpu_s:
             self._note("cpu time", f"more than {limits.cpu_s} s of CPU time", f"{limits.cpu_s} s")
@@ -81,6 +95,10 @@ class Watchdog:
         # The last ones that it may start count as too many: no more can be seen.
         if threads >= limits.processes:
             self._note("processes", f"{threads} processes and threads", str(limits.processes))
+        files = open_files(usages)
+        if files > limits.open_files:
+            self._note("open files", f"{files} open files", str(limits.open_files))
+            self._end_all()
         if len({usage.session for usage in usages}) > _MOST_SESSIONS:
             self._note("sessions", f"more than {_MOST_SESSIONS} sessions", str(_MOST_SESSIONS))
             self._end_all()

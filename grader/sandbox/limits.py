@@ -24,7 +24,8 @@ class Limits:
         disk_bytes: Of everything that is written to /tmp and home.
         files: Number of files and folders there.
         shared_bytes: Of /dev/shm.
-        open_files: Of one process.
+        open_files: Of all processes together, sockets and the like among them; the kernel holds
+            each process to it.
         address_bytes: Address space of one process. Reserving takes nothing from anybody, and
             every thread reserves some, so this is far more than the memory.
         output_bytes: A process that writes more than this is ended.

@@ -22,7 +22,13 @@ from grader.sandbox.limits import BUILD, Limits, size_words
 from grader.sandbox.namespaces import MOUNT_POINTS
 from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
 from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
-from grader.sandbox.usage import folder_usage, memory_bytes, usage_of
+from grader.sandbox.usage import (
+    folder_usage,
+    hidden_bytes,
+    memory_bytes,
+    open_files,
+    usage_of,
+)
 
 LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
 
@@ -33,6 +39,8 @@ CODE = (Path(grader.__file__).resolve().parent, Path(sim.__file__).resolve().par
 _CELL_UID, _BUILD_UID = 2000, 1000
 # The last ones fail to start, so they are never all there.
 _NEARLY_ALL = 0.95
+_OPEN_FILES = 4096
+"""Of all processes of a build: a compiler and all that drives it have some each."""
 _DATA = CODE[0] / "_data"
 _USR = Path("/usr")
 
@@ -245,12 +253,15 @@ class BuildRoom:
         """
         limits = self.limits
         usages = usage_of([pid])
-        if memory_bytes(usages, limits.memory_bytes) > limits.memory_bytes:
+        taken = memory_bytes(usages, limits.memory_bytes, hidden_bytes(usages))
+        if taken > limits.memory_bytes:
             return f"it took more than {size_words(limits.memory_bytes)} of memory"
         if sum(usage.cpu_s for usage in usages) > limits.cpu_s:
             return f"it took more than {limits.cpu_s} s of CPU time"
         if sum(usage.threads for usage in usages) >= _NEARLY_ALL * limits.processes:
             return f"it started {limits.processes} processes"
+        if open_files(usages) > _OPEN_FILES:
+            return f"it had more than {_OPEN_FILES} files open"
         size, files = folder_usage(self.folders, limits.disk_bytes, limits.files)
         if size > limits.disk_bytes:
             return f"it wrote more than {size_words(limits.disk_bytes)}"
@@ -260,6 +271,8 @@ class BuildRoom:
 def hide(binds: Sequence[Bind]) -> list[str]:
     """Arguments that cover what is not to be seen where what is shown would hold it.
 
+    With what nobody can write to: it is memory that no limit counts.
+
     That is rosgrade's own code, and the libraries of the Python that our environment was made of
     and takes none from.
     """
@@ -267,7 +280,7 @@ def hide(binds: Sequence[Bind]) -> list[str]:
         argument
         for path in (*CODE, *_libraries_beside())
         if _is_within(path, [bind for bind in binds if bind.source == bind.target])
-        for argument in ("--tmpfs", str(path))
+        for argument in ("--tmpfs", str(path), "--remount-ro", str(path))
     ]
 
 

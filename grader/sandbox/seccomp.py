@@ -52,6 +52,9 @@ _PRETENDED = (
     *("sched_setaffinity", "sched_setscheduler", "sched_setparam", "sched_setattr"),
     *("ioprio_set",),
 )
+# SOL_SOCKET; SO_SNDBUF, SO_RCVBUF and both FORCE: asm-generic/socket.h. What waits in a socket is
+# memory of the kernel's that is counted for no process, so each has the system's usual room.
+_SOCKET_LEVEL, _BUFFER_SIZES = 1, (7, 8, 32, 33)
 # CLONE_NEWNS, NEWCGROUP, NEWUTS, NEWIPC, NEWUSER, NEWPID, NEWNET, NEWTIME: linux/sched.h
 _NAMESPACES = (0x20000, 0x2000000, 0x4000000, 0x8000000, 0x10000000, 0x20000000, 0x40000000, 0x80)
 _TIOCSTI, _TIOCLINUX = 0x5412, 0x541C
@@ -87,6 +90,10 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
     _add(rules, seccomp.ERRNO(errno.ENOSYS), "clone3")
     for request in (_TIOCSTI, _TIOCLINUX):
         _add(rules, refuse, "ioctl", seccomp.Arg(1, seccomp.MASKED_EQ, _INT, request))
+    for option in _BUFFER_SIZES:
+        level = seccomp.Arg(1, seccomp.MASKED_EQ, _INT, _SOCKET_LEVEL)
+        wanted = seccomp.Arg(2, seccomp.MASKED_EQ, _INT, option)
+        _add(rules, seccomp.ERRNO(0), "setsockopt", level, wanted)
     for call in ("socket", "socketpair"):
         for family in range(1 << _FAMILY_BITS):
             if family not in _FAMILIES:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import re
 import shutil
+import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 _UNSAID = "colcon could not build this package; the log says why"
 _WHOLE_LOG = 60_000
+_SIGNALLED = 128
+_VMSTAT = Path("/proc/vmstat")
 _LEAST_FREE_BYTES = 64 * MIB
 # What makes the sandbox, each with its own complaint; colcon is only started by the last.
 _NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|prlimit): .*")
@@ -163,10 +166,17 @@ class _Workshop:
             for line in part.build.log.splitlines():
                 self.on_output(line)
         finished = set(parts)
+        # It is there before anything of the student's runs, who could else put a link in its place.
+        install.mkdir(exist_ok=True)
         colcon = self.colcon(scratch, install)
+        oom_kills = _oom_kills()
         check_python = colcon.sandbox.watched() if colcon.sandbox else None
         outcome = colcon.build(finished)
-        self._check_machine(outcome, scratch, install)
+        killed = None
+        if colcon.sandbox is not None and oom_kills is not None and oom_kills == _oom_kills():
+            killed = _killed_from_within(outcome)
+        if killed is None:
+            self._check_machine(outcome, scratch, install)
         if check_python is not None and outcome.status != 0:
             check_python()
         limits = colcon.limits
@@ -176,7 +186,7 @@ class _Workshop:
             most_bytes=limits.install_bytes,
             most_files=limits.install_files,
         )
-        problem = problem or _ended_by_us(outcome, colcon.wall_s)
+        problem = problem or _ended_by_us(outcome, colcon.wall_s) or killed
         record = self._record(outcome, finished, problem, scratch, install)
         record = _with_parts(record, parts.values())
         if finished:
@@ -198,7 +208,7 @@ class _Workshop:
         unstarted = _NOT_STARTED.match(outcome.output)
         if unstarted and "Starting >>>" not in outcome.output:
             raise GraderFault(f"the sandbox of the build could not be started: {unstarted[0]}")
-        if outcome.status is not None and _is_cut_off(outcome.output):
+        if outcome.status is not None and _is_cut_off(outcome.output, self.sources.folders):
             raise GraderFault(f"colcon ended with status {outcome.status} in the middle of a build")
         if "No space left on device" in outcome.output:
             free = min(shutil.disk_usage(path).free for path in (scratch, install.parent))
@@ -255,9 +265,32 @@ def _terms(limits: BuildLimits, sandbox: Sandbox | None) -> list[str]:
     return terms
 
 
-def _is_cut_off(output: str) -> bool:
+def _oom_kills() -> int | None:
+    """How many processes the kernel has ended for want of memory; None where it does not tell."""
+    try:
+        found = re.search(r"^oom_kill (\d+)$", _VMSTAT.read_text(), re.MULTILINE)
+    except OSError:
+        return None
+    return int(found[1]) if found else None
+
+
+def _killed_from_within(outcome: Outcome) -> str | None:
+    """Say which signal ended colcon in a sandbox, or None; nobody else's reaches into one.
+
+    The kernel itself may end a process for want of memory: see to that before.
+    """
+    status = outcome.status
+    # As a shell tells of a signal, and bubblewrap does.
+    number = status - _SIGNALLED if status is not None and status > _SIGNALLED else None
+    if number not in [int(one) for one in signal.Signals]:
+        return None
+    name = signal.Signals(number).name
+    return f"colcon was ended by {name}, which only a program of the build can have sent"
+
+
+def _is_cut_off(output: str, packages: Collection[str]) -> bool:
     """Whether colcon started a package and never said how that ended, nor why it stopped."""
-    started = set(re.findall(r"^Starting >>> (\S+)", output, re.MULTILINE))
+    started = set(re.findall(r"^Starting >>> (\S+)", output, re.MULTILINE)) & set(packages)
     ended = set(re.findall(r"^(?:Finished|Failed|Aborted) +<<< (\S+)", output, re.MULTILINE))
     # Of a very long log only the beginning and the end are there.
     return len(output) < _WHOLE_LOG and bool(started - ended) and STOPPED not in output

@@ -26,7 +26,7 @@ COMPILE_S = 60.0
 STOPPED = "Exception in job execution"
 """What colcon says when its executor stops, whatever --continue-on-error says."""
 _CMAKE_INCLUDE = Path(__file__).with_name("wheels.cmake")
-_PROGRESS = re.compile(r"(Starting >>>|Finished <<<) (\S+)")
+_PROGRESS = re.compile(r"(Starting >>>|Finished <<<|Failed   <<<|Aborted  <<<) (\S+)")
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,16 @@ class Colcon:
         def on_line(line: str) -> None:
             self.on_output(line)
             match = _PROGRESS.match(line)
-            if match and match[1].startswith("Finished"):
+            if match is None:
+                return
+            if match[1].startswith("Finished"):
                 finished.add(match[2])
-            elif match:
+            elif match[1].startswith("Starting"):
                 started.add(match[2])
                 self.on_progress(f"building {match[2]}")
+            else:
+                # colcon has the last word, whatever a package printed as if it were colcon.
+                finished.discard(match[2])
 
         failed: set[str] = set()
         outcomes: list[Outcome] = []
@@ -144,10 +149,16 @@ class Colcon:
             if self.is_apart and shutil.which("ninja", path=self.environment["PATH"]):
                 command += ["-GNinja"]
             if self.ros.source == "wheels":
-                # Where a sandbox shows it, too.
-                include = shutil.copy(_CMAKE_INCLUDE, self.scratch)
-                command += [f"-DCMAKE_PROJECT_INCLUDE={include}"]
+                command += [f"-DCMAKE_PROJECT_INCLUDE={self._include}"]
         return command
+
+    @cached_property
+    def _include(self) -> Path:
+        """Copied where a sandbox shows it, too, and only before anything of the student's ran.
+
+        Afterwards there might be a link in its place.
+        """
+        return Path(shutil.copy(_CMAKE_INCLUDE, self.scratch))
 
     def _run(
         self,
@@ -162,7 +173,9 @@ class Colcon:
         if self.sandbox is None:
             return run(command, environment=self.environment, excess=self._watched())
         self.limits.room.check_allowed()
-        folders = (self.scratch, self.root, self.install.parent)
+        # Not the folder around the install space: what is written there afterwards is written by
+        # us, and would go wherever a link that was left there points to.
+        folders = (self.scratch, self.root, self.install)
         with self.sandbox.build(self.ros, folders, self.limits.room) as room:
             return run(
                 room.command(command, self.environment),

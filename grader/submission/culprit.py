@@ -82,7 +82,8 @@ def find_culprit(log: str, failed: Collection[str], sources: Sources) -> SourceE
 
 def last_started(log: str, sources: Sources, message: str) -> SourceError | None:
     """Blame the build file of the package that was being built when the log ends."""
-    started = _STARTED.findall(log)
+    # What a build file prints may look like colcon's own lines.
+    started = [name for name in _STARTED.findall(log) if name in sources.folders]
     folder = sources.folders.get(started[-1] if started else "")
     if folder is None:
         return None

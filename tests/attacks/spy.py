@@ -136,6 +136,18 @@ def write_to_system():
     raise PermissionError('read-only')
 
 
+def write_beside_the_libraries():
+    # What is mounted over something else, and has no bound of its own.
+    for line in open('/proc/self/mounts'):
+        place, kind, options = line.split()[1:4]
+        if kind == 'tmpfs' and 'size=' not in options and place.startswith(sys.base_prefix):
+            try:
+                return write(place + '/planted')
+            except OSError:
+                continue
+    raise PermissionError('nothing of that kind')
+
+
 def reach_listener_on_loopback():
     with socket.create_connection(('127.0.0.1', TARGETS['port']), 1) as connection:
         return connection.recv(16)

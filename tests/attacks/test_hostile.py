@@ -132,6 +132,74 @@ if 'install' in sys.argv:
     os.makedirs(share, exist_ok=True)
     os.path.islink(share + '/passwd') or os.symlink('/etc/passwd', share + '/passwd')
 """
+HIDDEN_MEMORY = """\
+import mmap, time
+hoard = mmap.mmap(-1, {mib} * 2**20)
+for place in range(0, len(hoard), 2**22):
+    hoard[place:place + 2**22] = bytes(2**22)
+    hoard.madvise(mmap.MADV_DONTNEED, place, 2**22)
+time.sleep(60)
+"""
+SOCKETS = """\
+import socket
+hoard = []
+for _ in range(3):
+    if os.fork() == 0:
+        break
+while len(hoard) < 350:
+    hoard += socket.socketpair()
+    hoard[-1].setblocking(False)
+    hoard[-1].setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2**24)
+    try:
+        while True:
+            hoard[-1].send(bytes(2**15))
+    except BlockingIOError:
+        pass
+time.sleep(60)
+"""
+OTHER_BYTES = """\
+node.timer.cancel()
+node.other = node.create_timer(.1, lambda: node.publisher.publish(b'\\0\\1\\0\\0abc'))
+"""
+LOG_BEFORE_TIME = """\
+from rcl_interfaces.msg import Log
+logs = node.create_publisher(Log, '/rosout', 10)
+time.sleep(.3)
+record = Log(name='x' * 2**20)
+record.stamp.sec = -5
+logs.publish(record)
+time.sleep(.1)
+raise RuntimeError('and now it is graded')
+"""
+BY_HAND = """\
+import socket, struct
+writer = bytes(node.get_publishers_info_by_topic('/cmd_vel')[0].endpoint_gid)
+udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+for number, stamp in ((node.count + 1, -5), (2**40, 2**31 - 1)):
+    body = struct.pack('<HHI', 0, 16, 0) + writer[12:16] + struct.pack('<II', number >> 32, number & 2**32 - 1)
+    body += b'\\0\\1\\0\\0' + bytes(48)
+    udp.sendto(
+        b'RTPS\\2\\3\\1\\x0f' + writer[:12] + struct.pack('<BBHiI', 9, 1, 8, stamp, 2**32 - 1)
+        + struct.pack('<BBH', 0x15, 5, len(body)) + body, ('127.0.0.1', 7411))
+time.sleep(.1)
+raise RuntimeError('and now it is graded')
+"""
+CLAIM = """\
+import json
+claim = {'kind': 'publisher', 'pid': os.getpid(), 'topic': '/cmd_vel', 'depth': None}
+os.write(int(os.environ['ROSGRADE_TRACER_FD']), json.dumps(claim).encode() + b'\\n')
+"""
+KILL_COLCON = """\
+import os, sys
+if 'install' in sys.argv:
+    os.kill(os.getppid(), 9)
+"""
+SPEAK_AS_COLCON = """\
+import sys
+if 'install' in sys.argv:
+    print('Starting >>> ghost', 'Finished <<< bot_publisher', sep='\\n', flush=True)
+    sys.exit(1)
+"""
 UNUSUAL = """\
 import asyncio, multiprocessing, socket, tempfile
 import numpy
@@ -259,6 +327,16 @@ ATTACKS = {
         lost=frozenset({"ends"}),
         named=("SIGKILL",),
     ),
+    "hides_shared_memory": Attack(
+        HIDDEN_MEMORY.format(mib=600), lost=ALIVE, named=("MiB of memory",)
+    ),
+    "memory_in_sockets": Attack(SOCKETS, lost=ALIVE, named=("open files, 1024 are allowed",)),
+    "publishes_other_bytes": Attack(
+        OTHER_BYTES, lost=frozenset({"messages"}), named=("cannot be read",)
+    ),
+    "logs_before_1970": Attack(LOG_BEFORE_TIME, lost=ALIVE, named=("and now it is graded",)),
+    "writes_packets_by_hand": Attack(BY_HAND, lost=ALIVE, named=("and now it is graded",)),
+    "claims_a_queue_of_no_depth": Attack(CLAIM, lost=ALIVE, named=("wrote into the channel",)),
     "stops_itself": Attack(
         "os.kill(os.getpid(), signal.SIGSTOP)", lost=frozenset({"messages", "ends"})
     ),
@@ -304,6 +382,21 @@ ATTACKS = {
         "    k['data_files'].append(('/etc/cron.d', ['package.xml']))\n    _s(**k)\n"
         "setuptools.setup = setup",
         lost=frozenset({"builds"}),
+    ),
+    "build_kills_colcon": Attack(
+        at_build=KILL_COLCON,
+        lost=frozenset({"builds"}),
+        named=("colcon was ended by SIGKILL, which only a program of the build",),
+    ),
+    "build_speaks_as_colcon": Attack(
+        at_build=SPEAK_AS_COLCON,
+        lost=frozenset({"builds"}),
+        named=("setup.py: colcon could not build this package",),
+    ),
+    "build_hides_memory": Attack(
+        at_build=HIDDEN_MEMORY.format(mib=1200),
+        lost=frozenset({"builds"}),
+        named=("it took more than 1024 MiB of memory",),
     ),
     "build_memory": Attack(
         at_build="x = bytearray(2**32)", lost=frozenset({"builds"}), named=("MemoryError",)

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from grader.batch.grading import Grading
+from grader.checks.finding import Status
 from tests.attacks.conftest import Targets
 from tests.attacks.submissions import write_submission
 
@@ -50,6 +51,27 @@ ament_package()
 """
 
 
+REPLACE_RECORD = """\
+import os
+places = [line.split()[4] for line in open('/proc/self/mountinfo')]
+beside = next(place for place in places if '.unfinished-' in place).removesuffix('/install')
+try:
+    os.symlink({target!r}, beside + '/build.json')
+except OSError:
+    pass
+"""
+REDIRECT = """\
+import glob, os, sys
+if 'install' in sys.argv:
+    for path in glob.glob(os.environ['HOME'] + '/../*.cmake'):
+        os.unlink(path)
+        os.symlink({target!r}, path)
+    # colcon then goes on with the other packages, and is started again.
+    print('Exception in job execution', flush=True)
+    sys.exit(1)
+"""
+
+
 def outcomes(text: str) -> dict[str, str]:
     """What came of each attack, by its name."""
     return {name: what for name, what in re.findall(r"ATTACK (\w+) (refused|succeeded)", text)}
@@ -57,7 +79,7 @@ def outcomes(text: str) -> dict[str, str]:
 
 def all_refused(text: str) -> None:
     found = outcomes(text)
-    assert len(found) >= 37
+    assert len(found) >= 38
     succeeded = [line for line in text.splitlines() if re.search(r"ATTACK \w+ succeeded", line)]
     assert not succeeded
 
@@ -129,3 +151,32 @@ def test_nothing_is_reached_by_setup_py_or_cmake(
     untouched(targets)
     assert log.count("ATTACK read_hidden_checks refused") >= 2
     assert graded.grade.full_points, log
+
+
+def test_the_record_of_a_build_is_not_written_through_a_link_of_the_build(
+    grading: Grading, targets: Targets, tmp_path: Path
+) -> None:
+    planted = REPLACE_RECORD.format(target=targets.values["result"])
+    submission = write_submission(tmp_path / "eve", at_build=planted)
+    assert grading.grade(submission, tmp_path / "out").grade.full_points
+    untouched(targets)
+
+
+def test_nothing_of_ours_is_written_through_a_link_of_a_build(
+    grading: Grading, targets: Targets, tmp_path: Path
+) -> None:
+    from tests.submission.samples import MANIFEST
+
+    manifest = MANIFEST.replace("bot_publisher", "other_package").replace("ament_python", "ament_cmake")
+    cmake = CMAKE.replace("execute_process", "# ").replace("message(", "# (")
+    submission = write_submission(
+        tmp_path / "eve" / "bot_publisher",
+        at_build=REDIRECT.format(target=targets.values["result"]),
+        files={
+            "../other_package/package.xml": manifest,
+            "../other_package/CMakeLists.txt": cmake.format(python=sys.executable),
+        },
+    )
+    graded = grading.grade(submission.parent, tmp_path / "out")
+    assert graded.grade.result("builds").status is Status.FAILED
+    untouched(targets)

@@ -216,6 +216,12 @@ def test_a_full_disk_in_one_run_ends_no_other(grade: Grade) -> None:
     assert not runner._aborted
 
 
+def test_a_recording_that_cannot_be_read_ends_no_other(grade: Grade) -> None:
+    graded, runner = grade(UsageError("run.mcap: damaged recording"), recording())
+    assert graded.grade.full_points
+    assert not runner._aborted
+
+
 def test_a_bug_in_one_run_ends_no_other(lesson: LoadedAssignment, tmp_path: Path) -> None:
     prepared = Prepared(SUBMISSION, install=tmp_path)
     runner = ScriptedRunner(ZeroDivisionError("a bug"), recording())

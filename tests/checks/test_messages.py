@@ -33,6 +33,7 @@ from tests.checks.builder import (
     twist,
 )
 
+UNREADABLE = "1 message on `/cmd_vel` cannot be read: what was published are other bytes"
 VALUE = {"linear": {"x": 1.0}, "angular": {"z": 0.5}}
 
 
@@ -53,6 +54,13 @@ def unequal(value, **parameters):
 
 
 class TestCount:
+    def test_messages_of_other_bytes_are_told(self):
+        run = replace(recording(messages=messages(every(0.3, 2))), unreadable={"/cmd_vel": 1})
+        assert UNREADABLE in failing("messages.count", run, topic="/cmd_vel", at_least=3)
+        assert UNREADABLE in failing("messages.equal", run, topic="/cmd_vel", value=VALUE)
+        silent_run = replace(run, messages={})
+        assert UNREADABLE in failing("messages.count", silent_run, topic="/cmd_vel", at_least=1)
+
     @pytest.mark.parametrize(
         ("number", "limits", "status"),
         [

@@ -204,6 +204,16 @@ def test_messages_come_back_decoded_in_the_order_of_their_source_stamps(tmp_path
     assert second.value["angular"]["z"] == 0.5
 
 
+def test_a_message_of_other_bytes_than_its_type_has_is_counted_and_hurts_no_other(
+    tmp_path: Path,
+) -> None:
+    good = raw(4_000, *range(6))
+    wrong = [dataclasses.replace(good, cdr=cdr) for cdr in (b"", CDR_HEADER + b"abc")]
+    read = read_recording(written(tmp_path, a_recording(), *wrong, good))
+    assert [message.stamp_ns for message in read.on("/cmd_vel")] == [4_000]
+    assert read.unreadable == {"/cmd_vel": 2}
+
+
 def test_what_was_sent_and_what_joined_late_stay_apart_from_what_was_heard(tmp_path: Path) -> None:
     heard, kept = raw(3_000, 1, 0, 0, 0, 0, 0), raw(3_000, 1, 0, 0, 0, 0, 0)
     ours = dataclasses.replace(raw(2_500, 2, 0, 0, 0, 0, 0), topic="/goal", is_sent=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -75,6 +76,26 @@ def test_declarations_are_read_and_nonsense_is_dropped() -> None:
     foreign, timer = reader.declarations
     assert (foreign.kind, foreign.process) == ("foreign", "p/e")
     assert (timer.kind, timer.data) == ("timer", {"pid": 7, "period_s": 0.3})
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        {"kind": "rate"},
+        {"kind": ["timer"]},
+        {"kind": "publisher", "topic": "/cmd_vel", "depth": True},
+        {"kind": "subscription", "topic": "/cmd_vel"},
+    ],
+)
+def test_what_no_tracer_writes_was_written_by_another(data: dict[str, object]) -> None:
+    reader = OutputReader(1 << 16)
+    read_end, write_end = os.pipe()
+    reader.add(read_end, "p/e", "tracer")
+    os.write(write_end, json.dumps({"pid": 7, **data}).encode() + b"\n")
+    os.close(write_end)
+    assert reader.close(10.0) == ()
+    assert reader.forgers == {"p/e"}
+    assert [item.kind for item in reader.declarations] == ["foreign"]
 
 
 def test_a_tracer_that_reports_what_cannot_be_kept_is_no_forger() -> None:

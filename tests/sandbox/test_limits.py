@@ -7,6 +7,7 @@ import json
 import os
 import resource
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,13 @@ from grader.errors import GraderFault
 from grader.recording.model import Breach
 from grader.run.enclosure import Enclosure
 from grader.sandbox.limits import BUILD, Limits
-from grader.sandbox.usage import folder_usage, memory_bytes, usage_of
+from grader.sandbox.usage import (
+    folder_usage,
+    hidden_bytes,
+    memory_bytes,
+    open_files,
+    usage_of,
+)
 
 
 def test_an_author_s_limits_reach_the_command_in_front_of_the_program() -> None:
@@ -92,6 +99,42 @@ def test_usage_is_measured(tmp_path: Path) -> None:
     assert folder_usage([tmp_path], 2**30, 0)[1] >= 1
     assert memory_bytes([], 0) == 0
     assert usage_of([2**30]) == []
+
+
+HOARD = """\
+import mmap, sys
+hoard = mmap.mmap(-1, 2**25)
+hoard.write(b"x" * 2**25)
+print(flush=True)
+sys.stdin.readline()
+hoard.madvise(mmap.MADV_DONTNEED)
+print(flush=True)
+sys.stdin.readline()
+"""
+
+
+def test_shared_memory_counts_although_it_is_resident_nowhere() -> None:
+    command = [sys.executable, "-S", "-c", HOARD]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0
+    ) as child:
+        assert child.stdin is not None and child.stdout is not None
+        child.stdout.read(1)
+        assert hidden_bytes(usage_of([child.pid])) == 0
+        child.stdin.write(b"\n")
+        child.stdout.read(1)
+        assert hidden_bytes(usage_of([child.pid])) == 2**25
+        child.stdin.write(b"\n")
+    assert memory_bytes([], 0, 2**25) == 2**25
+
+
+def test_open_files_are_counted() -> None:
+    (own,) = (usage for usage in usage_of([os.getpid()]) if usage.pid == os.getpid())
+    before = open_files([own])
+    ends = os.pipe()
+    assert open_files([own]) == before + 2
+    for end in ends:
+        os.close(end)
 
 
 def test_usage_counts_a_process_and_what_it_started() -> None:
