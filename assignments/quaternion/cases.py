@@ -52,7 +52,9 @@ def quaternion(seed: int) -> list[dict]:
     chance = random.Random(f"{seed}/quaternion")
     half = math.sqrt(0.5)
     found = [(0.0, 0.0, 0.0, 1.0), (half, 0.0, 0.0, half), (0.0, 0.0, -half, half)]
-    found += [_unit_quaternion(chance) for _ in range(57)]
+    # Steep, but no gimbal lock: whoever takes a sine of 0.99 for one is always found out.
+    found += [_pitched(math.radians(pitch), chance) for pitch in (84.5, -84.5)]
+    found += [_unit_quaternion(chance) for _ in range(55)]
     return [_quaternion(item) for item in found]
 
 
@@ -144,6 +146,20 @@ def _unit_quaternion(chance: random.Random) -> tuple[float, ...]:
         unit = tuple(value / length for value in values)
         if _sine_of_pitch(unit) < math.sin(math.radians(85.0)):
             return unit
+
+
+def _pitched(pitch: float, chance: random.Random) -> tuple[float, ...]:
+    """A unit quaternion with this pitch, in radians, and any roll and yaw but none near 0."""
+    roll, yaw = (chance.choice((-1.0, 1.0)) * chance.uniform(0.5, 2.5) for _ in range(2))
+    cr, sr = math.cos(roll / 2.0), math.sin(roll / 2.0)
+    cp, sp = math.cos(pitch / 2.0), math.sin(pitch / 2.0)
+    cy, sy = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
 
 
 def _sine_of_pitch(values: Sequence[float]) -> float:

@@ -6,17 +6,19 @@ from collections.abc import Collection, Iterable
 
 from grader.checks import testimony
 from grader.checks.cause import Cause
-from grader.checks.failure import interrupted_place
+from grader.checks.failure import interrupted_callback, interrupted_place
 from grader.checks.finding import Evidence, Moment
 from grader.checks.sighting import until_the_end
 from grader.recording.model import NS, Call, Process, Recording
+from grader.submission.record import SourceError
 
 # What was asked for later than this before the end may be unanswered for that reason.
 _ANSWER_NS = NS
 
 HINT = (
     "A callback must return soon. Look for `while True`, time.sleep() or input() in a callback, in "
-    "the constructor or in main(), and for a node that is not given to rclpy.spin()."
+    "the constructor or in main(), for rclpy.spin() or rate.sleep() in a callback, and for a node "
+    "that is not given to rclpy.spin()."
 )
 
 
@@ -41,6 +43,32 @@ def first_unanswered(recording: Recording, nodes: Collection[str], since_ns: int
     if not unanswered or any((call.answered_ns or 0) >= since_ns for call in calls):
         return None
     return unanswered[0]
+
+
+def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float] | None:
+    """The call that the nodes let wait the longest but one, and for how long (seconds).
+
+    A single one may have been lost on its way. What the machine took from the nodes meanwhile
+    does not count.
+
+    Args:
+        recording: The run.
+        nodes: Fully qualified names of the nodes in question.
+    """
+    waits = []
+    for call in recording.calls:
+        if call.service.rpartition("/")[0] in nodes and not call.error:
+            end_ns = call.answered_ns or recording.stop_ns
+            taken_s = recording.taken_s(call.requested_ns, end_ns)
+            waits.append((call, (end_ns - call.requested_ns) / NS - taken_s))
+    waits.sort(key=lambda item: item[1])
+    return waits[-2] if len(waits) > 1 else None
+
+
+def stuck_callback(recording: Recording) -> SourceError | None:
+    """Where a callback was that did not return until it was interrupted; None without one."""
+    places = (interrupted_callback(recording, item.name) for item in recording.processes)
+    return next((place for place in places if place is not None), None)
 
 
 def where_blocked(recording: Recording, node: str, call: Call) -> tuple[str, Evidence]:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from grader.checks.blockage import stuck_callback
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.command import commands, scans
+from grader.checks.command import commands, is_zero, scans
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.immobility import why_cut_short, why_not_judged, why_not_moved
 from grader.checks.measure import metres, speed, turn
 from grader.checks.node_absence import why_no_node
 from grader.checks.scan import newest
 from grader.checks.track import has_moved, is_at_rest, speed_plot, way_m
-from grader.checks.wording import code
+from grader.checks.wording import code, counted
 from grader.recording.model import NS, Recording, Truth
 
 _HINT = (
@@ -22,8 +23,8 @@ _HINT = (
 )
 _DECIDED_HINT = (
     "It went on deciding to drive: log the range that you compare. Is it the beam straight ahead, "
-    "whose angle is 0, of the newest scan, and is your limit in metres? Where it is within the "
-    "limit, publish linear.x = 0.0."
+    "whose angle is 0, of the newest scan (a loop in a callback never sees a newer one), and is "
+    "your limit in metres? Where it is within the limit, publish linear.x = 0.0."
 )
 _HELD_HINT = (
     "The robot keeps the last command: publish one with every scan, or from a timer of 10 Hz or "
@@ -33,6 +34,18 @@ _BLIND_HINT = (
     "Without scans the robot drives blindly: keep the time of the last scan, and let a timer stop "
     "the robot when it is more than a second ago."
 )
+_CONTRADICTED_HINT = (
+    "Two places publish: one stops the robot, the other drives it on at once. Look for a timer "
+    "that publishes the speed again and again, and let one place alone decide."
+)
+_STUCK_HINT = (
+    "A loop in a callback never sees a newer scan, because the next one waits for its end: decide "
+    "once for each scan, publish once and return."
+)
+# Commands that were sent so long before contradict each other.
+_LATELY_NS = NS
+# Fewer commands to stop may come of noise.
+_CONTRADICTIONS = 3
 # A command that is older was not answered to one of the last two scans of the slowest LiDAR.
 _HELD_NS = NS // 2
 # Several scans of any LiDAR.
@@ -96,11 +109,40 @@ def why_touched(recording: Recording) -> Cause | None:
     blind = f"; the last scan had come {blind_ns / NS:.2f} s before" if blind_ns else ""
     held_ns = 0 if blind else _held_ns(recording, step, before)
     held = f", sent {held_ns / NS:.2f} s before" if held_ns else ""
+    deeper = None if blind or held else _stuck(recording) or _contradicted(recording, step)
+    more, hint = deeper or ("", _hint(recording, before))
     return Cause(
         f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, "
-        f"{_told(before)}{held}{blind}",
-        _BLIND_HINT if blind else _HELD_HINT if held else _hint(recording, before),
+        f"{_told(before)}{held}{blind}{more}",
+        _BLIND_HINT if blind else _HELD_HINT if held else hint,
         Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
+    )
+
+
+def _stuck(recording: Recording) -> tuple[str, str] | None:
+    """A callback that never returned: words for it, and what to try."""
+    place = stuck_callback(recording)
+    if place is None:
+        return None
+    return (
+        f"; a callback did not return, it was at {place.file}:{place.line} when it was interrupted",
+        _STUCK_HINT,
+    )
+
+
+def _contradicted(recording: Recording, step: Truth) -> tuple[str, str] | None:
+    """Commands to stop that were undone by others: words for them, and what to try."""
+    lately = [
+        item
+        for item in commands(recording)
+        if step.time_ns - _LATELY_NS <= item.time_ns <= step.time_ns
+    ]
+    stops = sum(is_zero(item.twist) for item in lately)
+    if not _CONTRADICTIONS <= stops < len(lately):
+        return None
+    return (
+        f"; {stops} of {counted(len(lately), 'command')} in the last second were to stop",
+        _CONTRADICTED_HINT,
     )
 
 

@@ -7,8 +7,9 @@ import signal
 from collections.abc import Sequence
 
 from grader.checks import testimony
+from grader.checks.api_slip import slip_hint
 from grader.checks.cause import Cause
-from grader.checks.failure import Failure, fatal_failure, student_place
+from grader.checks.failure import Failure, fatal_failure, student_place, submission_path
 from grader.checks.finding import Evidence, Moment
 from grader.checks.library import lacking_package, library_hint
 from grader.checks.wording import code
@@ -111,6 +112,18 @@ _OTHER_ARGUMENTS = re.compile(
 # A converter of rclpy met an object of another class; the name is that of the wanted one.
 _OTHER_CLASS = re.compile(r'convert_from_py: Assertion .strncmp\("[\w.]*\.(\w+)"')
 
+# A converter of rclpy met something else in a field of a message.
+_OTHER_FIELD = re.compile(r"Assertion .Py(Long|Float|Unicode|Bool)_Check\(")
+_FIELD_HINTS = {
+    "Long": "A field of integers in a message was given something else, such as a float or a text: "
+    "write int(value), and look for a parameter whose default is 1.0 or '1' in place of 1.",
+    "Float": "A field of floats in a message was given something else, such as a text or a whole "
+    "vector: write float(value).",
+    "Unicode": "A text field of a message was given something else: write str(value).",
+    "Bool": "A field that is True or False in a message was given something else: write "
+    "bool(value).",
+}
+
 
 def ended_early(recording: Recording, process: Process) -> bool:
     """Whether a process ended by itself before the end of the observation.
@@ -181,7 +194,9 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
         return Cause(f"{ended}: {breach}", _BREACH_HINTS[breach.what], evidence)
     failure = None if killed else fatal_failure(recording, process.name)
     if failure is None:
-        hint = _wrong_class(evidence.log) if killed is signal.SIGABRT else ""
+        hint = ""
+        if killed is signal.SIGABRT:
+            hint = _wrong_class(evidence.log) or _wrong_field(evidence.log)
         hint = hint or (_SIGNAL_HINTS.get(killed, "") if killed else "")
         hint = hint or "Run it by hand with `ros2 run` and look at its last lines of output."
         return Cause(f"{ended} with {exit_words(process.exit_code)}", hint, evidence)
@@ -274,6 +289,9 @@ def _exception_hint(failure: Failure, recording: Recording) -> str:
             "A callback group is an object, not its class: write ReentrantCallbackGroup() and "
             "MutuallyExclusiveCallbackGroup(), with brackets."
         )
+    slip = slip_hint(failure)
+    if slip is not None:
+        return slip
     if _enters_init(failure):
         return (
             "In Jazzy rclpy.init() returns nothing that `with` could enter; it does so in later "
@@ -289,6 +307,12 @@ def _exception_hint(failure: Failure, recording: Recording) -> str:
     if failure.type == "AttributeError" and "'_default_callback_group'" in failure.message:
         return "Call super().__init__('node_name') first in the node's constructor."
     if failure.type == "AttributeError" and failure.message.startswith("module "):
+        # Where Python itself loads the entry point, the last frame is its own.
+        if submission_path(failure.frames[-1].file, recording.submission):
+            return (
+                "The module has no such name: check its spelling. A module inside of another one "
+                "must be imported itself, as in `from rclpy.node import Node`."
+            )
         return "setup.py's console_scripts names a function that the module does not have."
     if failure.type == "TypeError" and "'qos_profile'" in failure.message:
         return "The third argument is the queue depth: self.create_publisher(Twist, 'cmd_vel', 10)."
@@ -325,6 +349,12 @@ def _wrong_class(lines: Sequence[str]) -> str:
         f"ROS was given something that is no {code(name)}: return or publish one. A callback "
         "without `return` returns None."
     )
+
+
+def _wrong_field(lines: Sequence[str]) -> str:
+    """What to try where a field of a message held what it cannot."""
+    found = next((match for line in lines if (match := _OTHER_FIELD.search(line))), None)
+    return _FIELD_HINTS[found[1]] if found else ""
 
 
 def _last_lines(recording: Recording, process: Process) -> tuple[str, ...]:

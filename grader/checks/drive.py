@@ -148,6 +148,15 @@ def _wrong_speed(
             "the robot stood still in between",
             "Which message made it stop? Log what the callback compares.",
         )
+    told = groupby(steps, key=lambda step: step.command_m_s == 0.0)
+    halts = sum(1 for stops, _ in told if stops)
+    if halts >= 2:
+        return (
+            f"the robot was told {halts} times to stop, and to drive on before it stood",
+            "Two places that publish contradict each other, such as a timer that stops the robot "
+            "after less than the time between two scans; or a range that is not measured (inf, "
+            "0.0) counts as an obstacle now and then.",
+        )
     if middle * wanted < 0.0:
         return "the robot drives backwards", _BACKWARDS_HINT
     limit = scene.max_linear_m_s

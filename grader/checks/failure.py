@@ -148,6 +148,24 @@ def interrupted_place(recording: Recording, process: str) -> SourceError | None:
     return None
 
 
+def interrupted_callback(recording: Recording, process: str) -> SourceError | None:
+    """Where in a callback a process was when SIGINT came; None if it was anywhere else.
+
+    A loop of its own in main() is no callback: rclpy did not call it.
+    """
+    for failure in reversed(failures(recording, process)):
+        if failure.type != "KeyboardInterrupt":
+            continue
+        frame = _student_frame(failure, recording.submission)
+        if frame is None or "spin" in frame.source:
+            return None
+        callers = failure.frames[: failure.frames.index(frame)]
+        if any("/rclpy/" in caller.file for caller in callers):
+            return interrupted_place(recording, process)
+        return None
+    return None
+
+
 def student_place(
     failure: Failure, submission: SubmissionRecord, message: str = ""
 ) -> SourceError | None:

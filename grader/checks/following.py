@@ -28,7 +28,7 @@ _MOST_EXPLAINED = 100
 _NEARLY_ALL = 0.9
 _NOT_FINITE = "not a finite number"
 _NOT_THERE = "not a finite number, or not there at all: the array is too short"
-_NEVER_SET = "never set"
+_NEVER_SET = "always 0, as one that is never set"
 _ALWAYS_THE_SAME = "always the same"
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from grader.assignment.quantity import Angle, Duration, PositiveLength, Ratio
 from grader.assignment.unit import format_duration
-from grader.checks.approach import Approach, approach, why_not_aligned, why_not_there
+from grader.checks.approach import Approach, approach
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.contact import why_touched
@@ -17,6 +17,7 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.immobility import why_cut_short, why_not_moved
 from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
+from grader.checks.missed_goal import why_not_aligned, why_not_there
 from grader.checks.reference import GoalPose
 from grader.checks.sighting import until_the_end
 from grader.checks.track import final_rest, is_at_rest, speed_plot, way_m

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Literal
 
 from pydantic import Field
@@ -10,7 +12,7 @@ from grader.assignment.model import TopicName
 from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.echo import Echo, echoes, wanted_values
+from grader.checks.echo import Echo, Wanted, echoes, wanted_values
 from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.log_absence import why_not_logged
@@ -56,6 +58,10 @@ class Follows(Parameters):
         "message from before the launch it is the time since the first match.",
         validate_default=False,
     )
+    every: Duration | None = Field(
+        None,
+        description="Longest time without such a line while messages come; by default any.",
+    )
 
 
 @check("log.follows", Subject.RECORDING, Follows)
@@ -72,7 +78,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     publisher does not offer; an executor that never spins or that a callback blocks; other values
     (another beam of a scan, the nearest of all, z instead of y, centimetres, too few decimals); two
     fields under each other's names; values that are logged only in the callback of another topic;
-    and a callback that logs nothing.
+    a callback that logs nothing, and one that logs too seldom.
     """
     expected = (
         f"log lines that show {codes(parameters.fields)} of messages on {code(parameters.topic)}, "
@@ -105,6 +111,11 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     within_ns = round(parameters.within * NS)
     found = echoes(recording, wanted, parameters.decimals, within_ns)
     if len(found) >= parameters.at_least:
+        if parameters.every is not None:
+            begin_ns, end_ns = _longest_gap(recording, wanted, found)
+            gap_s = (end_ns - begin_ns) / NS
+            if gap_s - recording.taken_s(begin_ns, end_ns) > parameters.every:
+                return _too_seldom(recording, parameters, expected, begin_ns, gap_s)
         return _passed(recording, parameters, expected, found, len(messages))
     return why_not_logged(
         recording,
@@ -115,6 +126,33 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         decimals=parameters.decimals,
         within_ns=within_ns,
     ).finding(expected)
+
+
+def _longest_gap(
+    recording: Recording, wanted: Sequence[Wanted], found: Sequence[Echo]
+) -> tuple[int, int]:
+    """Begin and end of the longest time without a line while messages came."""
+    begin_ns, end_ns = wanted[0].due_ns, wanted[-1].due_ns
+    written = (echo.lines[-1].time_ns for echo in found)
+    times = [begin_ns, *(min(time_ns, end_ns) for time_ns in written), end_ns]
+    return max(
+        pairwise(times),
+        key=lambda gap: (gap[1] - gap[0]) / NS - recording.taken_s(gap[0], gap[1]),
+    )
+
+
+def _too_seldom(
+    recording: Recording, parameters: Follows, expected: str, begin_ns: int, gap_s: float
+) -> Finding:
+    begin_s = recording.since_launch_s(begin_ns)
+    assert parameters.every is not None
+    return Finding.failed(
+        f"{expected}, and never longer than {format_duration(parameters.every)} without one",
+        f"no such line for {format_duration(gap_s)}, from {begin_s:.2f} s after launch on, "
+        f"although messages came on {code(parameters.topic)}",
+        "Log in every call of the callback, or at least once in a second.",
+        Evidence(moments=(Moment("no line from here on", begin_s),)),
+    )
 
 
 def _passed(

@@ -5,19 +5,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from grader.assignment.unit import format_duration
-from grader.checks.blockage import HINT, first_unanswered, where_blocked, why_never_spun
+from grader.checks.blockage import (
+    HINT,
+    first_unanswered,
+    long_wait,
+    where_blocked,
+    why_never_spun,
+)
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_no_history, why_not_delivered
 from grader.checks.echo import Echo, Wanted, echoes, output_lines, shown
+from grader.checks.field import number_at
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.misreading import explain
-from grader.checks.printed import exchanged, logged_text, numbers, quote
+from grader.checks.printed import exchanged, logged_text, numbers, quote, unfilled
 from grader.checks.sighting import first_seen
 from grader.checks.wording import code, codes, counted, listing, value_text
 from grader.recording.model import NS, Kind, LogLine, Recording
 
 _LOG_LINES = 5
+# A node whose callbacks return at once answers a call to its parameter services sooner.
+_SLOW_S = 0.5
 # Share of the time that the host may take before silence says nothing any more.
 _STARVED = 0.5
 
@@ -75,7 +84,8 @@ def why_not_logged(
         return _few(recording, topic, wanted, found)
     near = _near(recording, wanted, within_ns)
     return (
-        _elsewhere(recording, topic, wanted, near, decimals)
+        _behind(recording, topic, wanted, near, decimals, within_ns)
+        or _elsewhere(recording, topic, wanted, near, decimals)
         or _other_values(recording, topic, wanted, near, decimals)
         or _silent(recording, topic)
     )
@@ -143,9 +153,23 @@ def _few(
 ) -> Cause:
     times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
-    return Cause(
+    seen = (
         f"log lines follow only {len(found)} of {counted(len(wanted), 'message')} on "
-        f"{code(topic)}, written {written} after launch",
+        f"{code(topic)}, written {written} after launch"
+    )
+    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
+    waited = long_wait(recording, nodes)
+    if waited is not None and waited[1] > _SLOW_S:
+        call, wait_s = waited
+        moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
+        return Cause(
+            f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
+            f"service waited {format_duration(wait_s)} and more",
+            HINT,
+            Evidence(moments=(moment,)),
+        )
+    return Cause(
+        seen,
         "Log in every call of the callback, or at least once in a second.",
         Evidence(
             moments=tuple(Moment(f"logged a message on {topic}", time_s) for time_s in times_s),
@@ -158,6 +182,51 @@ def _near(recording: Recording, wanted: Sequence[Wanted], within_ns: int) -> lis
     """Lines that could have been an answer to a message."""
     begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + within_ns
     return [line for line in output_lines(recording) if begin_ns <= line.time_ns <= end_ns]
+
+
+def _behind(
+    recording: Recording,
+    topic: str,
+    wanted: Sequence[Wanted],
+    near: Sequence[LogLine],
+    decimals: int,
+    within_ns: int,
+) -> Cause | None:
+    """The lines show messages that had come long before: the callback takes too long for them."""
+    paths = list(wanted[-1].values)
+    carried = [
+        Wanted(
+            message,
+            {path: number_at(message.value, path) for path in paths},
+            wanted[-1].ready_ns,
+        )
+        for message in recording.carried(topic)
+    ]
+    for line in reversed(near):
+        printed = numbers(line.text)
+        old = [
+            item
+            for item in carried
+            if item.message.stamp_ns <= line.time_ns
+            and shown(printed, item, decimals) == set(item.values)
+        ]
+        if not old:
+            continue
+        late_ns = line.time_ns - old[-1].due_ns
+        if late_ns <= within_ns:
+            return None
+        late = format_duration(late_ns / NS)
+        return Cause(
+            f"the log lags behind the messages on {code(topic)}: {quote(line.text)} was written "
+            f"{late} after that message had come, and newer ones wait",
+            "A callback must return at once: look for time.sleep(), input() or a loop in one of "
+            "the callbacks. What comes meanwhile waits for its end.",
+            Evidence(
+                moments=(Moment("logged too late", recording.since_launch_s(line.time_ns)),),
+                log=tuple(line.text for line in near[:_LOG_LINES]),
+            ),
+        )
+    return None
 
 
 def _elsewhere(
@@ -205,6 +274,18 @@ def _other_values(
     values = listing(f"{code(path)} = {_rounded(item.values[path], decimals)}" for path in missing)
     # A line with numbers is more likely to be meant than one without.
     told = next((line for line in reversed(near) if numbers(line.text)), near[-1])
+    braces = unfilled(told.text)
+    if braces is not None:
+        return Cause(
+            f"log lines follow messages on {code(topic)}, but they show {code(braces)} instead of "
+            f"a value: {quote(told.text)}",
+            "Python fills in braces only where an f stands before the quotes: "
+            "f'... {value}' instead of '... {value}'.",
+            Evidence(
+                moments=(Moment("other values logged", recording.since_launch_s(told.time_ns)),),
+                log=tuple(line.text for line in near[:_LOG_LINES]),
+            ),
+        )
     pair = exchanged("\n".join(logged_text(line.text) for line in near), item.values, decimals)
     reason = (
         f"names the one where it shows the other: {listing(map(code, pair))} are exchanged"
@@ -241,7 +322,7 @@ def _silent(recording: Recording, topic: str) -> Cause:
         f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
         f"type and its QoS match{spins}{other}",
         "Call self.get_logger().info(...) or print(...) in the callback. What debug() logs is not "
-        "shown by default, and an `except: pass` hides an error.",
+        "shown by default, an `except: pass` hides an error, and an `if` may leave messages out.",
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
             log=tuple(line.text for line in output_lines(recording)[:_LOG_LINES]),

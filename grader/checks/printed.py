@@ -15,6 +15,14 @@ _NUMBER = re.compile(
 )
 # `1,37` as some locales write it. In `(1,37)` it could be two numbers as well: both are tried.
 _DECIMAL_COMMA = re.compile(r"(?<![0-9.,])[-+]?[0-9]+,[0-9]+(?![0-9.,])")
+# `123,456` and `123_456`, as the format specifications `,` and `_` write it.
+_GROUPED = re.compile(
+    r"(?<![0-9.,_])[-+]?[0-9]{1,3}([,_])[0-9]{3}(?:\1[0-9]{3})*(?:\.[0-9]+)?(?![0-9,_])"
+)
+# Typographers' sign, which some locales and tables write.
+_MINUS = "\N{MINUS SIGN}"
+# `{position.x:.2f}` as it stands in the source.
+_UNFILLED = re.compile(r"\{[A-Za-z_][^{}\s\"',]*\}")
 # `x = 1.37`, `y: -0.62`, `"x": 1.37`: a name and its number with nothing but such signs between.
 _NAMED = re.compile(
     r"""(?<![A-Za-z0-9_])(?P<name>[A-Za-z_]\w*)["']?[ \t]*[:=][ \t]*(?P<number>"""
@@ -46,7 +54,7 @@ def numbers(line: str) -> tuple[float, ...]:
     Args:
         line: Any text; the prefix of a ROS logger is left out.
     """
-    text = logged_text(line)
+    text = logged_text(line).replace(_MINUS, "-")
     found: list[float] = []
     for match in _NUMBER.finditer(text):
         number = float(match[0])
@@ -55,7 +63,18 @@ def numbers(line: str) -> tuple[float, ...]:
         if match[0].startswith("-") and text[: match.start()][-1:].isalnum():
             found.append(-number)
     found += [float(match[0].replace(",", ".")) for match in _DECIMAL_COMMA.finditer(text)]
+    found += [float(match[0].replace(match[1], "")) for match in _GROUPED.finditer(text)]
     return tuple(found)
+
+
+def unfilled(line: str) -> str | None:
+    """What stands in braces in a line where a value should: the text of an f-string without its f.
+
+    Args:
+        line: Any text; `{"x": 1.0}` and `{1.0}` are no such braces.
+    """
+    found = _UNFILLED.search(logged_text(line))
+    return found[0] if found else None
 
 
 def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[str, str] | None:
@@ -72,7 +91,7 @@ def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[st
         The two paths, or None.
     """
     named: dict[str, list[float]] = {}
-    for match in _NAMED.finditer(logged_text(text)):
+    for match in _NAMED.finditer(logged_text(text).replace(_MINUS, "-")):
         named.setdefault(match["name"].lower(), []).append(float(match["number"]))
     for one, other in combinations(values, 2):
         of_one, of_other = named.get(_last(one), []), named.get(_last(other), [])

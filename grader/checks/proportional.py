@@ -10,7 +10,7 @@ from pydantic import Field
 
 from grader.assignment.quantity import Frequency, PositiveLength, Ratio
 from grader.checks.answer import MOST_BEHIND, answers
-from grader.checks.approach import Approach, approach, why_not_there
+from grader.checks.approach import Approach, approach
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.command import command_topic
@@ -19,6 +19,7 @@ from grader.checks.immobility import why_cut_short
 from grader.checks.law import Law, Sample, Verdict, examine
 from grader.checks.measure import metres
 from grader.checks.misread_yaw import misread_yaw
+from grader.checks.missed_goal import why_not_there
 from grader.checks.reference import GoalPose
 from grader.checks.silence import why_silent
 from grader.checks.steering import LEAST_SAMPLES, at_the_goal, on_the_way

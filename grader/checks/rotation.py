@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -22,11 +23,11 @@ from grader.checks.conversion import (
 )
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_not_delivered
-from grader.checks.finding import Evidence, Finding
+from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.messages import published
 from grader.checks.rotation_case import Case, Limits, cases
 from grader.checks.rotation_evidence import evidence_of, right_words, shown
-from grader.checks.rotation_slip import explain
+from grader.checks.rotation_slip import explain, wrong_part
 from grader.checks.sighting import first_seen
 from grader.checks.silence import why_silent
 from grader.checks.slip import was_integer
@@ -40,6 +41,8 @@ _TIME_TO_ANSWER_S = 0.25
 # Share of the answers that must belong to the question before to say so.
 _STALE = 0.8
 _AT_ONCE_S = 0.05
+# A callback that converts answers within some ms; one that takes longer holds up the questions.
+_SLOW_S = 0.05
 # One that publishes a first message when it is created does no harm.
 _GREETINGS = 2
 
@@ -139,7 +142,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
         evidence = replace(evidence, moments=first_seen(recording, received))
         return _unasked(parameters, unasked, evidence)
     if len(judged) < parameters.at_least:
-        return _too_few(recording, parameters, judged).finding(expected)
+        return _too_few(recording, parameters, found, judged).finding(expected)
     return Finding.passed(expected, _summary(judged), evidence)
 
 
@@ -226,9 +229,25 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
             "Compute the answer in the callback from the message that it is called with, and set "
             "the fields before you publish; a new Quaternion has w = 1, all else is 0.",
         )
-    if all(case.group is Group.GIMBAL_LOCK for case in wrong):
-        # There, several mistakes give the same, and so does the usual formula by rounding errors.
+    if all(case.group in (Group.GIMBAL_LOCK, Group.ZERO) for case in wrong):
+        # There, several mistakes give the same: at gimbal lock the usual formula does so by
+        # rounding errors, and of a zero axis nothing is left that could be normalized.
         return _by_kind(wrong)
+    if all(case.group is Group.SCALED and _none(case.answers[0].row) for case in wrong):
+        return (
+            "the answer is no rotation at all",
+            "Only a length of 0 is no rotation. A short axis or quaternion has a direction too: "
+            "do not take it for a zero one, and divide it by its length.",
+        )
+    if parameters.conversion == "quaternion_to_rpy" and all(
+        math.isclose(abs(answer[1]), 0.5 * math.pi, abs_tol=1e-6) for _, answer in bad
+    ):
+        return (
+            "they are answered as at gimbal lock, with a pitch of 90 deg or -90 deg, but are not "
+            "there",
+            "Test for gimbal lock right at it only: abs(sin_pitch) > 0.9999999. At 0.99 the pitch "
+            "is 82 deg.",
+        )
     questions = np.array([question for question, _ in bad])
     found = explain(
         parameters.conversion,
@@ -240,11 +259,18 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
         slip, share = found
         of = f"all {len(bad)}" if share == 1.0 else f"{round(share * len(bad))} of {len(bad)}"
         return f"{slip.words} (that gives {of} of these answers)", slip.hint
-    return _by_kind(wrong)
+    part = wrong_part(parameters.conversion, questions, np.array([row for _, row in bad]))
+    return part or _by_kind(wrong)
+
+
+def _none(row: tuple[float, ...]) -> bool:
+    """Whether an answer says that nothing turns."""
+    return row in ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
 
 def _by_kind(wrong: list[Case]) -> tuple[str, str]:
-    if all(case.answers[0].error_rad < 1e-3 for case in wrong):
+    nothing = all(case.group is Group.ZERO for case in wrong)
+    if not nothing and all(case.answers[0].error_rad < 1e-3 for case in wrong):
         lengths = [case.answers[0].length for case in wrong if case.answers[0].length]
         return (
             f"the rotation is right, but the quaternion's length is not 1 (it is "
@@ -323,14 +349,35 @@ def _starved(recording: Recording, case: Case) -> bool:
     return left_s - recording.taken_s(case.asked_ns, recording.stop_ns) < _TIME_TO_ANSWER_S
 
 
-def _too_few(recording: Recording, parameters: Answers, judged: list[Case]) -> Cause:
+def _too_few(
+    recording: Recording, parameters: Answers, found: Sequence[Case], judged: list[Case]
+) -> Cause:
     seen = f"only {counted(len(judged), 'case')} of {parameters.at_least} could be sent"
     ended = dead(recording)
     if ended:
         return cause_of_death(recording, ended[0]).after(seen)
-    if any(case.behind_s is not None for case in judged):
+    if any(case.behind_s is not None for case in found) or _is_slow(recording, found):
         return Cause(
             f"{seen}, because the answers come late",
             "A callback must return soon: no time.sleep() and no loop that waits.",
+            Evidence(
+                moments=tuple(
+                    Moment(f"case {case.number} is sent", recording.since_launch_s(case.asked_ns))
+                    for case in found[:2]
+                )
+            ),
         )
     return Cause(seen, ours=True, disturbed=True)
+
+
+def _is_slow(recording: Recording, found: Sequence[Case]) -> bool:
+    """Whether the node takes its time for the answers, beyond what the machine took from it.
+
+    The next question follows the answer, so that the times between questions tell.
+    """
+    answered = [case for case in found if case.answers]
+    if len(answered) < 2:
+        return False
+    begin_ns, end_ns = answered[0].asked_ns, answered[-1].asked_ns
+    own_s = (end_ns - begin_ns) / NS - recording.taken_s(begin_ns, end_ns)
+    return own_s / (len(answered) - 1) > _SLOW_S

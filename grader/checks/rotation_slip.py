@@ -28,6 +28,13 @@ Flags = NDArray[np.bool_]
 _EXPLAINS = 0.9
 # Of a component of a quaternion, in addition to the tolerance.
 _COMPONENT = 1e-5
+# Between an angle that is right and one that is not.
+_ANGLE_RAD = 1e-3
+_ANGLES = (
+    ("roll", "atan2(2 (w x + y z), 1 - 2 (x x + y y))"),
+    ("pitch", "asin(2 (w y - z x))"),
+    ("yaw", "atan2(2 (w z + x y), 1 - 2 (y y + z z))"),
+)
 _HALF_HINT = (
     "A quaternion holds half of the angle: vector part = sin(angle / 2) times the unit axis, "
     "w = cos(angle / 2)."
@@ -94,6 +101,29 @@ def explain(
     return best
 
 
+def wrong_part(conversion: str, questions: Rows, answers: Rows) -> tuple[str, str] | None:
+    """The only one of roll, pitch and yaw that is wrong, as a clause and what to try.
+
+    Args:
+        conversion: Its name.
+        questions: Of the wrong cases, shape (n, k).
+        answers: The wrong answers, finite, shape (n, l).
+
+    Returns:
+        None where more than one of them is wrong, and for what is no conversion to angles.
+    """
+    if conversion != "quaternion_to_rpy" or not len(questions):
+        return None
+    off = answers - rpy_of(unit_quaternions(questions))
+    off = np.abs(np.remainder(off + np.pi, 2.0 * np.pi) - np.pi)
+    bad = [index for index in range(3) if np.mean(off[:, index] > _ANGLE_RAD) > 1.0 - _EXPLAINS]
+    if len(bad) != 1:
+        return None
+    name, formula = _ANGLES[bad[0]]
+    others = " and ".join(other for other, _ in _ANGLES if other != name)
+    return f"{others} are right, the {name} is not", f"Compare term by term: {name} = {formula}."
+
+
 def _same(given: Rows, answers: Rows, tolerance_rad: float) -> Flags:
     """Which answers are those that are given, row by row."""
     if answers.shape[1] != 4:
@@ -152,6 +182,10 @@ def _angle_scaled(factor: float) -> Callable[[Rows], Rows]:
         return _right_quaternion(np.column_stack((rows[:, :3], factor * rows[:, 3])))
 
     return formula
+
+
+def _angle_without_sign(rows: Rows) -> Rows:
+    return _right_quaternion(np.column_stack((rows[:, :3], np.abs(rows[:, 3]))))
 
 
 def _length(rows: Rows) -> Rows:
@@ -237,6 +271,9 @@ _AXIS_ANGLE = (
          _w_first(_right_quaternion)),
     Slip("the fields are in a wrong order: x, y, z, w hold y, z, w, x", _ORDER_HINT,
          _w_moved(_right_quaternion)),
+    # Before the conjugate: where the angle is negative it gives the same rotation.
+    Slip("the angle has lost its sign", "A negative angle turns the other way: leave it negative, "
+         "without abs().", _angle_without_sign),
     Slip("it is the conjugate, the inverse rotation", _INVERSE_HINT,
          _conjugate(_right_quaternion)),
     Slip("the angle is converted as if it came in degrees", _RADIANS_HINT,

@@ -201,6 +201,16 @@ def _explanation(
             f"{value_text(_plain(step))}",
             "Change the value once for every message, by what is asked for.",
         )
+    # Where a value only stands twice, what comes next is not begun anew.
+    once = [found[0], *(item for item, grown in zip(found[1:], steps, strict=True) if grown)]
+    if len(once) < len(found) and all(
+        same(b - a, step, parameters.tolerance) for a, b in pairwise(once)
+    ):
+        return (
+            f": message {steps.index(0) + 2} repeats the value before it",
+            "Publish once each time the value has changed: is publish(msg) there twice, or do two "
+            "timers or two publishers send it?",
+        )
     again = [
         index
         for index, item in enumerate(found)

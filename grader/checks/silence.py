@@ -13,7 +13,7 @@ from grader.checks.finding import Evidence, Moment
 from grader.checks.sighting import endpoints_seen, until_the_end
 from grader.checks.standing_clock import why_time_stands_still
 from grader.checks.topic_absence import why_no_endpoint
-from grader.checks.unanswered import why_raised
+from grader.checks.unanswered import why_never_awaited, why_raised
 from grader.checks.wording import code, codes, counted, listing
 from grader.recording.model import NS, Endpoint, Kind, LogLine, Owner, Recording
 from grader.submission.record import SourceError
@@ -62,6 +62,7 @@ def why_silent(recording: Recording, topic: str) -> Cause:
         or why_never_spun(recording, f"no message on {code(topic)}")
         or why_time_stands_still(recording, f"no message on {code(topic)}")
         or _blocked(recording, topic)
+        or why_never_awaited(recording, f"no message on {code(topic)}")
         or _prints(recording, topic)
         or _unanswered(recording, topic, asked)
         or _idle(recording, topic)

@@ -110,6 +110,13 @@ def mistakes(value: SourceValue, message: Mapping[str, Any]) -> Iterator[tuple[s
         yield f"`{value.path}` with the wrong sign", -right
         yield f"`{value.path}` without its sign, as of math.hypot() or abs()", abs(right)
         yield f"`{value.path}` in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
+        yield (
+            f"100 times `{value.path}`, as in centimetres: ROS has metres (REP-103)",
+            100.0 * right,
+        )
+        whole = f"`{value.path}` as a whole number, as of int(), round() or //"
+        for rounded in (round, math.trunc, math.floor):
+            yield whole, float(rounded(right)) if math.isfinite(right) else right
     for path, number in leaves(message).items():
         if path != value.path and isinstance(number, int | float):
             yield f"`{path}`", float(number)

@@ -33,7 +33,8 @@ _LATE_HINT = (
 )
 _OTHER_LIMIT_HINT = (
     "It answered these scans with a command to drive: which number does the callback compare the "
-    "front range with? Ranges are in metres, and -inf is nearer than the LiDAR can measure."
+    "front range with? Ranges are in metres, -inf is nearer than the LiDAR can measure, and an "
+    "average of several scans comes late."
 )
 # A callback that sleeps, or a slow timer, answers fewer scans than come.
 _ANSWERED = 3

@@ -9,7 +9,7 @@ from itertools import pairwise
 from pydantic import Field
 
 from grader.assignment.quantity import Angle, PositiveLength, Speed
-from grader.checks.approach import Approach, approach, why_not_there
+from grader.checks.approach import Approach, approach
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.contact import why_touched
@@ -17,6 +17,7 @@ from grader.checks.detour import WRAP_HINT, Detour, away
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.immobility import why_cut_short
 from grader.checks.measure import degrees, metres, speed
+from grader.checks.missed_goal import why_not_there
 from grader.checks.reference import GoalPose
 from grader.checks.track import speed_plot
 from grader.checks.wording import counted

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.blockage import why_never_spun
@@ -9,10 +11,12 @@ from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead, ended_early
 from grader.checks.failure import interrupted_place, parse_failures, student_place
 from grader.checks.finding import Evidence, Moment
+from grader.checks.wording import code
 from grader.recording.model import NS, Process, Recording
 
 _LIST_PARAMETERS = "/list_parameters"
 _LOG_LINES = 10
+_NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]+)' was never awaited")
 
 
 def why_unanswered(
@@ -128,6 +132,31 @@ def why_raised(recording: Recording, what: str, process: Process, begin_ns: int)
             log=tuple(line.text for line in lines[-_LOG_LINES:]),
         ),
     )
+
+
+def why_never_awaited(recording: Recording, what: str) -> Cause | None:
+    """A coroutine that was made but never run, as Python warns; None if there is no such warning.
+
+    Args:
+        recording: The run.
+        what: What came of it, in words.
+    """
+    for line in recording.log:
+        found = _NEVER_AWAITED.search(line.text) if line.stream == "stderr" else None
+        if found:
+            name = found[1].rpartition(".")[2]
+            return Cause(
+                f"{what}: Python warns that the coroutine {code(found[1])} was never awaited, so "
+                "nothing of it ran",
+                f"A function that begins with `async def` runs only under await: await "
+                f"self.{name}(...). Where nothing is awaited in it, write def instead of async def "
+                "(an EventsExecutor awaits no callback of a subscription).",
+                Evidence(
+                    moments=(Moment("the warning", recording.since_launch_s(line.time_ns)),),
+                    log=(line.text,),
+                ),
+            )
+    return None
 
 
 def _in_process(

@@ -95,7 +95,8 @@ def _incomplete(
             f"{code(name)} reported {counted(begun, 'start')}, but {ended or 'no'} "
             f"{'end' if ended == 1 else 'ends'}",
             "Publish the end as the last thing in the callback; it must return. Look for a loop, "
-            "a long time.sleep (it takes seconds) and an exception.",
+            "a long time.sleep (it takes seconds), an exception, and rate.sleep(), which waits for "
+            "ever in a callback of the only thread.",
             evidence,
         )
     if name in reports.orphans:

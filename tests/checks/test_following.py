@@ -191,6 +191,29 @@ class TestExplains:
         subject = replace(subject, messages={**subject.messages, ODOM: sources})
         assert "without its sign" in told(subject)
 
+    @pytest.mark.parametrize(
+        ("seen", "words"),
+        [
+            (lambda x: 100.0 * x, "100 times `pose.pose.position.x`, as in centimetres"),
+            (lambda x: float(round(x)), "as a whole number"),
+            (lambda x: float(int(x)), "as a whole number"),
+            (lambda x: float(math.floor(x)), "as a whole number"),
+        ],
+    )
+    def test_a_value_in_another_form(self, seen, words):
+        def sent(time_s):
+            position = {"x": 3.3 * place(time_s)[0], "y": place(time_s)[1], "z": 0.0}
+            shown = odometry(time_s)
+            return {**shown, "pose": {"pose": {**shown["pose"]["pose"], "position": position}}}
+
+        sources = tuple(
+            message(t, sent(t), sequence=n, topic=ODOM, type="nav_msgs/msg/Odometry")
+            for n, t in enumerate(TIMES, start=1)
+        )
+        subject = run(lambda t: status(seen(3.3 * place(t)[0]), *place(t)[1:]))
+        subject = replace(subject, messages={**subject.messages, ODOM: sources})
+        assert words in told(subject)
+
     def test_fields_that_are_swapped(self):
         found = told(run(lambda t: status(place(t)[2], place(t)[1], place(t)[0])))
         assert "`pose.x`" in found and "it is `twist.twist.linear.x`" in found

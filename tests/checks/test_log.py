@@ -118,6 +118,7 @@ class TestAnyFormatIsRight:
             "x:1.37y:-0.62",
             '{"x": 1.372, "y": -0.618}',
             "x: 1,37; y: -0,62",
+            "x = 1.37, y = \N{MINUS SIGN}0.62",
             "1.372e+00|-6.18e-01",
             "geometry_msgs.msg.Point(x=1.372, y=-0.618, z=0.0)",
             "x: 1.372\ny: -0.618",
@@ -152,6 +153,19 @@ class TestAnyFormatIsRight:
         finding = judge("log.follows", run(lines(text, SCAN_TIMES_S)), **FRONT)
         assert finding.status is Status.PASSED, finding
 
+    @pytest.mark.parametrize("text", ["765,072", "765_072", "Received: 765,072.", "n=+765_072.0"])
+    def test_of_a_number_whose_digits_are_grouped(self, text):
+        value = {**scan(), "ranges": [765072.0, *RANGES[1:]]}
+        changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
+        grouped = run(lines(text, SCAN_TIMES_S), messages=changed)
+        assert judge("log.follows", grouped, **FRONT).status is Status.PASSED
+
+    @pytest.mark.parametrize("text", ["765,07", "1765,072", "765,0722", "765_072_1", "0.765,072"])
+    def test_other_digits_are_no_groups(self, text):
+        value = {**scan(), "ranges": [765072.0, *RANGES[1:]]}
+        changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
+        assert "none shows" in front(lines(text, SCAN_TIMES_S), messages=changed)
+
     def test_on_stdout_too(self):
         log = tuple(replace(line, stream="stdout") for line in lines("1.37 -0.62", ODOM_TIMES_S))
         assert judge("log.follows", run(log), **POSITION).status is Status.PASSED
@@ -180,6 +194,15 @@ class TestAnyRhythmIsRight:
         assert "log lines follow only 1 of 6 messages on `/odom`" in found
         assert "Log in every call of the callback" in found
 
+    def test_a_callback_that_sleeps_keeps_the_others_waiting(self):
+        log = lines("1.83", [3.9])
+        slow = front(log, calls=tuple(call(0.5 * n, 1.0, of=BOT) for n in range(1, 7)))
+        assert "only 1 of 6 messages on `/scan`" in slow
+        assert "the node's parameter service waited 1 s and more" in slow
+        assert "time.sleep()" in slow
+        lost = (*(call(0.5 * n, of=BOT) for n in range(2, 7)), call(0.5, None, of=BOT))
+        assert "waited" not in front(log) and "waited" not in front(log, calls=lost)
+
     def test_values_that_change_must_be_those_of_the_message(self):
         values = [odometry(x=1.0 + 0.1 * index) for index in range(6)]
         changed = tuple(
@@ -198,11 +221,42 @@ class TestAnyRhythmIsRight:
             "log.follows", run(stale, messages={"/odom": changed}), **POSITION
         )
 
+    def test_lines_that_come_too_seldom(self):
+        once = [1.0 + 0.2 * index for index in range(16)]
+        messages = {"/odom": sent("/odom", ODOMETRY, odometry(), once)}
+        asked = {**POSITION, "every": "1.5 s"}
+        for times_s in ([1.0, 2.0, 3.0, 4.0], [1.9, 2.9, 3.9], [2.4, 3.8]):
+            run_ = run(lines("1.37 -0.62", times_s), messages=messages)
+            assert judge("log.follows", run_, **asked).status is Status.PASSED
+        for times_s, since in (([1.0, 3.0], "1.01"), ([2.8, 3.4], "1.00"), ([1.0, 2.2], "2.21")):
+            seldom = run(lines("1.37 -0.62", times_s), messages=messages)
+            found = failing("log.follows", seldom, **asked)
+            assert f"from {since} s after launch on" in found
+            assert "Log in every call" in found
+        machine = run(
+            lines("1.37 -0.62", [1.0, 3.0]), messages=messages,
+            disturbance=taken(1.0, 3.0, waited_s=0.8),
+        )  # fmt: skip
+        assert judge("log.follows", machine, **asked).status is Status.PASSED
+
     def test_a_line_must_come_soon(self):
         late = lines("1.83", SCAN_TIMES_S, delay_s=0.15)
         assert judge("log.follows", run(late), **FRONT).status is Status.PASSED
         finding = judge("log.follows", run(late), **FRONT, within="100 ms")
         assert finding.status is Status.FAILED
+
+    def test_a_callback_that_sleeps_lags_behind(self):
+        changed = tuple(
+            message(t, odometry(x=1.0 + 0.1 * index), topic="/odom", type=ODOMETRY)
+            for index, t in enumerate(ODOM_TIMES_S)
+        )
+        # 0.7 s for each: the first is shown 0.7 s, the second 1.2 s after it came.
+        log = (*lines("1.0 -0.62", [1.7]), *lines("1.1 -0.62", [2.4]))
+        found = failing("log.follows", run(log, messages={"/odom": changed}), **POSITION)
+        assert "the log lags behind the messages on `/odom`: `1.1 -0.62` was written 1.21 s" in (
+            found
+        )
+        assert "time.sleep()" in found
 
 
 class TestOtherValues:
@@ -278,6 +332,23 @@ class TestOtherValues:
         changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
         found = front(lines("mean inf", SCAN_TIMES_S), messages=changed)
         assert "`mean inf`" in found and "which shows" not in found
+
+    @pytest.mark.parametrize(
+        ("text", "braces"),
+        [
+            ("x = {p.x:.2f}, y = {p.y:.2f}", "{p.x:.2f}"),
+            ("[INFO] [1700000000.1] [bot]: at {msg.pose.pose.position!r}", "{msg.pose"),
+            ("{self.where()} {y}", "{self.where()}"),
+        ],
+    )
+    def test_an_f_string_without_its_f(self, text, braces):
+        found = position(lines(text, ODOM_TIMES_S))
+        assert f"they show `{braces}" in found and "instead of a value" in found
+        assert "an f stands before the quotes" in found
+
+    @pytest.mark.parametrize("text", ['{"x": 9.5}', "{'y': 9.5}", "{9.5}", "{}"])
+    def test_other_braces_are_no_f_string(self, text):
+        assert "an f stands" not in position(lines(text, ODOM_TIMES_S))
 
     def test_text_without_numbers(self):
         found = front(lines("[INFO] [1700000000.1] [bot]: Scan received", SCAN_TIMES_S))

@@ -1,6 +1,7 @@
 """Reaching a goal with a proportional controller, on runs of the real simulator core."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import example, given, settings
@@ -9,6 +10,8 @@ from hypothesis import strategies as st
 from grader.checks.finding import Status
 from grader.checks.law import Sample, examine
 from tests.checks.builder import (
+    INSTALLED,
+    SOURCE,
     died,
     drive,
     failing,
@@ -305,6 +308,44 @@ class TestMistakes:
         said = failing("motion.path_length", run, goal=yaml(BEHIND), most="180 %")
         assert "it drives backwards" in said and "math.hypot(dx, dy)" in said
 
+    @pytest.mark.parametrize("start", [(0.0, 0.0, 0.0), (0.3, -0.4, 0.5)])
+    @pytest.mark.parametrize("origin", ["its start", "the origin"])
+    def test_a_direction_that_is_never_computed_anew(self, start, origin):
+        x, y = start[:2] if origin == "its start" else (0.0, 0.0)
+        direction = math.atan2(GOAL[1] - y, GOAL[0] - x)
+
+        def fixed(pose):
+            return 0.22, clamp(1.5 * wrap(direction - pose.yaw_rad), 2.84)
+
+        pose = [start[0], start[1], f"{start[2]} rad"]
+        run = drive(on_odometry(fixed), seconds=30, options={"robot": {"pose": pose}})
+        said = failing("motion.path_length", run, goal=yaml(GOAL), position="2 cm", most="40 %")
+        assert "it keeps to one direction" in said and "anew with each odometry" in said
+
+    def test_a_loop_in_the_callback(self):
+        interrupted = (
+            "Traceback (most recent call last):\n"
+            '  File "/opt/ros/jazzy/lib/site-packages/rclpy/executors.py", line 9, in f\n'
+            "    await call_coroutine()\n"
+            f'  File "{INSTALLED}", line 14, in odom_callback\n'
+            "    time.sleep(0.1)\n"
+            "KeyboardInterrupt"
+        )
+        run = drive(lambda _: (0.2, 1.0), seconds=30)
+        run = replace(run, log=output(interrupted, time_s=30.0))
+        said = failing("motion.path_length", run, goal=yaml(GOAL), most="40 %")
+        assert f"a callback did not return, it was at {SOURCE}:14" in said
+        assert "compute one command for each" in said
+
+    def test_a_command_that_is_computed_once(self):
+        run = drive(lambda _: (0.2, 0.8), seconds=20)
+        said = failing("motion.path_length", run, goal=yaml(GOAL), position="2 cm", most="40 %")
+        assert "every command is the same, linear.x = 0.2 m/s and angular.z = 0.8 rad/s" in said
+        assert "A loop in a callback never sees a newer one" in said
+        limit = drive(lambda _: (0.2, 2.84), seconds=20)
+        said = failing("motion.path_length", limit, goal=yaml(GOAL), position="2 cm", most="40 %")
+        assert "every command is the same" not in said
+
     def test_half_a_turn_taken_for_no_error(self):
         def by_half_turns(error):
             return (error + math.pi / 2) % math.pi - math.pi / 2
@@ -478,8 +519,8 @@ def test_a_yaw_that_knows_half_of_the_circle_is_named():
 
 
 def test_a_robot_that_turns_on_and_on_is_told_to_look_at_its_yaw():
-    """Its commands are all the same, and say nothing of what it took for its yaw."""
-    run = run_to((0.6, 0.4, 1.0), law=lambda _: 0.5)
+    """Its commands follow nothing, and say nothing of what it took for its yaw."""
+    run = run_to((0.6, 0.4, 1.0), law=lambda error: 0.5 + 0.1 * math.sin(20.0 * error))
     finding = judge("motion.reaches", run, goal=yaml((0.6, 0.4, 1.0)), **REACHES)
     assert "times around, always to the" in finding.observed
     assert "x, y, z, w" in finding.hint

@@ -1,6 +1,7 @@
 """Driving ahead and stopping in front of an obstacle, on runs of the real simulator core."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from grader.checks.finding import Status
 from grader.recording.model import Incident, Kind, Owner, Qos
 from tests.checks.builder import (
+    INSTALLED,
     Senses,
     at,
     declarations,
@@ -233,6 +235,44 @@ class TestStops:
         run = drive(on_scan(lambda ranges: good([ranges[270]])), world=WALL, seconds=12)
         said = failing("motion.no_contact", run)
         assert "It went on deciding to drive" in said and "sent" not in said
+
+    def test_two_places_that_publish(self):
+        def law(senses: Senses):
+            if senses.new_scan and senses.scan is not None and senses.scan.ranges_m[0] <= 0.2:
+                return (0.0, 0.0)
+            return (0.1, 0.0)
+
+        said = failing("motion.no_contact", drive(law, world=WALL, seconds=12))
+        assert "commands in the last second were to stop" in said
+        assert "Two places publish" in said
+
+    @pytest.mark.parametrize(
+        ("caller", "words"),
+        [("rclpy/executors.py", "a callback did not return, it was at"), ("threading.py", "log")],
+    )
+    def test_a_loop_in_a_callback_and_one_in_main(self, caller, words):
+        interrupted = (
+            "Traceback (most recent call last):\n"
+            f'  File "/opt/ros/jazzy/lib/python3.12/site-packages/{caller}", line 9, in f\n'
+            "    go()\n"
+            f'  File "{INSTALLED}", line 14, in scan_callback\n'
+            "    time.sleep(0.1)\n"
+            "KeyboardInterrupt"
+        )
+        run = drive(on_scan(lambda _: (0.1, 0.0)), world=WALL, seconds=12)
+        run = replace(run, log=output(interrupted, time_s=12.0))
+        said = failing("motion.no_contact", run)
+        assert words in said
+        assert ("A loop in a callback never sees a newer scan" in said) == ("rclpy" in caller)
+
+    def test_a_robot_that_is_told_to_stop_now_and_then(self):
+        def law(senses: Senses):
+            # For 0.1 s of every 0.2 s: too short to come to rest.
+            return (0.1 if senses.time_s % 0.2 < 0.15 else 0.0, 0.0)
+
+        said = failing("motion.drives", drive(law, world=WALL, seconds=6), **DRIVES)
+        assert "times to stop, and to drive on before it stood" in said
+        assert "contradict each other" in said
 
     def test_a_command_that_is_held_until_it_touches(self):
         def slow(senses: Senses):

@@ -171,6 +171,23 @@ class TestExists:
         assert "something that is no `Fibonacci.Result`" in finding.hint
 
     @pytest.mark.parametrize(
+        ("test", "words"),
+        [
+            ("PyLong_Check(field)", "write int(value)"),
+            ("PyFloat_Check(item)", "write float(value)"),
+            ("PyUnicode_Check(field)", "write str(value)"),
+            ("PyBool_Check(field)", "write bool(value)"),
+        ],
+    )
+    def test_a_field_that_stops_rclpy_is_told_what_it_takes(self, test, words):
+        printed = (
+            "python: /build/rosidl_generator_py/enpm702_msgs/msg/_bot_status_s.c:65: "
+            f"enpm702_msgs__msg__bot_status__convert_from_py: Assertion `{test}' failed."
+        )
+        run = nodeless(processes=(died(-6),), ending=Ending.EXITED, log=output(printed))
+        assert words in judge("node.exists", run, name=NODE).hint
+
+    @pytest.mark.parametrize(
         ("exit_code", "words"),
         [
             (-11, "SIGSEGV (segmentation fault)"),
@@ -256,6 +273,7 @@ class TestStarts:
         assert failing("node.starts", run) == failing("node.exists", run, name=NODE)
 
 
+_IN_QOS = '  File "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/qos.py", line 99, in f\n'
 _IN_RCLPY = (
     '  File "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/node.py", line 205, in f\n'
     "    raise it\n"
@@ -336,6 +354,64 @@ class TestAlive:
                 "def message_callback(self, msg)",
             ),
             ("ValueError: math domain error", "math.acos(w)", "max(-1.0, min(1.0, value))"),
+            (
+                "AttributeError: property 'timers' of 'Bot' object has no setter",
+                "self.timers = []",
+                "self.my_timers",
+            ),
+            ("AttributeError: can't set attribute 'timers'", "self.timers = []", "self.my_timers"),
+            (
+                "TypeError: Bot.heard() missing 1 required positional argument: 'msg'",
+                "Odometry, '/odom', self.heard(), 10",
+                "without brackets, `self.heard`",
+            ),
+            (
+                "TypeError: Quaternion.__init__() takes 1 positional argument but 5 were given",
+                "return Quaternion(x, y, z, w)",
+                "name its fields",
+            ),
+            (
+                "TypeError: QoSProfile.__init__() takes 1 positional argument but 2 were given",
+                "profile = QoSProfile(10)",
+                "QoSProfile(depth=10",
+            ),
+            (
+                "AttributeError: module 'rclpy' has no attribute 'node'",
+                "node = rclpy.node.Node('bot')",
+                "from rclpy.node import Node",
+            ),
+            ("RuntimeError: no running event loop", "await asyncio.sleep(1)", "without asyncio"),
+            (
+                "TypeError: RcutilsLogger.info() takes 2 positional arguments but 3 were given",
+                "self.get_logger().info('x', x)",
+                "A logger takes one text",
+            ),
+            (
+                "TypeError: rclpy_logging_rcutils_log(): incompatible function arguments. The",
+                "self.get_logger().info(msg.data)",
+                "info(str(x))",
+            ),
+            (
+                "SystemError: <built-in method publish of object> returned a result with an "
+                "exception set",
+                "self.publisher.publish(msg)",
+                "write int(value)",
+            ),
+            (
+                "TypeError: Expected <class 'std_msgs.msg._int64.Int64'>, got <class 'int'>",
+                "self.publisher.publish(1)",
+                "publish() takes a message",
+            ),
+            (
+                "TypeError: unsupported operand type(s) for -: 'Parameter' and 'float'",
+                "dx = self.goal_x - x",
+                "self.get_parameter('name').value",
+            ),
+            (
+                'TypeError: can only concatenate str (not "float") to str',
+                "'x = ' + x",
+                "f'x = {x:.2f}'",
+            ),
         ],
     )
     def test_what_an_exception_means(self, raised, source, words):
@@ -371,6 +447,27 @@ class TestAlive:
         log = output(traceback(raised).replace(_IN_RCLPY, ""))
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
         assert "Mend the line that is named here." in failing("node.alive", run)
+
+    @pytest.mark.parametrize(
+        ("raised", "source"),
+        [
+            (
+                "AttributeError: property 'speed' of 'Bot' object has no setter",
+                "self.speed = 1.0",
+            ),
+            ("TypeError: Bot.go() missing 1 required positional argument: 'v'", "self.go()"),
+            ("AssertionError", "assert self.ready"),
+        ],
+    )
+    def test_what_only_looks_like_a_slip_with_rclpy(self, raised, source):
+        log = output(traceback(raised, source=source).replace(_IN_RCLPY, ""))
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        assert "Mend the line that is named here." in failing("node.alive", run)
+
+    def test_a_policy_that_is_a_text(self):
+        log = output(traceback("AssertionError").replace(_IN_RCLPY, _IN_QOS))
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        assert "DurabilityPolicy.TRANSIENT_LOCAL" in failing("node.alive", run)
 
     def test_another_with_is_not_that_of_rclpy(self):
         raised = "TypeError: 'NoneType' object does not support the context manager protocol"

@@ -53,8 +53,8 @@ def answer(row):
     return dict(zip("xyzw", map(float, row), strict=False))
 
 
-def run(conversion, asked, answered, *, late_s=0.001, stop_s=None, **changes):
-    """A run in which each question is sent 20 ms after the one before.
+def run(conversion, asked, answered, *, late_s=0.001, step_s=STEP_S, stop_s=None, **changes):
+    """A run in which each question is sent some time (seconds) after the one before.
 
     Args:
         asked: Rows of questions.
@@ -63,7 +63,7 @@ def run(conversion, asked, answered, *, late_s=0.001, stop_s=None, **changes):
     topic, answers = ASKED[conversion]
     sent, received = [], []
     for index, (row, found) in enumerate(zip(asked, answered, strict=True)):
-        time_s = 1.0 + STEP_S * index
+        time_s = 1.0 + step_s * index
         sent.append(message(time_s, question(conversion, row), sequence=index + 1, topic=topic))
         several = isinstance(found, list) and not np.isscalar(found[0])
         many = found if several else [] if found is None else [found]
@@ -76,7 +76,7 @@ def run(conversion, asked, answered, *, late_s=0.001, stop_s=None, **changes):
                     topic=answers,
                 )
             )
-    stop_s = stop_s or 1.0 + STEP_S * len(asked) + late_s + 0.5
+    stop_s = stop_s or 1.0 + step_s * len(asked) + late_s + 0.5
     defaults = {
         "sent": {topic: tuple(sent)},
         "messages": {answers: tuple(received)} if received else {},
@@ -211,6 +211,13 @@ class TestZero:
         assert "1 of 3 cases wrong" in words
         assert why in words
 
+    def test_the_way_out_is_that_of_a_zero_axis(self):
+        # As of an axis that was divided by its length and a little.
+        half = [0, 0, 0, math.cos(0.5)]
+        words = failed("axis_angle_to_quaternion", self.CASES, self.with_zero(half))
+        assert "Test the length before you divide by it" in words
+        assert "normalize" not in words.lower()
+
     def test_a_node_that_dies_of_it_is_told_why(self):
         words = failed(
             "axis_angle_to_quaternion", self.CASES, [QUARTER_X[1], None, None],
@@ -261,6 +268,38 @@ def test_what_has_no_name_gets_none():
     crooked = [row + np.array([0.01, 0.02, 0.03]) for row in right("quaternion_to_rpy", asked)]
     words = failed("quaternion_to_rpy", asked, crooked)
     assert "60 of 60 cases wrong; case 1" in words
+
+
+@pytest.mark.parametrize(("index", "name"), [(0, "roll"), (1, "pitch"), (2, "yaw")])
+def test_the_only_wrong_angle_is_named(index, name):
+    _, asked = asked_of("quaternion")
+    answers = [list(row) for row in right("quaternion_to_rpy", asked)]
+    for number, row in enumerate(answers):
+        row[index] += 0.3 + 0.01 * number
+    words = failed("quaternion_to_rpy", asked, answers)
+    assert f"are right, the {name} is not" in words
+    assert f"{name} = a" in words
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gimbal_lock_that_is_seen_too_early_is_found_for_every_seed(seed):
+    _, asked = asked_of("quaternion", seed)
+    answers = [list(row) for row in right("quaternion_to_rpy", asked)]
+    for (x, y, z, w), row in zip(asked, answers, strict=True):
+        if abs(sine := 2.0 * (w * y - z * x)) > 0.99:
+            row[:] = [0.0, math.copysign(0.5 * math.pi, sine), 2.0 * math.atan2(z, w)]
+    words = failed("quaternion_to_rpy", asked, answers)
+    assert "answered as at gimbal lock" in words and "abs(sin_pitch) > 0.9999999" in words
+
+
+def test_a_short_axis_that_is_taken_for_a_zero_one():
+    conversion, asked = asked_of("axis_angle")
+    answers = [
+        [0, 0, 0, 1] if math.hypot(*row[:3]) < 0.5 else answered
+        for row, answered in zip(asked, right(conversion, asked), strict=True)
+    ]
+    words = failed(conversion, asked, answers)
+    assert "the answer is no rotation at all" in words and "do not take it for a zero one" in words
 
 
 def test_the_same_answer_to_everything():
@@ -469,6 +508,22 @@ class TestSilence:
         )
         assert finding.status is Status.ERROR
         assert "only 1 case of 5 could be sent" in finding.observed
+
+    def test_fewer_cases_than_needed_because_the_callback_sleeps(self):
+        conversion, asked = asked_of("axis_angle")
+        few = asked[:10]
+        # The next question follows the answer. Those of other lengths come last, and are not
+        # asked at all.
+        slow = {"late_s": 0.29, "step_s": 0.3}
+        needed = {"cases": ["scaled"], "at_least": 30}
+        words = failed(conversion, few, right(conversion, few), needed, **slow)
+        assert "only 0 cases of 30 could be sent, because the answers come late" in words
+        assert "no time.sleep()" in words
+        finding = judged(
+            conversion, few, right(conversion, few), needed,
+            disturbance=taken(1.0, 4.0, waited_s=2.8), **slow,
+        )  # fmt: skip
+        assert finding.status is Status.ERROR
 
     def test_only_cases_of_a_kind_are_judged(self):
         conversion, asked = asked_of("axis_angle")

@@ -49,6 +49,8 @@ def test_a_message_that_was_lost_on_its_way_leaves_its_place_out():
         ((1, 2, 3, 4), {"step": 1, "start": 0}, "it begins with 1"),
         ((0, 1, 2, 0, 1), {"step": 1}, "it begins anew with message 4"),
         ((0, 1, 1, 2, 3), {"step": 1}, "message 3 repeats the value before it"),
+        ((0, 0, 1, 1, 2, 2), {"step": 1}, "message 2 repeats the value before it"),
+        ((0, 0, 1, 0, 0, 1), {"step": 1}, "it begins anew with message 2"),
         ((3, 2, 1), {"values": [1, 2, 3]}, "the right values, but in another order"),
         ((1, 2, 4), {"values": [1, 2, 3]}, "4 instead of 3 in message 3 of 3"),
         (("a", "c"), {"values": ["a", "b"]}, "'c' instead of 'b' in message 2 of 2"),

@@ -92,6 +92,12 @@ class TestNotAnswered:
         assert "although 5 messages on `/chatter` reached the node" in found
         assert "Is publish(msg) reached in the subscription's callback?" in found
 
+    def test_a_coroutine_that_nobody_awaited(self):
+        warning = "executor.py:12: RuntimeWarning: coroutine 'Bot.reply' was never awaited"
+        found = why(asked(listener(), times_s=every(0.3, 5), log=output(warning, time_s=1.5)))
+        assert "the coroutine `Bot.reply` was never awaited" in found
+        assert "await self.reply(...)" in found
+
     def test_an_exception_that_was_survived(self):
         log = output(traceback("ValueError: no", source="self.publisher.publish(1)"), time_s=1.5)
         found = why(asked(listener(), times_s=every(0.3, 5), log=log))

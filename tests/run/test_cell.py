@@ -79,6 +79,20 @@ def test_a_timer_is_recorded_with_its_source_timestamps(run_node: RunNode) -> No
     assert [node.name for node in recording.student_nodes] == ["/bot_publisher"]
 
 
+@pytest.mark.parametrize("spin", ["executor.spin()", "rclpy.spin(node, executor)"])
+def test_an_events_executor_calls_back(run_node: RunNode, spin: str) -> None:
+    executor = (
+        "from rclpy.experimental.events_executor import EventsExecutor\n"
+        "executor = EventsExecutor()\n"
+        "executor.add_node(node)\n"
+    )
+    source = nodes.timed(period_s=0.1, before_spin=executor)
+    recording = run_node(source.replace("rclpy.spin(node)\n", f"{spin}\n"), until={"messages": 5})
+    assert len(recording.on("/cmd_vel")) >= 5
+    assert [item.data["executor"] for item in recording.declared("spin")] == ["EventsExecutor"]
+    assert recording.processes[0].stopped_by == "SIGINT"
+
+
 def test_messages_after_sigint_are_not_recorded(run_node: RunNode) -> None:
     source = nodes.timed().replace(
         "rclpy.spin(node)\n",

@@ -2,12 +2,13 @@
 
 Python imports a module of this name at start, before the student's code. It wraps a few
 methods of rclpy when (and only if) the student imports them, reports each use as one JSON
-line on the pipe that the cell left open, and changes nothing else, with two exceptions. A
+line on the pipe that the cell left open, and changes nothing else, with three exceptions. A
 publisher on a topic that the probe listens to is held until it is matched, because a
 volatile publisher that publishes in a constructor otherwise writes before discovery has
 matched anybody, and the message is lost. And a MultiThreadedExecutor that takes as many
 threads as there are CPUs gets four at least, because right code would look serial on a small
-machine of ours; a number of threads that the program names stays as it is.
+machine of ours; a number of threads that the program names stays as it is. And an EventsExecutor
+of the wheels waits in slices, because without a limit it never calls anything there.
 
 Only the standard library may be used here, as little as possible of it, and an error must
 never reach the student's program.
@@ -31,6 +32,7 @@ _HOLD_POLL_S = 0.002
 _FLUSH_LIMIT_S = 0.5
 _SEEN_LIMIT_S = 2.0
 _LEAST_THREADS = 4
+_SLICE_S = 0.5
 _THRESHOLDS = gc.get_threshold()
 _IMPORTED = 100_000
 _OWN_TOPICS = ("/parameter_events", "/rosout")
@@ -264,6 +266,27 @@ def _patch_events_executor(module: Any) -> None:
         return make(*args, **kwargs)
 
     module.EventsExecutor = made
+    if os.environ.get("_ROS_WHEELS_BOOTSTRAP_COMPLETE"):
+        _wait_in_slices(module._rclpy.EventsExecutor)
+
+
+def _wait_in_slices(executor_class: Any) -> None:
+    """Mend the wheels' EventsExecutor, whose waits without a limit end at once, again and again.
+
+    It waits until the latest time that there is, and the standard library of C++ that the wheels
+    were built with makes one of it that is over. A wait with a limit is right.
+    """
+    spin_once = executor_class.spin_once
+
+    def once(self: Any, timeout_sec: Any = None) -> None:
+        spin_once(self, _SLICE_S if timeout_sec is None else timeout_sec)
+
+    def spin(self: Any) -> None:
+        while self.context.ok():
+            once(self)
+
+    executor_class.spin_once = once
+    executor_class.spin = spin
 
 
 _PATCHES = {

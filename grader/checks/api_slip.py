@@ -1,0 +1,80 @@
+"""Slips with rclpy that raise an exception whose own words do not say to a beginner what to do."""
+
+from __future__ import annotations
+
+import re
+
+from grader.checks.failure import Failure
+from grader.checks.wording import code
+
+# What rclpy's Node has as a property without a setter.
+_NODE_PROPERTIES = (
+    *("publishers", "subscriptions", "clients", "services", "timers", "guards", "waitables"),
+    *("context", "default_callback_group", "handle"),
+)
+# Python 3.11 and later, Python 3.10.
+_NO_SETTER = re.compile(
+    r"property '(\w+)' of '\w+' object has no setter|can't set attribute '(\w+)'"
+)
+_CALLED = re.compile(r"(\w+)\(\) missing \d+ required positional arguments?:")
+_BY_PLACE = re.compile(r"(\w+)\.__init__\(\) takes 1 positional argument but \d+")
+
+_LOGGER_HINT = (
+    "A logger takes one text: self.get_logger().info(f'x = {x}'), or info(str(x)) for a value "
+    "alone."
+)
+# Parts of a message -> what to try. The names in them are rclpy's own, or those of Python.
+_HINTS = {
+    "no running event loop": "rclpy runs coroutines itself, without asyncio, so that "
+    "asyncio.sleep() and the like do not work in a callback. For a pause create a timer.",
+    "returned a result with an exception set": "A field of the message holds what does not belong "
+    "there, such as a float or a text in a field of integers: write int(value).",
+    "RcutilsLogger.": _LOGGER_HINT,
+    "rclpy_logging_rcutils_log(): incompatible": _LOGGER_HINT,
+    "without a depth setting": "Say how many messages are kept: QoSProfile(..., depth=10).",
+    "Expected <class '": "publish() takes a message of the publisher's class: fill one in, "
+    "msg = Int64(data=1), and publish that.",
+    "unexpected keyword argument 'qos'": "The argument is called qos_profile; without a name it "
+    "is the last one.",
+    "can only concatenate str": "Write an f-string in place of +: f'x = {x:.2f}'.",
+    "'Parameter' and": "get_parameter() gives a Parameter; what it holds is "
+    "self.get_parameter('name').value.",
+    "and 'Parameter'": "get_parameter() gives a Parameter; what it holds is "
+    "self.get_parameter('name').value.",
+}
+
+
+def slip_hint(failure: Failure) -> str | None:
+    """What to try after such an exception; None if it is no known one.
+
+    Args:
+        failure: What ended a process.
+    """
+    taken = _NO_SETTER.match(failure.message)
+    if taken and (name := taken[1] or taken[2]) in _NODE_PROPERTIES:
+        return (
+            f"rclpy's Node has {code(name)} itself: give your attribute another name, such as "
+            f"self.my_{name}."
+        )
+    called = _CALLED.search(failure.message)
+    source = failure.frames[-1].source if failure.frames else ""
+    if called and re.search(rf"\b{called[1]}\(\)\s*[,)]", source):
+        return (
+            f"Hand over a callback without brackets, {code(f'self.{called[1]}')}: with them you "
+            "call it yourself, at once and without a message."
+        )
+    by_place = _BY_PLACE.match(failure.message)
+    if by_place and by_place[1] == "QoSProfile":
+        return "QoSProfile takes its policies by name: QoSProfile(depth=10, reliability=...)."
+    if by_place:
+        return (
+            f"If {code(by_place[1])} is a message: name its fields, such as "
+            "Vector3(x=1.0, y=2.0, z=0.0). If it is a class of your own: its __init__ takes "
+            "nothing but self."
+        )
+    if failure.type == "AssertionError" and failure.frames[-1].file.endswith("rclpy/qos.py"):
+        return (
+            "A policy is a member of its enum, such as DurabilityPolicy.TRANSIENT_LOCAL, and not "
+            "its name as a text."
+        )
+    return next((hint for part, hint in _HINTS.items() if part in failure.message), None)

@@ -1,0 +1,373 @@
+"""Why the goal pose was not reached: the place, the way, or the heading."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from grader.assignment.unit import format_duration
+from grader.checks.approach import NO_SPEED_M_S, Approach
+from grader.checks.blockage import stuck_callback
+from grader.checks.cause import Cause
+from grader.checks.contact import why_touched
+from grader.checks.detour import WRAP_HINT, away
+from grader.checks.finding import Evidence, Moment
+from grader.checks.immobility import why_cut_short
+from grader.checks.lateness import taken_s
+from grader.checks.measure import degrees, metres, point, speed, turn
+from grader.checks.misread_yaw import misread_yaw
+from grader.checks.sighting import until_the_end
+from grader.checks.track import is_at_rest, turned_rad, turns_one_way
+from grader.recording.model import NS, Ending, Truth
+from sim.motion import wrap_angle
+
+_WEAVES = 4
+# Share of the way: who ends so near the goal knows where it is.
+_A_LITTLE = 0.25
+# As far from the heading of the goal, in rad, as a tolerance may reasonably leave it.
+_A_LITTLE_RAD = 0.15
+_STRAIGHT_RAD_S = 0.02
+_ASTRAY_RAD = math.radians(30.0)
+# A curve in which every error changes, but no command does.
+_SAME_NS = 5 * NS
+_AT_LIMIT = 0.98
+# An error of angle that a proportional controller has done away with.
+_EXACTLY_RAD = 3e-3
+# One that turns the long way of an error comes to the goal after that, or after the next one.
+_CIRCLES = 3
+_FEW_COMMANDS = 3
+# A command that only depends on where the robot is goes up and down once in a circle; such a wave
+# and a ramp are correlated by 0.78 at most.
+_FALLING = -0.85
+_YAW_HINT = (
+    "Print yaw while it turns: it has to go with the robot, from -pi to pi. A quaternion in ROS is "
+    "x, y, z, w; yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z)), and z alone is no angle."
+)
+
+
+def why_not_there(run: Approach, position_m: float) -> Cause | None:
+    """Why the robot is not at the goal's position in the end; None if it is."""
+    truth = run.truth
+    last = truth[-1]
+    left_m = run.distance_m(last)
+    if left_m <= position_m:
+        return None
+    deeper = why_cut_short(run.recording) or why_touched(run.recording)
+    if deeper is not None:
+        return deeper
+    nearest = min(range(len(truth)), key=lambda i: run.distance_m(truth[i]))
+    nearest_m = run.distance_m(truth[nearest])
+    evidence = Evidence(
+        moments=(
+            Moment("nearest to the goal", run.recording.since_launch_s(truth[nearest].time_ns)),
+        ),
+        plots=(run.distance_plot,),
+    )
+    if is_at_rest(last):
+        seen = f"came to rest at {point(last.x_m, last.y_m)}, {metres(left_m)} from the goal"
+        words, hint = _wrong_place(run, position_m) or (
+            (
+                f"it had been there, {metres(nearest_m)} near, and drove on",
+                "Compare the distance in every callback, and stop where it is small.",
+            )
+            if nearest_m <= position_m
+            else (
+                "it ended a little before it",
+                "Compare the distance with the tolerance as it is now asked for, in metres, and "
+                "drive on until it is smaller.",
+            )
+            if left_m <= _A_LITTLE * run.distance_m(truth[0])
+            else (
+                "",
+                "Is goal_x, goal_y what your node reads? The distance is "
+                "math.hypot(goal_x - x, goal_y - y).",
+            )
+        )
+        return Cause(f"{seen}: {words}" if words else seen, hint, evidence)
+    return _still_moving(run, position_m, nearest_m, evidence)
+
+
+def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: Evidence) -> Cause:
+    truth, recording = run.truth, run.recording
+    last = truth[-1]
+    left_m = run.distance_m(last)
+    lost_s = taken_s(recording, truth[0].time_ns, truth[-1].time_ns)
+    watched_s = (truth[-1].time_ns - truth[0].time_ns) / NS
+    seen = f"is still {metres(left_m)} from the goal when the observation ends"
+    if lost_s > 0.25 * watched_s and recording.ending is Ending.TIMEOUT:
+        return Cause(
+            f"{seen}; the machine took up to {format_duration(lost_s)} of "
+            f"{format_duration(watched_s)} from the run",
+            ours=True,
+            disturbed=True,
+        )
+    moving = f"at {speed(last.linear_m_s)} and {turn(last.angular_rad_s)}"
+    stuck = stuck_callback(recording)
+    if stuck is not None:
+        return Cause(
+            f"{seen}, {moving}: a callback did not return, it was at {stuck.file}:{stuck.line} "
+            "when it was interrupted",
+            "A loop in a callback never sees newer odometry, because the next message waits for "
+            "its end: compute one command for each, publish it and return.",
+            Evidence(evidence.moments, (stuck,), plots=evidence.plots),
+        )
+    misread = misread_yaw(recording, run.goal, position_m)
+    if misread is not None:
+        return Cause(f"{seen}: {misread}", misread.hint, evidence)
+    since = _same_command_since(run)
+    if since is not None:
+        return Cause(
+            f"{seen}: since {recording.since_launch_s(since.time_ns):.2f} s after launch every "
+            f"command is the same, linear.x = {speed(since.command_m_s)} and angular.z = "
+            f"{turn(since.command_rad_s)}, although the robot moves on",
+            "Each odometry takes a command of its own, computed from it. A loop in a callback "
+            "never sees a newer one, and what the constructor computes stays as it is. A command "
+            "that is clamped all the time comes of an error that is too large, as in degrees.",
+            evidence,
+        )
+    far = [step for step in truth if run.distance_m(step) > position_m]
+    circles = turns_one_way(far)
+    if circles and not _follows_the_heading(far):
+        return Cause(f"{seen}: {_circling(circles)}", f"{_YAW_HINT} {WRAP_HINT}", evidence)
+    detours = list(away(far, run.bearing_error_rad, _ASTRAY_RAD, "the goal"))
+    if detours:
+        times = "once" if len(detours) == 1 else f"{len(detours)} times"
+        return Cause(
+            f"{seen}: on its way it turned away from the goal through half a turn, {times}",
+            f"{WRAP_HINT} {_YAW_HINT}" if len(detours) >= _CIRCLES else WRAP_HINT,
+            evidence,
+        )
+    turns = abs(turned_rad(truth)) / math.tau
+    if turns >= 1.5:
+        return Cause(
+            f"{seen}: it turned {turns:.1f} times around",
+            "Does it turn towards the goal? The error is atan2(dy, dx) - yaw in radians, "
+            "normalised to [-pi, pi]; yaw comes from the quaternion.",
+            evidence,
+        )
+    if nearest_m <= position_m:
+        return Cause(
+            f"{seen}: it had been there, {metres(nearest_m)} near, and drove on {moving}",
+            "Stop where the distance is below your tolerance: publish linear.x = 0.0.",
+            evidence,
+        )
+    began_m = run.distance_m(truth[0])
+    if left_m > began_m and last.linear_m_s < 0.0:
+        return Cause(
+            f"{seen}, farther than at its start ({metres(began_m)}): it drives backwards, {moving}",
+            "linear.x is negative: it is a gain times the distance math.hypot(dx, dy), which never "
+            "is, and not times dx. Turn towards the goal, also where dx is negative.",
+            evidence,
+        )
+    if left_m > began_m and _keeps_a_direction(run):
+        return Cause(
+            f"{seen}, farther than at its start ({metres(began_m)}): it keeps to one direction, "
+            f"{moving}, although the goal is elsewhere by now",
+            "The direction to the goal changes while the robot drives: compute math.atan2(goal_y - "
+            "y, goal_x - x) anew with each odometry, from the position that it tells.",
+            evidence,
+        )
+    if left_m > began_m and _has_turned_its_back(run):
+        return Cause(
+            f"{seen}, farther than at its start ({metres(began_m)}): it drives straight away from "
+            f"it, {moving}, as if half a turn were no error",
+            "The direction is math.atan2(dy, dx): math.atan(dy / dx) is the same for the opposite "
+            "one. An error is wrapped by whole turns, 2 * math.pi, not by math.pi.",
+            evidence,
+        )
+    if left_m > began_m:
+        return Cause(
+            f"{seen}, farther than at its start ({metres(began_m)}), {moving}",
+            "It drives away: look at the sign of the heading error and at atan2(dy, dx), which "
+            "takes y first.",
+            evidence,
+        )
+    if _weaves(run):
+        return Cause(
+            f"{seen}: it weaves from side to side, {moving}",
+            "The angular gain is too large for the delay of odometry: make it smaller.",
+            evidence,
+        )
+    return Cause(
+        f"{seen}, {moving}, after {format_duration(watched_s)}",
+        "If it is on its way, it is too slow: a larger gain, within the limits of the robot.",
+        evidence,
+    )
+
+
+def _circling(turns: float) -> str:
+    side = "left" if turns > 0.0 else "right"
+    return f"it turned {abs(turns):.1f} times around, always to the {side}"
+
+
+def _follows_the_heading(steps: Sequence[Truth]) -> bool:
+    """Whether the turn that is commanded falls as the robot turns left, but for one jump a turn.
+
+    It does where the error is taken from the right yaw and is not wrapped.
+    """
+    commands = [step.command_rad_s for step in steps]
+    if len(set(commands)) < _FEW_COMMANDS:
+        return False
+    return any(
+        np.corrcoef([(step.yaw_rad - cut_rad) % math.tau for step in steps], commands)[0, 1]
+        < _FALLING
+        for cut_rad in (0.0, math.pi)
+    )
+
+
+def _same_command_since(run: Approach) -> Truth | None:
+    """The step from which on one command to drive a curve holds to the end, if it is long ago."""
+    last, scene = run.truth[-1], run.recording.scene
+    if abs(last.command_m_s) <= NO_SPEED_M_S or abs(last.command_rad_s) < _STRAIGHT_RAD_S:
+        return None
+    # At the limit of the robot a command stays the same although the error does not.
+    if scene is not None and abs(last.command_rad_s) > _AT_LIMIT * scene.max_angular_rad_s:
+        return None
+    first = last
+    for step in reversed(run.truth):
+        if (step.command_m_s, step.command_rad_s) != (last.command_m_s, last.command_rad_s):
+            break
+        first = step
+    return first if last.time_ns - first.time_ns >= _SAME_NS else None
+
+
+def _keeps_a_direction(run: Approach) -> bool:
+    """Whether it drives in the direction that the goal had at the start, or has from the origin.
+
+    One that takes half a turn for no error looks straight away from the goal instead.
+    """
+    last, first = run.truth[-1], run.truth[0]
+    straight = last.linear_m_s > NO_SPEED_M_S and abs(last.angular_rad_s) < _STRAIGHT_RAD_S
+    if not straight or abs(run.bearing_error_rad(last)) > math.pi - _EXACTLY_RAD:
+        return False
+    directions = (
+        math.atan2(run.goal.y_m - y_m, run.goal.x_m - x_m)
+        for x_m, y_m in ((first.x_m, first.y_m), (0.0, 0.0))
+    )
+    return any(abs(wrap_angle(item - last.yaw_rad)) < _EXACTLY_RAD for item in directions)
+
+
+def _has_turned_its_back(run: Approach) -> bool:
+    """Whether the robot drives ahead in the end, without turning, and the goal is right behind."""
+    last = run.truth[-1]
+    return (
+        last.linear_m_s > NO_SPEED_M_S
+        and abs(last.angular_rad_s) < _STRAIGHT_RAD_S
+        and abs(run.bearing_error_rad(last)) > math.pi - _A_LITTLE_RAD
+    )
+
+
+def _weaves(run: Approach) -> bool:
+    """Whether the turn changes its sense again and again, with some force."""
+    left = [step.angular_rad_s > 0.0 for step in run.truth if abs(step.angular_rad_s) > 0.3]
+    return sum(a != b for a, b in pairwise(left)) >= _WEAVES
+
+
+def _wrong_place(run: Approach, position_m: float) -> tuple[str, str] | None:
+    """A classic place to go to instead of the goal."""
+    goal, last, first = run.goal, run.truth[-1], run.truth[0]
+    cos, sin = math.cos(first.yaw_rad), math.sin(first.yaw_rad)
+    frame = (
+        "that is the goal counted from where the robot started",
+        "The goal is in the frame of odometry: subtract the position that odometry reports.",
+    )
+    swapped = "x and y are swapped", "goal_x belongs to position.x; atan2 takes y first."
+    sign = "Look at the signs: dx = goal_x - x, dy = goal_y - y."
+    places: tuple[tuple[float, float, tuple[str, str]], ...] = (
+        (first.x_m + goal.x_m, first.y_m + goal.y_m, frame),
+        (
+            first.x_m + cos * goal.x_m - sin * goal.y_m,
+            first.y_m + sin * goal.x_m + cos * goal.y_m,
+            frame,
+        ),
+        (goal.y_m, goal.x_m, swapped),
+        (goal.x_m, -goal.y_m, ("that is the goal with the sign of y changed", sign)),
+        (-goal.x_m, goal.y_m, ("that is the goal with the sign of x changed", sign)),
+        (-goal.x_m, -goal.y_m, ("that is the goal with both signs changed", sign)),
+    )
+    for x_m, y_m, words in places:
+        if math.hypot(goal.x_m - x_m, goal.y_m - y_m) > 2.0 * position_m and (
+            math.hypot(last.x_m - x_m, last.y_m - y_m) <= position_m
+        ):
+            return words
+    return None
+
+
+def why_not_aligned(run: Approach, position_m: float, heading_rad: float) -> Cause | None:
+    """Why the robot does not look as the goal does in the end; None if it does."""
+    last = run.truth[-1]
+    off_rad = run.heading_error_rad(last)
+    if abs(off_rad) <= heading_rad:
+        return None
+    deeper = why_cut_short(run.recording) or why_touched(run.recording)
+    if deeper is not None:
+        return deeper
+    evidence = Evidence(
+        moments=(until_the_end(run.recording),),
+        plots=(run.heading_plot,),
+    )
+    seen = (
+        f"is at the goal's position, but looks to {degrees(last.yaw_rad)} instead of "
+        f"{degrees(run.goal.yaw_rad)}"
+    )
+    misread = misread_yaw(run.recording, run.goal, position_m)
+    if misread is not None:
+        return Cause(f"{seen}: {misread}", misread.hint, evidence)
+    if not is_at_rest(last):
+        circles = turns_one_way(run.truth)
+        return Cause(
+            f"{seen} and still turns at {turn(last.angular_rad_s)} when the observation ends"
+            + (f": {_circling(circles)}" if circles else ""),
+            f"{_YAW_HINT} {WRAP_HINT}"
+            if circles
+            else "Normalise the error to [-pi, pi] with atan2(sin(e), cos(e)), and make the gain "
+            "smaller if it oscillates.",
+            evidence,
+        )
+    words, hint = _wrong_heading(run, heading_rad)
+    return Cause(f"{seen}{words}", hint, evidence)
+
+
+def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
+    theta, last = run.goal.yaw_rad, run.truth[-1]
+    radians = "Angles in ROS are radians (REP-103), and so is goal_theta already."
+    headings = (
+        (math.radians(theta), ": goal_theta was taken for degrees", radians),
+        (math.degrees(theta), ": goal_theta was converted to degrees", radians),
+        (
+            -theta,
+            ": that is the goal's heading with its sign changed",
+            "Counter-clockwise is positive (REP-103): error = goal_theta - yaw.",
+        ),
+        (
+            theta + math.pi,
+            ": that is the opposite of the goal's heading",
+            "Look at how you normalise the angle, and at the arguments of atan2(y, x).",
+        ),
+        (
+            2.0 * math.asin(max(-1.0, min(1.0, theta / 2.0))),
+            ": as if z of the quaternion were the angle",
+            "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z)): z alone is the sine of half the angle.",
+        ),
+    )
+    for heading, words, hint in headings:
+        if abs(wrap_angle(heading - theta)) > 2.0 * heading_rad and (
+            abs(wrap_angle(heading - last.yaw_rad)) <= heading_rad
+        ):
+            return words, hint
+    driven = run.driven(math.inf)
+    if driven is not None and abs(turned_rad(run.truth[driven:])) < heading_rad:
+        return (
+            ": it has not turned since it arrived",
+            "After the position is reached, turn on the spot by the error goal_theta - yaw.",
+        )
+    if is_at_rest(last) and abs(run.heading_error_rad(last)) < _A_LITTLE_RAD:
+        return (
+            ": it stopped turning a little before",
+            "Compare abs(goal_theta - yaw) with angle_tolerance, in radians, and turn on until it "
+            "is smaller. It is not goal_tolerance, and no number of your own.",
+        )
+    return "", "The error is goal_theta - yaw in radians; yaw comes from the quaternion."
