@@ -192,15 +192,17 @@ def _lines(sections: tuple[Section, ...]) -> Iterator[str]:
 
 @check("interface.manifest", Subject.SUBMISSION, OfInterface)
 def manifest(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
-    """package.xml names what an interface package needs.
+    """package.xml names what an interface package needs, and the package is registered.
 
     `rosidl_default_generators` by `buildtool_depend` (or `build_depend`, `depend`),
     `rosidl_default_runtime` by `exec_depend` (or `depend`), membership of the group
     `rosidl_interface_packages`, and each package whose messages the definition uses by `depend`
     (or by one tag for the build and one for the run). On the machine where all of it is
-    installed the build does without these; on another one it fails.
+    installed the build does without these; on another one it fails. A package that was built must
+    be in ament's index of packages, where `ros2 interface show` looks.
 
-    Explains each entry that is missing, with the line to add.
+    Explains each entry that is missing, with the line to add, and a CMakeLists.txt without
+    ament_package().
     """
     expected = f"package.xml of {code(parameters.parts.package)} is that of an interface package"
     definition = find_definition(submission, parameters.parts)
@@ -211,6 +213,8 @@ def manifest(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
         return cause.finding(expected)
     package = existing_package(submission, parameters.parts.package)
     missing = list(_missing(package, used_packages(parameters.parts, definition)))
+    if not missing and not package.registered:
+        return _unregistered(package, expected)
     if not missing:
         return Finding.passed(expected, "every entry is there")
     return Finding.failed(
@@ -220,6 +224,18 @@ def manifest(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
         Evidence(
             places=(SourceError(package.file("package.xml"), None, "entries are missing"),),
             tables=(Table("What package.xml lacks", ("entry", "what it is for"), tuple(missing)),),
+        ),
+    )
+
+
+def _unregistered(package: PackageRecord, expected: str) -> Finding:
+    return Finding.failed(
+        f"{expected}, and registered where ROS looks for packages",
+        f"{code(package.name)} was installed, but not registered: neither `ros2 interface show` "
+        "nor another package finds it",
+        f"End {code(package.file('CMakeLists.txt'))} with ament_package().",
+        Evidence(
+            places=(SourceError(package.file("CMakeLists.txt"), None, "ends without it"),),
         ),
     )
 

@@ -18,6 +18,7 @@ from grader.submission.record import Definition
 MOST_BYTES = 64 * 1024
 """Largest definition of an interface that is kept."""
 
+_INDEX = Path("share", "ament_index", "resource_index", "packages")
 _MAX_METADATA_BYTES = 256 * 1024
 _MAX_HASHED_BYTES = 16 * 2**20
 _DISTRIBUTION = re.compile(r"(?P<name>.+?)-[^-]+(-py3[.\d]*)?\.(egg-info|dist-info)")
@@ -36,6 +37,7 @@ class InstallSpace:
         origins: Path of each of them -> the student's file that it is a copy of.
         definitions: Package -> the interfaces that it generates, such as ``msg/Bot.msg``, with
             their definitions.
+        registered: Packages that are in ament's index of packages, where ROS looks for them.
     """
 
     executables: Mapping[str, tuple[str, ...]]
@@ -44,6 +46,7 @@ class InstallSpace:
     python: Mapping[str, str]
     origins: Mapping[str, str]
     definitions: Mapping[str, tuple[Definition, ...]]
+    registered: frozenset[str]
 
 
 def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) -> InstallSpace:
@@ -82,6 +85,7 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
         python,
         match_files(python, sources),
         definitions,
+        frozenset(path.name for path in regular_files(install / _INDEX)),
     )
 
 

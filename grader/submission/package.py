@@ -224,10 +224,12 @@ def _with_executables(
     files: dict[str, str] = {}
     executables: tuple[str, ...] = ()
     generated: tuple[Definition, ...] = ()
+    registered = True
     misplaced: list[str] = []
     if installed is not None:
         files = {shown(i): shown(p) for i, p in in_folder(installed.origins, package.folder)}
         generated = installed.definitions.get(package.name, ())
+        registered = package.name in installed.registered
         executables = installed.executables.get(package.name, ())
         distribution = normalised(package.setup.name or package.name)
         built = installed.entry_points.get(distribution)
@@ -246,6 +248,7 @@ def _with_executables(
         missing_targets=tuple((name, error) for name, error in missing if error is not None),
         files=tuple(sorted(files.items())),
         generated=generated[:_MOST_DEFINITIONS],
+        registered=registered,
     )
 
 

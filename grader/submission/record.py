@@ -109,6 +109,7 @@ class PackageRecord:
         cmake: Its CMakeLists.txt, or None where it has none.
         definitions: Its ``.msg``, ``.srv`` and ``.action`` files, and others beside them.
         generated: Definitions that the build generated code for and installed.
+        registered: Whether ROS finds what was installed, in ament's index of packages.
         sources: What its Python code says; tests, launch files and setup.py left aside.
         lint: What ruff said of the same files, or None where it was not asked.
     """
@@ -131,6 +132,7 @@ class PackageRecord:
     cmake: str | None = None
     definitions: tuple[Definition, ...] = ()
     generated: tuple[Definition, ...] = ()
+    registered: bool = True
     sources: tuple[SourceFile, ...] = ()
     lint: Lint | None = None
 

@@ -325,6 +325,11 @@ class TestManifest:
         assert f"add to package.xml: `<{tag}>{name}</{tag}>`" in found.lower()
         assert found.count("<") == 2 * 2
 
+    def test_a_package_that_ros_does_not_find(self):
+        found = failing("interface.manifest", handed_in(registered=False), interface=INTERFACE)
+        assert "installed, but not registered" in found
+        assert "End `src/bot_msgs/CMakeLists.txt` with ament_package()" in found
+
     def test_one_tag_for_the_build_and_one_for_the_run_will_do(self):
         kept = tuple(d for d in interfaces().dependencies if d.name != "geometry_msgs")
         both = (

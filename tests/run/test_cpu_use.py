@@ -121,6 +121,13 @@ def test_a_wait_is_a_disturbance_only_as_far_as_others_had_the_cpus(
     assert third.waited_ns == pytest.approx(counted_ms * MS, abs=1000)
 
 
+@pytest.mark.parametrize(("own_ms", "others_ms"), [(20, 100), (60, 100), (90, 10)])
+def test_a_cell_that_is_flooded_is_no_disturbance(own_ms: int, others_ms: int) -> None:
+    """The student has one of two CPUs, and somebody the other one."""
+    after = CpuTimes(100 * MS, 100 * MS, 0, own_ns=own_ms * MS)
+    assert interval(CpuTimes(0, 0, 0), after, cpus=2).others_ns == others_ms * MS
+
+
 def test_a_process_that_takes_its_time_with_it_makes_nobody_owe_anything() -> None:
     ended = interval(CpuTimes(0, 500 * MS, 0), CpuTimes(100 * MS, 0, 0), cpus=2)
     assert ended.others_ns == 200 * MS

@@ -28,6 +28,7 @@ def install(tree: Tree) -> Path:
             "lib/bot_publisher/data.txt": "",
             "lib/libbot.so": "",
             "bin/stray": "",
+            "share/ament_index/resource_index/packages/bot_publisher": "",
             f"{SITE}/bot_publisher/node.py": "x = 1\n",
             f"{SITE}/bot_publisher/__init__.py": "",
             f"{SITE}/bot_publisher/__pycache__/node.cpython-312.pyc": "",
@@ -45,6 +46,7 @@ def test_what_ros2_run_and_python_find_is_told(tree: Tree) -> None:
     found = inspect(install(tree), ["bot_publisher", "other"], sources)
     assert found.executables == {"bot_publisher": ("bot_pub",), "other": ()}
     assert found.in_bin == ("stray",)
+    assert found.registered == {"bot_publisher"}
     (entry,) = found.entry_points["bot_publisher"]
     assert (entry.name, entry.target) == ("bot_pub", "bot_publisher.node:main")
     assert set(found.python) == {
@@ -69,7 +71,7 @@ def test_links_pipes_and_giant_metadata_are_not_read(tree: Tree) -> None:
 
 
 def test_an_empty_install_space_has_nothing(tmp_path: Path) -> None:
-    nothing = InstallSpace({"bot": ()}, (), {}, {}, {}, {"bot": ()})
+    nothing = InstallSpace({"bot": ()}, (), {}, {}, {}, {"bot": ()}, frozenset())
     assert inspect(tmp_path, ["bot"], {}) == nothing
 
 
