@@ -17,7 +17,7 @@ _NUMBER = re.compile(
 _DECIMAL_COMMA = re.compile(r"(?<![0-9.,])[-+]?[0-9]+,[0-9]+(?![0-9.,])")
 # `123,456` and `123_456`, as the format specifications `,` and `_` write it.
 _GROUPED = re.compile(
-    r"(?<![0-9.,_])[-+]?[0-9]{1,3}([,_])[0-9]{3}(?:\1[0-9]{3})*(?:\.[0-9]+)?(?![0-9,_])"
+    r"(?<![0-9.,_])[-+]?[0-9]{1,3}([,_])[0-9]{3}(?:\1[0-9]{3})*(?:\.[0-9]+)?(?![0-9_]|[.,][0-9])"
 )
 # Typographers' sign, which some locales and tables write.
 _MINUS = "\N{MINUS SIGN}"

@@ -153,7 +153,9 @@ class TestAnyFormatIsRight:
         finding = judge("log.follows", run(lines(text, SCAN_TIMES_S)), **FRONT)
         assert finding.status is Status.PASSED, finding
 
-    @pytest.mark.parametrize("text", ["765,072", "765_072", "Received: 765,072.", "n=+765_072.0"])
+    @pytest.mark.parametrize(
+        "text", ["765,072", "765_072", "Received: 765,072.", "765,072, 5", "n=+765_072.0"]
+    )
     def test_of_a_number_whose_digits_are_grouped(self, text):
         value = {**scan(), "ranges": [765072.0, *RANGES[1:]]}
         changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
