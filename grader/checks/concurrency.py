@@ -61,7 +61,7 @@ def forbids(recording: Recording, *, itself: bool) -> bool:
 
 
 def not_judged(
-    recording: Recording, expected: str, observed: str, *, prevented: bool
+    recording: Recording, expected: str, observed: str, *, prevented: bool, at_once: int = 2
 ) -> Finding | None:
     """The finding where it is not the student's fault that callbacks did not run together.
 
@@ -70,6 +70,7 @@ def not_judged(
         expected: Of the finding.
         observed: How they ran instead.
         prevented: Whether the machine may have kept them from running together often enough.
+        at_once: How many of them should have run at the same time.
     """
     if _has_one_thread_for_one_cpu(recording):
         return Finding.error(
@@ -77,16 +78,16 @@ def not_judged(
             f"{observed}: this machine has one CPU, so MultiThreadedExecutor() has one thread; "
             "grade on a machine with two CPUs or more",
         )
-    if prevented and not _is_serial(recording):
+    if prevented and not _lacks_threads(recording, at_once):
         return Finding.error(
             expected, f"{observed}, but the machine took the time from the process", disturbed=True
         )
     return None
 
 
-def _is_serial(recording: Recording) -> bool:
-    """Whether all that was spun is one executor of one thread: nothing else kept them apart."""
-    return len(recording.declared("spin")) == 1 and single(recording)
+def _lacks_threads(recording: Recording, at_once: int) -> bool:
+    """Whether all that was spun is one executor of fewer threads: that kept them apart."""
+    return len(recording.declared("spin")) == 1 and 0 < threads(recording) < at_once
 
 
 def _has_one_thread_for_one_cpu(recording: Recording) -> bool:

@@ -67,7 +67,11 @@ def together(recording: Recording, parameters: Together) -> Finding:
     observed = f"{codes(names)} {seen} ran all at the same time"
     most = len(found) + _prevented(recording, reports, parameters)
     excused = concurrency.not_judged(
-        recording, expected, observed, prevented=most >= parameters.at_least
+        recording,
+        expected,
+        observed,
+        prevented=most >= parameters.at_least,
+        at_once=len(parameters.callbacks),
     )
     if excused is not None:
         return excused

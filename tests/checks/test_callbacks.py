@@ -520,6 +520,14 @@ class TestTogether:
         assert finding.status is Status.ERROR
         assert finding.disturbed
 
+    @pytest.mark.parametrize(("threads", "status"), [(2, Status.FAILED), (3, Status.ERROR)])
+    def test_two_threads_are_no_fault_of_the_machine(self, threads, status):
+        runs = [("timer_1", 1.0, 1.4), ("chatter", 1.05, 1.45), ("timer_2", 1.35, 1.75)]
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=threads)
+        disturbed = taken(1.1, 1.3, waited_s=0.3)
+        subject = run(*runs, disturbance=disturbed, declarations=(spin,))
+        assert judged("together", subject, self.ALL).status is status
+
     def test_what_the_machine_took_at_another_time_explains_nothing(self):
         disturbed = taken(1.55, 1.8, waited_s=0.3)
         subject = run(*self.two_threads(), disturbance=disturbed)
