@@ -192,7 +192,7 @@ def _lines(sections: tuple[Section, ...]) -> Iterator[str]:
 
 @check("interface.manifest", Subject.SUBMISSION, OfInterface)
 def manifest(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
-    """package.xml names what an interface package needs, and the package is registered.
+    """package.xml names what an interface package needs.
 
     `rosidl_default_generators` by `buildtool_depend` (or `build_depend`, `depend`),
     `rosidl_default_runtime` by `exec_depend` (or `depend`), membership of the group
