@@ -37,10 +37,13 @@ class Approach:
         """Distance from the goal."""
         return math.hypot(self.goal.x_m - step.x_m, self.goal.y_m - step.y_m)
 
+    def direction_rad(self, step: Truth | Pose) -> float:
+        """The direction of the goal from there, in [-pi, pi]."""
+        return math.atan2(self.goal.y_m - step.y_m, self.goal.x_m - step.x_m)
+
     def bearing_error_rad(self, step: Truth | Pose) -> float:
         """How far the robot would have to turn to look at the goal, in [-pi, pi]."""
-        direction = math.atan2(self.goal.y_m - step.y_m, self.goal.x_m - step.x_m)
-        return wrap_angle(direction - step.yaw_rad)
+        return wrap_angle(self.direction_rad(step) - step.yaw_rad)
 
     def heading_error_rad(self, step: Truth | Pose) -> float:
         """How far the robot would have to turn to the goal's heading, in [-pi, pi]."""

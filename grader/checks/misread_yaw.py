@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from grader.checks.answer import MOST_BEHIND, Answer, answers
+from grader.checks.approach import Approach
 from grader.checks.law import Sample, fit
-from grader.recording.model import Recording
-from sim.motion import Pose, wrap_angle
+from grader.checks.steering import before_arrival
+from sim.motion import wrap_angle
 
 # Chance does not come near it: nothing is read from fewer commands, or a worse fit.
 _LEAST_COMMANDS = 20
@@ -75,53 +76,40 @@ _READINGS = (
 )
 
 
-def misread_yaw(recording: Recording, goal: Pose, position_m: float) -> Reading | None:
+def misread_yaw(run: Approach, position_m: float) -> Reading | None:
     """How yaw was read wrongly, if that alone explains the turns on the way to a goal.
 
     The commands then are in proportion to the direction of the goal less that yaw, and not in
     proportion to the direction less the true one.
 
     Args:
-        recording: Of a run whose robot moved.
-        goal: In the world's frame.
+        run: The run.
         position_m: How near the goal the way to it ends.
     """
-    scene = recording.scene
+    scene = run.recording.scene
     limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
     fits: list[tuple[float, Reading]] = []
     for behind in range(MOST_BEHIND + 1):
-        way = _on_the_way(answers(recording, behind), goal, position_m)
+        way = before_arrival(run, answers(run.recording, behind), position_m)
         yaws = [answer.pose.yaw_rad for answer in way]
         if len(way) < _LEAST_COMMANDS or max(yaws) - min(yaws) < _TURNED_RAD:
             return None
-        if _r2(way, goal, lambda yaw_rad: yaw_rad, limit_rad_s) > _RIGHT_R2:
+        if _r2(run, way, lambda yaw_rad: yaw_rad, limit_rad_s) > _RIGHT_R2:
             return None
-        fits += [(_r2(way, goal, one.of, limit_rad_s), one) for one in _READINGS]
+        fits += [(_r2(run, way, one.of, limit_rad_s), one) for one in _READINGS]
     best = max(fits, key=lambda item: item[0])
     return best[1] if best[0] >= _GOOD_R2 else None
 
 
-def _on_the_way(known: Sequence[Answer], goal: Pose, position_m: float) -> list[Answer]:
-    end = next((i for i, item in enumerate(known) if _distance_m(item, goal) <= position_m), None)
-    return list(known[:end])
-
-
-def _distance_m(answer: Answer, goal: Pose) -> float:
-    return math.hypot(goal.x_m - answer.pose.x_m, goal.y_m - answer.pose.y_m)
-
-
 def _r2(
-    way: Sequence[Answer], goal: Pose, read: Callable[[float], float], limit_rad_s: float
+    run: Approach, way: Sequence[Answer], read: Callable[[float], float], limit_rad_s: float
 ) -> float:
     """How well the commands are in proportion to the error, wrapped or not; at most 1."""
     found = -math.inf
     for wrap in (wrap_angle, lambda error_rad: error_rad):
         samples = [
             Sample(
-                wrap(
-                    math.atan2(goal.y_m - item.pose.y_m, goal.x_m - item.pose.x_m)
-                    - read(item.pose.yaw_rad)
-                ),
+                wrap(run.direction_rad(item.pose) - read(item.pose.yaw_rad)),
                 item.command.twist.angular_rad_s,
             )
             for item in way

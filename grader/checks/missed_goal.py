@@ -114,7 +114,7 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
             "its end: compute one command for each, publish it and return.",
             Evidence(evidence.moments, (stuck,), plots=evidence.plots),
         )
-    misread = misread_yaw(recording, run.goal, position_m)
+    misread = misread_yaw(run, position_m)
     if misread is not None:
         return Cause(f"{seen}: {misread}", misread.hint, evidence)
     since = _same_command_since(run)
@@ -313,7 +313,7 @@ def why_not_aligned(run: Approach, position_m: float, heading_rad: float) -> Cau
         f"is at the goal's position, but looks to {degrees(last.yaw_rad)} instead of "
         f"{degrees(run.goal.yaw_rad)}"
     )
-    misread = misread_yaw(run.recording, run.goal, position_m)
+    misread = misread_yaw(run, position_m)
     if misread is not None:
         return Cause(f"{seen}: {misread}", misread.hint, evidence)
     if not is_at_rest(last):

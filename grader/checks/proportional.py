@@ -104,7 +104,7 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
             evidence,
         )
     observed, hint = _words(verdict, parameters, len(samples))
-    misread = misread_yaw(recording, run.goal, parameters.position)
+    misread = misread_yaw(run, parameters.position)
     if misread is not None:
         return Finding.failed(
             expected, f"the commands do not follow the error: {misread}", misread.hint, evidence

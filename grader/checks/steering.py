@@ -25,9 +25,14 @@ def on_the_way(run: Approach, known: Sequence[Answer], position_m: float) -> lis
         known: As :func:`~grader.checks.answer.answers` finds them.
         position_m: How near.
     """
+    return [_to_goal(run, item) for item in before_arrival(run, known, position_m)]
+
+
+def before_arrival(run: Approach, known: Sequence[Answer], position_m: float) -> list[Answer]:
+    """Commands that answer where the robot was before it was near the goal."""
     arrival = run.arrival(position_m)
     arrival_ns = math.inf if arrival is None else run.truth[arrival].time_ns
-    return [_to_goal(run, item) for item in known if item.seen_ns < arrival_ns]
+    return [item for item in known if item.seen_ns < arrival_ns]
 
 
 def at_the_goal(

@@ -7,8 +7,11 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from grader.checks.approach import Approach
 from grader.checks.finding import Status
 from grader.checks.law import Sample, examine
+from grader.checks.misread_yaw import misread_yaw
+from sim.motion import Pose
 from tests.checks.builder import (
     INSTALLED,
     SOURCE,
@@ -150,6 +153,7 @@ def test_a_good_controller_passes_every_check(
         period_s=period_s,
     )
     assert lost(run, goal) == {}
+    assert misread_yaw(Approach(run, Pose(*goal)), 0.1) is None
     assert judge("motion.settles", run, within="40 s").status is Status.PASSED
     if turn_first is not None:
         finding = judge("motion.path_length", run, goal=yaml(goal), most="10 %")

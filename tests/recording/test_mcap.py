@@ -214,6 +214,14 @@ def test_a_message_of_other_bytes_than_its_type_has_is_counted_and_hurts_no_othe
     assert read.unreadable == {"/cmd_vel": 2}
 
 
+def test_a_type_that_cannot_be_decoded_is_no_fault_of_who_published_it(tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    wide = RawMessage("/name", "bot_msgs/msg/Name", CDR_HEADER + b"\0" * 8, 3_000, 3_050, 1)
+    write_recording(file, a_recording(), [wide], {"bot_msgs/msg/Name": "wstring name\n"})
+    with pytest.raises(UsageError, match=r"/name: wstring parsing is not implemented"):
+        read_recording(file)
+
+
 def test_what_was_sent_and_what_joined_late_stay_apart_from_what_was_heard(tmp_path: Path) -> None:
     heard, kept = raw(3_000, 1, 0, 0, 0, 0, 0), raw(3_000, 1, 0, 0, 0, 0, 0)
     ours = dataclasses.replace(raw(2_500, 2, 0, 0, 0, 0, 0), topic="/goal", is_sent=True)
