@@ -71,7 +71,8 @@ def test_without_a_file_there_is_no_reference(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"no gzip", gzip.compress(b"{", mtime=0), gzip.compress(b'{"schema":1}')]
+    "content",
+    [b"", b"no gzip", gzip.compress(b"{", mtime=0), gzip.compress(b'{"schema":1}', mtime=0)],
 )
 def test_a_damaged_file_is_refused(tmp_path, content):
     loaded, _ = make(tmp_path)
