@@ -12,6 +12,7 @@ from grader.checks.cause import Cause
 from grader.checks.failure import Failure, fatal_failure, student_place, submission_path
 from grader.checks.finding import Evidence, Moment
 from grader.checks.library import lacking_package, library_hint
+from grader.checks.newer_name import newer_name
 from grader.checks.wording import code
 from grader.recording.model import Ending, Process, Recording
 
@@ -102,6 +103,8 @@ _MESSAGE_HINTS = {
     "math.isfinite(value) before int(value).",
     "Subscription.__init__(): callback should be": "A subscription's callback takes the message: "
     "def message_callback(self, msg).",
+    "from __future__ imports must occur": "Move this line to the top of the file: nothing but "
+    "comments and the docstring comes before it.",
     "math domain error": "math.acos and math.asin take -1 to 1, math.sqrt takes 0 or more: limit "
     "the value first, max(-1.0, min(1.0, value)), for rounding makes 1.0000000000000002 of 1.",
 }
@@ -221,6 +224,15 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
                 evidence,
                 ours=True,
             )
+    newer = newer_name(failure, recording)
+    if newer is not None:
+        return Cause(
+            f"{ended}: it uses {code(newer.name)}{where}, which is not there where this is graded",
+            f"It is right in ROS 2 Jazzy, which has {newer.home}, and no point is lost by it. Tell "
+            f"whoever runs the grader: it needs {newer.home}. Or do without this name.",
+            evidence,
+            ours=True,
+        )
     return Cause(
         observed=f"{ended} with {failure}{where}",
         hint=_exception_hint(failure, recording),

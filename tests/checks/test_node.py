@@ -124,6 +124,10 @@ class TestExists:
                 "not its name",
             ),
             ("AttributeError: module 'bot_publisher.node' has no attribute 'main'", "setup.py"),
+            (
+                "SyntaxError: from __future__ imports must occur at the beginning of the file",
+                "to the top of the file",
+            ),
         ],
     )
     def test_frequent_exceptions_come_with_what_to_do(self, raised, hint):
