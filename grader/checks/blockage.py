@@ -9,6 +9,7 @@ from grader.checks.cause import Cause
 from grader.checks.failure import interrupted_callback, interrupted_place
 from grader.checks.finding import Evidence, Moment
 from grader.checks.sighting import until_the_end
+from grader.checks.wording import codes
 from grader.recording.model import NS, Call, Process, Recording
 from grader.submission.record import SourceError
 
@@ -89,15 +90,17 @@ def where_blocked(recording: Recording, node: str, call: Call) -> tuple[str, Evi
 def why_never_spun(
     recording: Recording,
     seen: str,
+    nodes: Iterable[str] = (),
     processes: Iterable[Process] | None = None,
     moments: tuple[Moment, ...] = (),
 ) -> Cause | None:
-    """The cause if a process never called ``rclpy.spin()``, by its tracer's word.
+    """The cause if nothing spins a node, by the word of its process's tracer.
 
     Args:
         recording: The run.
         seen: What was seen of it.
-        processes: Which may be the one; by default all.
+        nodes: Fully qualified names of those whose callbacks should run.
+        processes: Which may be the one that never spun; by default all.
         moments: Evidence besides the place at which it was interrupted.
     """
     candidates = recording.processes if processes is None else processes
@@ -105,7 +108,7 @@ def why_never_spun(
         (item for item in candidates if testimony.never_spun(recording, item.name)), None
     )
     if process is None:
-        return None
+        return _why_not_given(recording, seen, nodes, moments)
     place = interrupted_place(recording, process.name)
     where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
     return Cause(
@@ -115,4 +118,21 @@ def why_never_spun(
             moments or (until_the_end(recording, "rclpy.spin() was still not called"),),
             (place,) if place else (),
         ),
+    )
+
+
+def _why_not_given(
+    recording: Recording, seen: str, nodes: Iterable[str], moments: tuple[Moment, ...]
+) -> Cause | None:
+    """The cause if a node was given to no executor, though its process has one that spins."""
+    names = sorted(set(nodes))
+    if not names or not all(testimony.in_no_executor(recording, name) for name in names):
+        return None
+    named = codes(names)
+    return Cause(
+        f"{seen}: an executor spins, but {named} was not given to it, so none of its callbacks "
+        "runs",
+        "Give the node to the executor that spins, executor.add_node(node), or call "
+        "rclpy.spin(node).",
+        Evidence(moments or (until_the_end(recording, "no executor had the node"),)),
     )

@@ -74,6 +74,7 @@ def why_not_logged(
             recording,
             f"the callback is never called: the subscription to {code(topic)} is there and its "
             "QoS matches",
+            {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)},
         )
         or _blocked(recording, topic, found)
         or _dropped(recording, topic)

@@ -59,7 +59,9 @@ def why_silent(recording: Recording, topic: str) -> Cause:
         _undelivered(recording, topic, asked)
         or (_slow(recording, topic) if not asked else None)
         or _starved(recording, topic)
-        or why_never_spun(recording, f"no message on {code(topic)}")
+        or why_never_spun(
+            recording, f"no message on {code(topic)}", {item.node for item in publishers}
+        )
         or why_time_stands_still(recording, f"no message on {code(topic)}")
         or _blocked(recording, topic)
         or why_never_awaited(recording, f"no message on {code(topic)}")

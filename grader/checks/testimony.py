@@ -59,6 +59,22 @@ def never_spun(recording: Recording, process: str | None = None) -> bool:
     return traced(recording, process) and not said(recording, "spin", process)
 
 
+def in_no_executor(recording: Recording, node: str) -> bool:
+    """Whether the process of a node spun, but gave this node to no executor.
+
+    Args:
+        recording: The run.
+        node: Fully qualified name.
+    """
+    process = process_of(recording, node)
+    if process is None or not declares(recording, "node", "node", node):
+        return False
+    spins = [item.data for item in recording.declared("spin") if item.process == process.name]
+    # Older recordings do not tell, and neither does an EventsExecutor, which is made in C++.
+    tells = bool(spins) and all("nodes" in spin for spin in spins)
+    return tells and not declares(recording, "added", "node", node)
+
+
 def exiting_ns(recording: Recording, process: str) -> int | None:
     """When Python began to end in its usual way in the process, or None where it did not."""
     began = [item for item in recording.declared("started") if item.process == process]

@@ -40,7 +40,9 @@ def why_unanswered(
     if taken is not None:
         return taken
     if process is not None:
-        found = _in_process(recording, what, process, moment, asked_ns)
+        found = why_raised(recording, what, process, asked_ns) or why_never_spun(
+            recording, what, (node,), (process,), (moment,)
+        )
         if found is not None:
             return found
     blocked = _blocked(recording, node, asked_ns)
@@ -157,16 +159,6 @@ def why_never_awaited(recording: Recording, what: str) -> Cause | None:
                 ),
             )
     return None
-
-
-def _in_process(
-    recording: Recording, what: str, process: Process, moment: Moment, asked_ns: int
-) -> Cause | None:
-    """An exception that the process survived, or an executor that never spun."""
-    raised = why_raised(recording, what, process, asked_ns)
-    if raised is not None:
-        return raised
-    return why_never_spun(recording, what, (process,), (moment,))
 
 
 def _blocked(recording: Recording, node: str, asked_ns: int) -> bool:

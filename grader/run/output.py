@@ -21,7 +21,10 @@ _MOST_TOLD = 2000
 _LARGEST_NUMBER = 2**63
 _OF_ENDPOINTS = ("publisher", "subscription")
 _KINDS = frozenset(
-    {*_OF_ENDPOINTS, "started", "init", "node", "timer", "spin", "held", "leaving", "exiting"}
+    {
+        *_OF_ENDPOINTS,
+        *("started", "init", "node", "timer", "added", "spin", "held", "leaving", "exiting"),
+    }
 )
 """What a tracer tells of; see ``tracer/sitecustomize.py``."""
 

@@ -6,6 +6,7 @@ from grader.checks.finding import Status
 from grader.recording.model import Ending
 from tests.checks.asking import SET_BOOL, action, asked, service, serving
 from tests.checks.builder import (
+    NODE,
     SOURCE,
     call,
     declared,
@@ -112,6 +113,12 @@ class TestResponds:
     def test_the_executor_never_spun(self):
         run = serving(asked(answer_s=None), declarations=(declared("started"),))
         assert "rclpy.spin() was never called" in failing("service.responds", run, **TRUE)
+
+    def test_a_node_that_no_executor_has(self):
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=4, nodes=1)
+        told = (declared("started"), declared("node", node=NODE), spin)
+        run = serving(asked(answer_s=None), declarations=told)
+        assert "was not given to it" in failing("service.responds", run, **TRUE)
 
     def test_a_callback_that_blocks_the_executor(self):
         silent = tuple(call(1.5 + 0.5 * n, None) for n in range(4))

@@ -6,9 +6,11 @@ import pytest
 
 from grader.recording.model import Kind
 from tests.checks.builder import (
+    NODE,
     RELIABLE,
     call,
     declarations,
+    declared,
     died,
     endpoint,
     every,
@@ -28,6 +30,10 @@ LATCHED = replace(RELIABLE, durability="transient_local")
 
 def listener(**changes):
     return endpoint("/chatter", **{"kind": Kind.SUBSCRIPTION, "type": STRING, **changes})
+
+
+def spinning(**data):
+    return declared("spin", 0.41, executor="MultiThreadedExecutor", threads=4, **data)
 
 
 def asked(*listeners, times_s=(), **changes):
@@ -121,6 +127,27 @@ class TestNotAnswered:
             listener(), times_s=every(0.3, 5), declarations=declarations(timer_s=None, spin=False)
         )
         assert "rclpy.spin() was never called" in why(run)
+
+    def test_a_node_that_no_executor_has(self):
+        told = (*declarations(timer_s=None, spin=False), spinning(nodes=1))
+        run = asked(listener(), times_s=every(0.3, 5), declarations=told)
+        found = why(run)
+        assert f"an executor spins, but `{NODE}` was not given to it" in found
+        assert "executor.add_node(node)" in found
+
+    def test_a_node_that_an_executor_has(self):
+        told = (
+            *declarations(timer_s=None, spin=False),
+            declared("added", 0.4, node=NODE),
+            spinning(nodes=1),
+        )
+        run = asked(listener(), times_s=every(0.3, 5), declarations=told)
+        assert "not given to it" not in why(run)
+
+    def test_an_executor_that_does_not_tell_which_nodes_it_has(self):
+        told = (*declarations(timer_s=None, spin=False), spinning(), spinning(nodes=1))
+        run = asked(listener(), times_s=every(0.3, 5), declarations=told)
+        assert "not given to it" not in why(run)
 
     def test_a_slow_timer_is_not_blamed_for_an_answer(self):
         run = asked(listener(), times_s=every(0.3, 5), declarations=declarations(timer_s=300.0))

@@ -13,6 +13,7 @@ from uuid import uuid4
 import pytest
 
 from grader import ros
+from grader.checks import testimony
 from grader.recording.model import NS, Ending, Kind, Owner, Recording
 from grader.run.environment import cell_environment
 from tests.run import nodes
@@ -91,6 +92,26 @@ def test_an_events_executor_calls_back(run_node: RunNode, spin: str) -> None:
     assert len(recording.on("/cmd_vel")) >= 5
     assert [item.data["executor"] for item in recording.declared("spin")] == ["EventsExecutor"]
     assert recording.processes[0].stopped_by == "SIGINT"
+
+
+def test_which_nodes_an_executor_was_given(run_node: RunNode) -> None:
+    """Some before it spins, and one while it does."""
+    executor = (
+        "from rclpy.executors import SingleThreadedExecutor\n"
+        "executor = SingleThreadedExecutor()\n"
+        "first, second = rclpy.create_node('first'), rclpy.create_node('second')\n"
+        "first.create_timer(0.05, lambda: executor.add_node(second))\n"
+        "executor.add_node(first)\n"
+        "executor.spin()\n"
+    )
+    source = nodes.timed().replace("rclpy.spin(node)\n", executor)
+    recording = run_node(source, until={"elapsed": "1 s"})
+    assert not recording.on("/cmd_vel")
+    given = {
+        name: not testimony.in_no_executor(recording, name)
+        for name in ("/bot_publisher", "/first", "/second")
+    }
+    assert given == {"/bot_publisher": False, "/first": True, "/second": True}
 
 
 def test_messages_after_sigint_are_not_recorded(run_node: RunNode) -> None:

@@ -137,6 +137,7 @@ def _hold(node: Any, publisher: Any) -> None:
 
 _publishers: list[Any] = []
 _held: set[tuple[str, str]] = set()
+_added: set[str] = set()
 _nodes: list[bool] = []
 
 
@@ -168,7 +169,7 @@ def _exit() -> None:
 
 
 def _wrap(owner: Any, name: str, before: Any = None, after: Any = None) -> None:
-    """Replace a method by one that calls ``before(self)`` and ``after(self, result, ...)``."""
+    """Replace a method by one that calls ``before(self)`` and ``after(self, result)``."""
     import functools
 
     original = getattr(owner, name)
@@ -236,10 +237,18 @@ def _patch_executors(module: Any) -> None:
         # From the second call on the executor runs rclpy's own method again.
         self.wait_for_ready_callbacks = original.__get__(self)
         threads = getattr(getattr(self, "_executor", None), "_max_workers", 1)
-        _report("spin", executor=type(self).__name__, threads=threads)
+        nodes = len(self.get_nodes())
+        _report("spin", executor=type(self).__name__, threads=threads, nodes=nodes)
         return original(self, *args, **kwargs)
 
+    def added(self: Any, _: Any) -> None:
+        # rclpy.spin_once(node) adds its node at each call.
+        for name in {_full_name(node) for node in self.get_nodes()} - _added:
+            _added.add(name)
+            _report("added", node=name)
+
     executor_class.wait_for_ready_callbacks = first_wait
+    _wrap(executor_class, "add_node", after=added)
     _give_threads(module.MultiThreadedExecutor)
 
 
