@@ -108,7 +108,7 @@ def why_never_spun(
         (item for item in candidates if testimony.never_spun(recording, item.name)), None
     )
     if process is None:
-        return _why_not_given(recording, seen, nodes, moments)
+        return why_not_given(recording, seen, nodes, moments)
     place = interrupted_place(recording, process.name)
     where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
     return Cause(
@@ -121,10 +121,17 @@ def why_never_spun(
     )
 
 
-def _why_not_given(
-    recording: Recording, seen: str, nodes: Iterable[str], moments: tuple[Moment, ...]
+def why_not_given(
+    recording: Recording, seen: str, nodes: Iterable[str], moments: tuple[Moment, ...] = ()
 ) -> Cause | None:
-    """The cause if a node was given to no executor, though its process has one that spins."""
+    """The cause if nodes were given to no executor, though their process has one that spins.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Their fully qualified names.
+        moments: Evidence.
+    """
     names = sorted(set(nodes))
     if not names or not all(testimony.in_no_executor(recording, name) for name in names):
         return None

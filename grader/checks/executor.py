@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, field_validator
 from grader.assignment.quantity import Duration, Ratio
 from grader.assignment.unit import format_duration
 from grader.checks import testimony
+from grader.checks.blockage import why_not_given
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.concerned import concerned_nodes
@@ -169,7 +170,7 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
             "self.create_timer(0.3, self.callback), and call rclpy.spin(node) in main().",
             evidence,
         )
-    return Cause(
+    return why_not_given(recording, seen, (group.node,), evidence.moments) or Cause(
         f"{seen}: something keeps the executor from coming round{where}",
         "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
         "callback or in the constructor, and let a timer call again instead.",

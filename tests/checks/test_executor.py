@@ -89,6 +89,13 @@ class TestBlocked:
         assert f"({SOURCE}:17)" in finding.observed
         assert finding.evidence.places[0].line == 17
 
+    def test_a_node_that_no_executor_has(self):
+        spin = declared("spin", executor="SingleThreadedExecutor", threads=1, nodes=0)
+        told = (*declarations(spin=False), spin)
+        found = failing("executor.responsive", recording(calls=calls(None), declarations=told))
+        assert "answered 0 of 6 calls within 1 s: an executor spins" in found
+        assert "`/bot_publisher` was not given to it" in found
+
     def test_a_loop_in_a_callback(self):
         found = failing("executor.responsive", recording(calls=calls(None)))
         assert "something keeps the executor from coming round" in found
