@@ -93,7 +93,7 @@ class TestBlocked:
         spin = declared("spin", executor="SingleThreadedExecutor", threads=1, nodes=0)
         told = (*declarations(spin=False), spin)
         found = failing("executor.responsive", recording(calls=calls(None), declarations=told))
-        assert "answered 0 of 6 calls within 1 s: an executor spins" in found
+        assert ": an executor spins, but" in found
         assert "`/bot_publisher` was not given to it" in found
 
     def test_a_loop_in_a_callback(self):
