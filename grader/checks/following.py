@@ -62,8 +62,8 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     """The values of the messages follow those of another topic.
 
     Every message must hold the values of one message of the source that was published at most
-    `within` before it (more, if the machine kept the node from running). Angles are compared on
-    the circle. What is published before the source has said anything does not count.
+    `within` before it; what the machine took from the node is not held against it. Angles are
+    compared on the circle. What is published before the source has said anything does not count.
 
     Explains, from the data: another field of the source, a part of a quaternion taken for an
     angle, degrees, a wrong sign, half of the angle, values that never change, that are never set
@@ -109,6 +109,14 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         )
     if wrong:
         return _failure(recording, parameters, made_of, judged, wrong, expected)
+    late = [one for one in judged if not made_of.fits(one, one.window[one.excused :])]
+    if late:
+        return Finding.error(
+            expected,
+            f"{len(late)} of {counted(len(judged), 'message')} have older values, but the machine "
+            "took the time from the process",
+            disturbed=True,
+        )
     plots = tuple(_plot(recording, made_of, judged, index) for index in range(len(made_of.fields)))
     seen = f"so it is in all of {counted(len(judged), 'message')}"
     return Finding.passed(expected, seen, Evidence(plots=plots))

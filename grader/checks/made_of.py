@@ -26,6 +26,7 @@ class Sample:
         message: The message.
         values: The numbers in its fields; NaN for one that is not there.
         window: Indices of those sources; the last one is the newest that there was.
+        excused: How many of them, the oldest, are right only by what the host took.
         is_known: Whether the recording has all of those sources. It may lack one that was lost
             on its way, and what was published after the newest one that it has.
     """
@@ -34,6 +35,7 @@ class Sample:
     message: Message
     values: tuple[float, ...]
     window: range
+    excused: int
     is_known: bool
 
 
@@ -92,12 +94,13 @@ class MadeOf:
             last = bisect_right(stamps, message.stamp_ns)
             if not last:
                 continue
-            begin_ns = message.stamp_ns - within_ns
-            begin_ns -= round(recording.taken_s(begin_ns, message.stamp_ns) * NS)
+            due_ns = message.stamp_ns - within_ns
+            begin_ns = due_ns - round(recording.taken_s(due_ns, message.stamp_ns) * NS)
             # Where the source is silent its newest values stay the right ones.
-            first = min(bisect_left(stamps, begin_ns), last - 1)
+            first, due = (min(bisect_left(stamps, at), last - 1) for at in (begin_ns, due_ns))
             is_known = last < len(sources) and lost[first] == lost[last]
-            samples.append(Sample(number, message, numbers, range(first, last), is_known))
+            window = range(first, last)
+            samples.append(Sample(number, message, numbers, window, due - first, is_known))
         return cls(tuple(fields), values, tolerance, sources, table, tuple(samples))
 
     def fits(

@@ -174,6 +174,9 @@ class TestRun:
                 now_s += 0.2
         words = failed("run", run(*runs, stop_s=8.0, end_s=8.1), TIMERS, period="1 s")
         assert "`timer_1` starts 7 times in 5.4 s: too often" in words
+        busy = run(*runs, stop_s=8.0, end_s=8.1, disturbance=taken(1.0, 3.0, waited_s=0.5))
+        finding = judged("run", busy, TIMERS, period="1 s")
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
     @given(late_s=st.lists(st.floats(0.0, 0.24), min_size=4, max_size=8))
     def test_starts_that_are_late_are_not_too_often(self, late_s):

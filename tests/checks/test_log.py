@@ -239,7 +239,9 @@ class TestAnyRhythmIsRight:
             lines("1.37 -0.62", [1.0, 3.0]), messages=messages,
             disturbance=taken(1.0, 3.0, waited_s=0.8),
         )  # fmt: skip
-        assert judge("log.follows", machine, **asked).status is Status.PASSED
+        finding = judge("log.follows", machine, **asked)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "no such line for 2 s, from 1.01 s after launch on" in finding.observed
 
     def test_a_line_must_come_soon(self):
         late = lines("1.83", SCAN_TIMES_S, delay_s=0.15)
