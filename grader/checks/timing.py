@@ -141,14 +141,19 @@ def _why_ended(
     """Why nothing was published any more, long before the observation ended."""
     last_ns = messages[-1].stamp_ns
     silent_s = (recording.stop_ns - last_ns) / NS
-    awake_s = silent_s - recording.taken_s(last_ns, recording.stop_ns)
     # Of a flood only the beginning is looked at.
-    if awake_s <= _ENDED_PERIODS * parameters.period or len(messages) > MOST_INTERVALS:
+    if silent_s <= _ENDED_PERIODS * parameters.period or len(messages) > MOST_INTERVALS:
         return None
     seen = (
         f"{counted(len(messages), 'message')} at the right period, but none in the last "
         f"{format_duration(silent_s)} of the observation"
     )
+    taken_s = recording.taken_s(last_ns, recording.stop_ns)
+    if silent_s - taken_s <= _ENDED_PERIODS * parameters.period:
+        return Cause(
+            f"{seen}; the machine took {format_duration(taken_s)} of them", ours=True,
+            disturbed=True,
+        )  # fmt: skip
     dying = dead(recording)
     if dying:
         return cause_of_death(recording, dying[0]).after(seen)
