@@ -17,7 +17,7 @@ from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.intake import HandedIn
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade
-from grader.errors import RosgradeError, UsageError
+from grader.errors import GraderFault, RosgradeError, UsageError
 from grader.recording.fact import to_json
 from grader.report.facts import Clock
 from grader.report.files import write_whole
@@ -27,6 +27,8 @@ from grader.submission.paths import shown
 from grader.submission.prepare import fingerprint
 
 FAULTS_FILE = "faults.log"
+NOT_YET = "not graded yet: the batch was interrupted"
+_MOST_NAMED = 5
 RETRY_ALL, RETRY_ERRORS = "all", "errors"
 
 
@@ -75,6 +77,7 @@ class Batch:
         Raises:
             UsageError: A key to grade again is not there, or results are of another assignment.
         """
+        self._refuse_other()
         unknown = self.retry - {RETRY_ALL, RETRY_ERRORS} - {row.key for row in rows}
         if unknown:
             raise UsageError(f"--retry: there is no submission called {', '.join(sorted(unknown))}")
@@ -92,6 +95,7 @@ class Batch:
                     paths[row.key] = row.path
             self._entries[row.key] = entry
         to_do = {key: path for key, path in paths.items() if not self._is_done(key)}
+        self._refuse_changed(set(paths) - set(to_do))
         self._write()
         return list(self._entries.values()), to_do
 
@@ -127,6 +131,23 @@ class Batch:
         finally:
             self._write()
 
+    def left(self, done: Iterable[Done]) -> list[Done]:
+        """What an interrupted batch has not come to, each with the grade that it still has.
+
+        Args:
+            done: What it has.
+        """
+        finished = {item.entry.key for item in done}
+        return [self._left(entry) for entry in self._entries.values() if entry.key not in finished]
+
+    def _left(self, entry: Entry) -> Done:
+        result = self.ledger.result(entry.key)
+        fits = result is not None and result.submission.sha256 == entry.sha256
+        if fits and self._is_of_this_version(entry.key):
+            return Done(entry, result, fresh=False)
+        told = "; ".join(part for part in (entry.problem, NOT_YET) if part)
+        return Done(replace(entry, problem=told), None, fresh=False)
+
     def _identified(self, entry: Entry, path: Path) -> Entry:
         try:
             return replace(entry, sha256=fingerprint(path))
@@ -141,15 +162,33 @@ class Batch:
         same = {twin.key for twin in self._entries.values() if twin.same_as == key}
         if RETRY_ALL in self.retry or not self.retry.isdisjoint({key, *same}):
             return False
-        if RETRY_ERRORS in self.retry and not result.graded:
-            return False
-        if result.assignment.sha256 != self.loaded.sha256:
-            raise UsageError(
-                f"{self.ledger.out}: was graded with another version of "
-                f"{result.assignment.id}; `rosgrade regrade {self.ledger.out}` judges its "
-                "recordings again, `--retry all` runs everything again"
-            )
-        return True
+        return not (RETRY_ERRORS in self.retry and not result.graded)
+
+    def _refuse_other(self) -> None:
+        """Let no batch of another assignment replace these grades."""
+        try:
+            name, _ = self.ledger.read()
+        except UsageError:
+            # There is none yet, or it is damaged; what it says is written anew from the class.
+            return
+        if name != self.loaded.assignment.id:
+            raise UsageError(f"{self.ledger.out}: holds the grades of {name}; name a new folder")
+
+    def _refuse_changed(self, keys: Iterable[str]) -> None:
+        """Let no grade of an earlier version of the assignment stand beside those of this one."""
+        changed = sorted(key for key in keys if not self._is_of_this_version(key))
+        if not changed:
+            return
+        named = ", ".join(changed[:_MOST_NAMED]) + (", …" if len(changed) > _MOST_NAMED else "")
+        raise UsageError(
+            f"{self.ledger.out}: {len(changed)} ({named}) graded with another version of "
+            f"{self.loaded.assignment.id}; `rosgrade regrade {self.ledger.out}` judges their "
+            "recordings again, `--retry all` runs everything again, `--retry NAME` one"
+        )
+
+    def _is_of_this_version(self, key: str) -> bool:
+        result = self.ledger.result(key)
+        return result is not None and result.assignment.sha256 == self.loaded.sha256
 
     def _take(self, key: str, partial: Path, future: Future[None]) -> None:
         try:
@@ -172,13 +211,19 @@ class Batch:
 
     def _finished(self, key: str, *, fresh: bool) -> Iterable[Done]:
         entry = self._entries[key]
-        result = None if entry.fault else self.ledger.result(key)
+        result = self.ledger.result(key) if entry.sha256 and not entry.fault else None
         yield Done(entry, result, fresh)
         for twin in [item for item in self._entries.values() if item.same_as == key]:
             told = self._entries[twin.key] = replace(twin, fault=entry.fault)
             if result is not None:
-                self._copy(key, twin)
-            yield Done(told, self.ledger.result(twin.key) if result else None, fresh)
+                try:
+                    self._copy(key, twin)
+                except RosgradeError as error:
+                    why = str(error).partition("\n")[0]
+                    again = GraderFault(f"{why}; `--retry {key}` grades both again")
+                    told = self._entries[twin.key] = self._with_fault(twin, again)
+            known = result is not None and not told.fault
+            yield Done(told, self.ledger.result(twin.key) if known else None, fresh)
 
     def _copy(self, key: str, twin: Entry) -> None:
         """Give the same submission of somebody else the same result, under its own name."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from grader.assignment.load import LoadedAssignment
 from grader.batch.batch import Done
@@ -23,11 +23,13 @@ class Regraded:
         done: The row with its result as it is now.
         before: Its result until now, or None.
         changes: What changed, a line each.
+        problem: Why it was not judged again although it was handed in, or empty.
     """
 
     done: Done
     before: Result | None
     changes: tuple[str, ...] = ()
+    problem: str = ""
 
     @property
     def gained(self) -> float:
@@ -60,10 +62,14 @@ def regrade_class(loaded: LoadedAssignment, ledger: Ledger) -> Iterator[Regraded
     _, entries = ledger.read()
     for entry in entries:
         before = ledger.result(entry.key)
-        if before is None:
-            yield Regraded(Done(entry, None, fresh=False), None)
-        else:
+        if entry.fault:
+            yield Regraded(Done(entry, None, fresh=False), None, problem=entry.fault)
+        elif before is not None and entry.sha256 in ("", before.submission.sha256):
             yield _regrade(loaded, ledger, entry, before)
+        elif entry.sha256:
+            yield _not_judged(entry, None, "there is no result of it; run the batch again")
+        else:
+            yield Regraded(Done(entry, None, fresh=False), None)
     ledger.write(entries, loaded.assignment.id, loaded.sha256)
 
 
@@ -72,10 +78,16 @@ def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Res
     try:
         found = find(folder)
     except RosgradeError as error:
-        return Regraded(Done(entry, before, fresh=False), before, (f"not judged again: {error}",))
+        return _not_judged(entry, before, str(error).partition("\n")[0])
     graded = regrade(loaded, found)
     changes = tuple(compare(before, graded.grade))
     if changes or before.assignment.sha256 != loaded.sha256:
         keep_earlier(folder / RESULT_FILE)
         write_graded(graded, folder, Clock())
     return Regraded(Done(entry, ledger.result(entry.key), fresh=True), before, changes)
+
+
+def _not_judged(entry: Entry, before: Result | None, why: str) -> Regraded:
+    """A row that keeps the result that it has, if any, and says so."""
+    told = "; ".join(part for part in (entry.problem, f"not judged again: {why}") if part)
+    return Regraded(Done(replace(entry, problem=told), before, fresh=False), before, problem=why)

@@ -32,6 +32,7 @@ _IGNORED = ("__MACOSX",)
 _FOREIGN = (".rar", ".7z")
 _REPOSITORY = re.compile(r"(https?|ssh|git|file)://|[\w.-]+@[\w.-]+:")
 _CLONE_LIMIT_S = 120.0
+_BARE = "is a bare git repository; give a clone of it, or name it as file://… in a roster"
 # A class's archive holds what many students handed in.
 _CLASS_LIMITS = ArchiveLimits(total_bytes=8192 * MIB, members=500_000)
 
@@ -78,6 +79,7 @@ def take_in(
     staging: Path,
     roster: Roster | None = None,
     on_left_out: Callable[[str], None] = lambda _: None,
+    out: Path | None = None,
 ) -> list[HandedIn]:
     """Find out who handed in what.
 
@@ -87,6 +89,7 @@ def take_in(
         staging: An empty folder for what has to be unpacked, copied together or cloned.
         roster: Who should have handed in; without one everybody who did is a row.
         on_left_out: Told the name of each file that is taken for no submission.
+        out: Folder of the results; in ``source`` it is no submission.
 
     Returns:
         The rows, sorted by key; those of the roster that handed in nothing are among them.
@@ -96,7 +99,7 @@ def take_in(
     """
     folder = _opened(source, staging)
     _refuse_single(folder, source)
-    entries = list(_entries(folder, staging, on_left_out))
+    entries = list(_entries(folder, staging, on_left_out, out))
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected a folder or an archive of each")
     rows = _matched(entries, roster) if roster is not None else [_row(item) for item in entries]
@@ -138,36 +141,75 @@ def _from_roster(student: Student, base: Path, staging: Path) -> HandedIn:
         problem = _clone(student.submission, target)
         return replace(row, fault=problem) if problem else replace(row, path=target)
     path = base / student.submission
-    if not path.exists():
-        return replace(row, fault=f"{shown(student.submission)} does not exist")
-    return replace(row, path=path)
+    try:
+        path.stat()
+        fault = _BARE if _is_bare(path) else ""
+    except (FileNotFoundError, ValueError):
+        # A ValueError where no file can have that name: there is a NUL in it.
+        fault = f"{shown(student.submission)} does not exist"
+    except OSError as error:
+        fault = f"{shown(student.submission)} cannot be read: {error.strerror}"
+    return replace(row, fault=fault) if fault else replace(row, path=path)
 
 
 def _clone(url: str, target: Path) -> str:
     """Clone a repository; says what went wrong, or nothing."""
-    command = ["git", "-c", "core.hooksPath=/dev/null", "-c", "protocol.ext.allow=never"]
-    command += ["clone", "--quiet", "--depth", "1", "--no-recurse-submodules", "--", url]
+    options = ["--quiet", "--depth", "1", "--no-recurse-submodules"]
     try:
-        done = subprocess.run(
-            [*command, str(target)],
-            env={**os.environ, "GIT_TERMINAL_PROMPT": "0", "GIT_LFS_SKIP_SMUDGE": "1"},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_CLONE_LIMIT_S,
-            check=False,
-        )
+        _git("clone", *options, "--", url, str(target))
+        if _git("-C", str(target), "for-each-ref", "--count=1"):
+            return ""
+        # Git takes a HEAD that names no branch for an empty repository: after a push of `main` to
+        # where HEAD is `master`, nobody may be told to have handed in nothing.
+        heads = _git("ls-remote", "--heads", "--", url).split("\n")
+        branches = [head.partition("refs/heads/")[2] for head in heads if head]
+        if len(branches) == 1:
+            shutil.rmtree(target)
+            _git("clone", *options, f"--branch={branches[0]}", "--", url, str(target))
     except FileNotFoundError:
         return "git is not installed"
     except subprocess.TimeoutExpired:
         return f"git clone took longer than {_CLONE_LIMIT_S:.0f} s"
-    if done.returncode == 0:
-        return ""
-    # Below its reason git says what one might look at.
-    lines = done.stderr.strip().split("\n")
-    reason = next((line for line in lines if line.startswith("fatal: ")), lines[-1])
-    return f"git clone failed: {shown(reason.removeprefix('fatal: '))}"
+    except subprocess.CalledProcessError as error:
+        # Below its reason git says what one might look at.
+        lines = error.stderr.strip().split("\n")
+        reason = next((line for line in lines if line.startswith("fatal: ")), lines[-1])
+        return f"git clone failed: {shown(reason.removeprefix('fatal: '))}"
+    if len(branches) > 1:
+        names = shown(", ".join(branches))
+        return f"HEAD of the repository names none of its branches, which are {names}"
+    return ""
+
+
+def _git(*arguments: str) -> str:
+    """Run git, which asks for nothing and runs nothing of the repository; gives its output.
+
+    Raises:
+        FileNotFoundError: Git is not installed.
+        TimeoutExpired: It took too long.
+        CalledProcessError: It failed.
+    """
+    done = subprocess.run(
+        ["git", "-c", "core.hooksPath=/dev/null", "-c", "protocol.ext.allow=never", *arguments],
+        # What it says is looked for words.
+        env={**os.environ, "GIT_TERMINAL_PROMPT": "0", "GIT_LFS_SKIP_SMUDGE": "1", "LC_ALL": "C"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=_CLONE_LIMIT_S,
+        check=True,
+    )
+    return done.stdout
+
+
+def _is_bare(path: Path) -> bool:
+    """Whether it is a repository without its files: what git itself looks for."""
+    try:
+        return all((path / part).exists() for part in ("HEAD", "objects", "refs"))
+    except OSError:
+        # Why it cannot be read is told by whoever reads it.
+        return False
 
 
 def _opened(source: Path, staging: Path) -> Path:
@@ -205,11 +247,15 @@ def _is_ignored(item: Path) -> bool:
     return item.name.startswith(".") or item.name in _IGNORED
 
 
-def _entries(folder: Path, staging: Path, on_left_out: Callable[[str], None]) -> Iterator[_Entry]:
+def _entries(
+    folder: Path, staging: Path, on_left_out: Callable[[str], None], out: Path | None
+) -> Iterator[_Entry]:
     metadata = _gradescope(folder / GRADESCOPE_METADATA)
     canvas: dict[str, list[tuple[Path, re.Match[str]]]] = {}
     for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
         if _is_ignored(item) or item.name == GRADESCOPE_METADATA:
+            continue
+        if out is not None and item.resolve() == out.resolve():
             continue
         match = _CANVAS.fullmatch(item.name) if item.is_file() else None
         if item.name in metadata:
@@ -237,7 +283,7 @@ def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> _Entry
     path, fault = first, ""
     if len(files) > 1 or not first.name.lower().endswith(SUFFIXES):
         path = staging / f"canvas-{match['user']}"
-        fault = _gather({_AGAIN.sub("", named["file"]): file for file, named in files}, path)
+        fault = _gather(_names(files), path)
     late = any(named["late"] for _, named in files)
     return _Entry(
         shown(f"{match['name']}_{match['user']}"),
@@ -246,6 +292,17 @@ def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> _Entry
         late=late,
         fault=fault,
     )
+
+
+def _names(files: list[tuple[Path, re.Match[str]]]) -> dict[str, Path]:
+    """Each file under the name that it was handed in with, as far as that tells them apart."""
+    plain = [_AGAIN.sub("", named["file"]) for _, named in files]
+    names = {
+        name if plain.count(name) == 1 else named["file"]: file
+        for name, (file, named) in zip(plain, files, strict=True)
+    }
+    # The same name twice, which Canvas does not give: nothing of it may be lost.
+    return names if len(names) == len(files) else {file.name: file for file, _ in files}
 
 
 def _gather(files: Mapping[str, Path], folder: Path) -> str:
@@ -289,8 +346,9 @@ def _of_gradescope(item: Path, about: Any) -> _Entry:
 
 
 def _row(entry: _Entry) -> HandedIn:
-    path = None if entry.fault else entry.path
-    return HandedIn(entry.key, path, entry.name, entry.late, fault=entry.fault)
+    fault = entry.fault or (_BARE if _is_bare(entry.path) else "")
+    path = None if fault else entry.path
+    return HandedIn(entry.key, path, entry.name, entry.late, fault=fault)
 
 
 def _with_problem(row: HandedIn, problem: str) -> HandedIn:
@@ -344,9 +402,15 @@ def _owners(entry: _Entry, known: Mapping[str, set[str]]) -> set[str]:
 
 def _unique(rows: list[HandedIn]) -> list[HandedIn]:
     """Rows sorted by key, with a number behind a key that is there already."""
+    # A browser numbers what it saves in the same way, so `ana (2)` may be there as well.
+    taken = {row.key for row in rows}
     counts: dict[str, int] = {}
     found = []
     for row in sorted(rows, key=lambda item: item.key):
-        count = counts[row.key] = counts.get(row.key, 0) + 1
-        found.append(row if count == 1 else replace(row, key=f"{row.key} ({count})"))
+        key, number = row.key, counts.get(row.key, 0) + 1
+        while number > 1 and (key := f"{row.key} ({number})") in taken:
+            number += 1
+        counts[row.key] = number
+        taken.add(key)
+        found.append(replace(row, key=key))
     return found

@@ -29,6 +29,8 @@ SUBMISSIONS = "submissions"
 _PARTIAL = ".partial"
 _LOCK = ".lock"
 _EARLIER = "earlier"
+_REPLACED = "#replaced"
+"""Behind the name of a result that makes way for another; no key has such a folder."""
 _LONGEST_NAME = 120
 
 
@@ -83,6 +85,7 @@ class Ledger:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 raise UsageError(f"{self.out}: another batch is writing to it") from error
+            self._put_back()
             shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
             (self.out / _PARTIAL).mkdir()
             try:
@@ -111,13 +114,20 @@ class Ledger:
         for item in (*partial.rglob("*"), partial):
             _sync(item)
         if target.exists():
-            old = partial.with_name(partial.name + ".old")
+            old = partial.with_name(partial.name + _REPLACED)
             target.rename(old)
             partial.rename(target)
             shutil.rmtree(old, ignore_errors=True)
         else:
             partial.rename(target)
         _sync(target.parent)
+
+    def _put_back(self) -> None:
+        """Undo what :meth:`put` was killed in: the result before is whole, and so is its past."""
+        for old in (self.out / _PARTIAL).glob(f"*{_REPLACED}"):
+            target = self.out / SUBMISSIONS / old.name.removesuffix(_REPLACED)
+            if not target.exists():
+                old.rename(target)
 
     def result(self, key: str) -> Result | None:
         """A row's result, or None where it is not graded yet or was damaged."""

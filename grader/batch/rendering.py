@@ -11,6 +11,7 @@ from pathlib import Path
 from grader.assignment.load import load_assignment
 from grader.assignment.selection import select, visible_part
 from grader.batch.files import RESULT_FILE, Written, write_report
+from grader.batch.ledger import BATCH_FILE, Ledger
 from grader.batch.regrading import find, regrade
 from grader.errors import UsageError
 from grader.grade import Grade
@@ -27,19 +28,37 @@ _load = cache(load_assignment)
 def find_reports(out: Path) -> tuple[Path, ...]:
     """The report folders at a path: itself, or those of a class in it, sorted.
 
-    Hidden folders are left out: a batch that still runs writes in them.
+    Hidden folders are left out: a batch that still runs writes in them. So is what a batch has
+    left in its folder of rows that it does not have any more, or of what was handed in before.
 
     Raises:
-        UsageError: There is none.
+        UsageError: There is none, or the batch's list of its rows is damaged.
     """
     if (out / RESULT_FILE).is_file():
         return (out,)
+    if (out / BATCH_FILE).is_file():
+        return _of_batch(Ledger(out))
     inside = sorted(file.parent.relative_to(out) for file in out.rglob(RESULT_FILE))
     hidden = [path for path in inside if any(part.startswith(".") for part in path.parts)]
     found = tuple(out / path for path in inside if path not in hidden)
     if not found:
         raise UsageError(f"{out}: there is no {RESULT_FILE} in it, nor in a folder below it")
     return found
+
+
+def _of_batch(ledger: Ledger) -> tuple[Path, ...]:
+    _, entries = ledger.read()
+    found = []
+    for entry in entries:
+        if entry.fault:
+            continue
+        result = ledger.result(entry.key)
+        damaged = result is None and (ledger.folder(entry.key) / RESULT_FILE).is_file()
+        if damaged or (result is not None and result.submission.sha256 == entry.sha256):
+            found.append(ledger.folder(entry.key))
+    if not found:
+        raise UsageError(f"{ledger.out}: nothing of this batch is graded yet")
+    return tuple(sorted(found))
 
 
 def read_results(out: Path) -> tuple[Result, ...]:

@@ -93,7 +93,7 @@ def read_roster(file: Path) -> Roster:
     """Read a roster.
 
     Args:
-        file: CSV with commas or semicolons and a header; a Canvas export will do.
+        file: CSV with commas, semicolons or tabs and a header; a Canvas export will do.
 
     Raises:
         UsageError: It cannot be read, or no column names a student.
@@ -120,7 +120,7 @@ def parse_roster(text: str, source: str) -> Roster:
         UsageError: No column names a student.
     """
     first = text.partition("\n")[0]
-    delimiter = ";" if first.count(";") > first.count(",") else ","
+    delimiter = max(",;\t", key=first.count)
     reader = csv.reader(io.StringIO(text), delimiter=delimiter)
     try:
         header = next(reader, [])

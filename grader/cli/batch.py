@@ -80,7 +80,7 @@ def batch(
         Ledger(out).opened() as ledger,
         ClassProgress(quiet) as progress,
     ):
-        names, rows = _rows(submissions, roster, staging, progress)
+        names, rows = _rows(submissions, roster, out, staging, progress)
         for problem in names.problems if names else ():
             progress.note(f"{roster or submissions}: {problem}")
         work = Batch(loaded, ledger, frozenset(retry or ()))
@@ -103,6 +103,7 @@ def batch(
                 f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same command "
                 "goes on with the others"
             )
+            write_class([*done, *work.left(done)], ledger)
             raise
         finally:
             if crew is not None:
@@ -119,7 +120,7 @@ def batch(
 
 
 def _rows(
-    submissions: Path, roster: Path | None, staging: Path, progress: ClassProgress
+    submissions: Path, roster: Path | None, out: Path, staging: Path, progress: ClassProgress
 ) -> tuple[Roster | None, list[HandedIn]]:
     from grader.batch.intake import take_in, take_in_roster
     from grader.batch.roster import read_roster
@@ -133,7 +134,7 @@ def _rows(
     def left_out(name: str) -> None:
         progress.note(f"{name} is neither a folder nor an archive, and is left out")
 
-    return read, take_in(submissions, staging, read, left_out)
+    return read, take_in(submissions, staging, read, left_out, out)
 
 
 def _at_once(jobs: str) -> int | None:
@@ -144,7 +145,7 @@ def _at_once(jobs: str) -> int | None:
     """
     if jobs == _AUTO:
         return None
-    if not (jobs.isdigit() and int(jobs) > 0):
+    if not (jobs.isdecimal() and int(jobs) > 0):
         raise UsageError(f"--jobs {jobs}: must be auto or a number from 1 on")
     return int(jobs)
 

@@ -85,16 +85,25 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     for row in rows:
         for change in row.changes:
             console.print(f"{row.done.entry.key}: {change}", soft_wrap=True)
+        if row.problem:
+            console.print(f"{row.done.entry.key}: not judged again: {row.problem}", soft_wrap=True)
     gain = [row for row in rows if row.gained > 0]
     lose = [row for row in rows if row.gained < 0]
     doubtful = sum(row.in_doubt for row in rows)
+    judged = sum(row.done.fresh for row in rows)
     console.print(
-        f"{len(rows)} judged again in {time.monotonic() - began_s:.1f} s: {len(gain)} gain "
+        f"{judged} judged again in {time.monotonic() - began_s:.1f} s: {len(gain)} gain "
         f"{sum(row.gained for row in gain):g} points, {len(lose)} lose "
         f"{-sum(row.gained for row in lose):g} points, "
         f"{sum(bool(row.changes) for row in rows)} with a change",
         soft_wrap=True,
     )
+    left = sum(bool(row.problem) for row in rows)
+    if left:
+        console.print(
+            f"{left} not judged again; run them again with `rosgrade batch ... --retry NAME`",
+            soft_wrap=True,
+        )
     if doubtful:
         console.print(
             f"{doubtful} cannot be judged from what was recorded and are not graded any more; "
@@ -103,5 +112,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
         )
     console.print(f"Overview: {overview}", soft_wrap=True)
     console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
-    graded = all(row.done.result is None or row.done.result.graded for row in rows)
+    graded = all(
+        not row.problem and (row.done.result is None or row.done.result.graded) for row in rows
+    )
     raise typer.Exit(0 if graded else NOT_GRADED)

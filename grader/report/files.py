@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import secrets
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
-from grader.errors import UsageError
+from grader.errors import GraderFault, UsageError
+
+_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 
 
 def write_whole(file: Path, content: str | bytes) -> None:
@@ -22,6 +25,7 @@ def write_whole(file: Path, content: str | bytes) -> None:
 
     Raises:
         UsageError: It cannot be written there.
+        GraderFault: The disk is full or broken.
     """
     data = content.encode() if isinstance(content, str) else content
     draft = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
@@ -35,7 +39,8 @@ def write_whole(file: Path, content: str | bytes) -> None:
         finally:
             draft.unlink(missing_ok=True)
     except OSError as error:
-        raise UsageError(f"{file} cannot be written: {error.strerror}") from error
+        kind = GraderFault if error.errno in _OF_THE_DISK else UsageError
+        raise kind(f"{file} cannot be written: {error.strerror}") from error
 
 
 def write_folders(place: Path, files: Mapping[str, str]) -> None:

@@ -30,6 +30,8 @@ _POINTS_POSSIBLE = "Points Possible"
 _CANVAS_ID = re.compile(r"\((\d+)\)\s*$")
 # How Canvas names what it lets a teacher download: name, perhaps LATE, user, attachment, file.
 _DOWNLOAD = re.compile(r"^[^_]+_(?:LATE_)?(\d+)_\d+_")
+# What `rosgrade batch` calls whoever handed that in: name and user.
+_DOWNLOADED = re.compile(r"^([^_]+)_(\d+)$")
 _OPTIONAL = ("SIS User ID", "SIS Login ID", "Integration ID", "Root Account")
 
 
@@ -119,7 +121,10 @@ def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
     text = text.removeprefix("\N{BYTE ORDER MARK}")
     first = text.partition("\n")[0]
     delimiter = ";" if first.count(";") > first.count(",") else ","
-    rows = [row for row in csv.reader(io.StringIO(text), delimiter=delimiter) if any(row)]
+    try:
+        rows = [row for row in csv.reader(io.StringIO(text), delimiter=delimiter) if any(row)]
+    except csv.Error as error:
+        raise UsageError(f"{name}: is not CSV: {error}") from error
     header = rows[0] if rows else []
     end = next((n + 1 for n, title in enumerate(header) if "Section" in title), 0)
     identity = tuple(header[:end])
@@ -288,7 +293,19 @@ def _students(export: CanvasExport, submission: str) -> list[int]:
         ]
         if found:
             return found
-    return []
+    downloaded = _DOWNLOADED.match(submission)
+    # A login may look like this too, so the name has to fit as well.
+    return [
+        number
+        for number, row in enumerate(export.students)
+        if downloaded
+        and row[1].strip() == downloaded[2]
+        and _letters(downloaded[1]) in map(_letters, _forms(row[0], name=True))
+    ]
+
+
+def _letters(name: str) -> str:
+    return re.sub(r"[\W_]+", "", name).casefold()
 
 
 def _forms(value: str, *, name: bool) -> set[str]:

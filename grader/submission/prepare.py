@@ -237,6 +237,8 @@ def _no_package(located: Located) -> str:
         return f"{problem}; {shown(alike[0])} must be called package.xml"
     if archives:
         return f"{problem}; hand in what is in {shown(archives[0])}, not the archive in another"
+    if any(file.path == ".gitmodules" for file in located.files):
+        return f"{problem}; git submodules come empty: commit the package itself"
     if leftovers:
         return f"{problem} (nobody looks into {shown(leftovers[0])}/: hand in src/)"
     if all(name.endswith(".py") for name in names):

@@ -5,6 +5,7 @@ What is handed in here cannot be built, so that nothing needs ROS.
 
 from __future__ import annotations
 
+import shutil
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -12,13 +13,14 @@ import pytest
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.batch.batch import Batch, Done
+from grader.batch.batch import NOT_YET, Batch, Done
 from grader.batch.crew import Crew, CrewLost, LocalCrew
 from grader.batch.files import RESULT_FILE
-from grader.batch.grading import Grading
-from grader.batch.intake import take_in
+from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
+from grader.batch.intake import HandedIn, take_in
 from grader.batch.ledger import Ledger
-from grader.errors import GraderFault
+from grader.batch.rendering import find_reports
+from grader.errors import GraderFault, UsageError
 from grader.run.runner import Runner
 
 YAML = """\
@@ -151,3 +153,69 @@ def test_a_crew_that_grows_gets_more_to_do(course: Class) -> None:
 
     done = course.grade(Growing())
     assert {item.entry.fault for item in done.values()} == {"all at work"}
+
+
+def test_a_batch_of_another_assignment_replaces_no_grades(course: Class) -> None:
+    course.grade(course.crew())
+    before = course.written()
+    course.hand_in("dee", "third")
+    other = course.folder / "other"
+    other.mkdir()
+    (other / "assignment.yaml").write_text(YAML.replace("id: lesson", "id: other"))
+    with pytest.raises(UsageError, match="holds the grades of lesson; name a new folder"):
+        Batch(load_assignment(other), course.ledger, frozenset({"all"})).read(
+            take_in(course.folder / "class", course.folder)
+        )
+    assert course.written() == before
+    assert course.ledger.read()[0] == "lesson"
+
+
+def test_who_was_graded_with_another_version_is_named(course: Class) -> None:
+    course.grade(course.crew())
+    yaml = course.folder / "lesson" / "assignment.yaml"
+    yaml.write_text(YAML.replace("points: 1", "points: 2"))
+    course.loaded = load_assignment(yaml.parent)
+    with pytest.raises(UsageError, match=r"2 \(ana, ben\) graded with another version of lesson"):
+        course.grade(course.crew())
+    with pytest.raises(UsageError, match=r"1 \(ben\) graded with another version of lesson"):
+        course.grade(course.crew(), "cai")
+    done = course.grade(course.crew(), "ana", "ben")
+    assert {item.result.max_score for item in done.values() if item.result} == {2}
+
+
+def test_what_is_gone_has_no_grade(course: Class) -> None:
+    course.grade(course.crew())
+    shutil.rmtree(course.folder / "class" / "ben")
+    with course.ledger.opened():
+        batch = Batch(course.loaded, course.ledger)
+        rows = take_in(course.folder / "class", course.folder)
+        batch.read([*rows, HandedIn("ben", None, problem="handed in nothing")])
+        done = {item.entry.key: item for item in batch.grade({}, None)}
+    assert done["ben"].result is None and done["ana"].result is not None
+    assert [folder.name for folder in find_reports(course.ledger.out)] == ["ana", "cai"]
+
+
+def test_a_recording_that_is_damaged_costs_only_the_twin_its_grade(course: Class) -> None:
+    course.grade(course.crew())
+    record = course.ledger.folder("ana") / RECORDINGS_FOLDER / SUBMISSION_FILE
+    record.write_text("{}")
+    course.hand_in("dee", "first")
+    done = course.grade(course.crew())
+    assert done["dee"].result is None
+    assert done["dee"].entry.fault.endswith("`--retry ana` grades both again")
+    assert {key for key, item in done.items() if item.result} == {"ana", "ben", "cai"}
+    again = course.grade(course.crew(), "ana")
+    assert not again["dee"].entry.fault and again["dee"].result is not None
+
+
+def test_an_interrupted_batch_knows_what_it_has_not_come_to(course: Class) -> None:
+    course.grade(course.crew())
+    course.hand_in("dee", "third")
+    (course.folder / "class" / "ben" / "notes.txt").write_text("handed in again")
+    with course.ledger.opened():
+        batch = Batch(course.loaded, course.ledger, frozenset({"ana"}))
+        _, to_do = batch.read(take_in(course.folder / "class", course.folder))
+        assert set(to_do) == {"ana", "ben", "dee"}
+        left = {item.entry.key: item for item in batch.left(())}
+    assert {key for key, item in left.items() if item.result is not None} == {"ana", "cai"}
+    assert left["ben"].entry.problem == left["dee"].entry.problem == NOT_YET

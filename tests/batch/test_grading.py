@@ -376,6 +376,34 @@ def test_what_cannot_be_judged_again_is_no_loss_of_points(
     assert row.in_doubt and row.gained == 0.0
 
 
+def test_what_cannot_be_read_again_keeps_its_grade_and_is_told(
+    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    first, _ = grade(recording())
+    sha256 = first.prepared.record.sha256
+    names = ("ada", "ben", "cai", "dee")
+    with Ledger(tmp_path / "out").opened() as ledger:
+        for name in names:
+            partial = ledger.partial(name)
+            shutil.copytree(tmp_path / "recordings", partial / "recordings")
+            write_graded(first, partial, Clock())
+            ledger.put(name, partial)
+        entries = [*(Entry(name, sha256=sha256) for name in names[:3]), Entry("dee", sha256="0")]
+        ledger.write([*entries, Entry("eli", problem="handed in nothing")], "lesson", lesson.sha256)
+        (ledger.folder("ada") / "recordings" / "run.mcap").write_bytes(b"cut")
+        (ledger.folder("ben") / "result.json").write_text("")
+        ada, ben, cai, dee, eli = regrade_class(lesson, ledger)
+    assert "run.mcap: damaged recording: " in ada.problem
+    assert ada.done.result is not None and not ada.done.fresh
+    assert ada.done.entry.problem == f"not judged again: {ada.problem}"
+    assert not cai.problem and cai.done.fresh
+    for row in (ben, dee):
+        assert row.problem == "there is no result of it; run the batch again"
+        assert row.done.result is None
+    assert not eli.problem and eli.done.entry.problem == "handed in nothing"
+    assert ledger.read()[1][0].problem == ""
+
+
 def test_a_folder_without_recordings_is_a_wrong_use(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there are no recordings in it"):
         find(tmp_path)

@@ -183,6 +183,40 @@ def test_who_is_in_the_roster_twice_is_told_on_the_row(course: Path, staging: Pa
     assert len(rows) == 2
 
 
+def test_a_number_behind_a_name_is_taken_from_nobody(course: Path, staging: Path) -> None:
+    folder(course / "ana")
+    archive(course / "ana.zip")
+    archive(course / "ana (2).zip")
+    rows = take_in(course, staging)
+    assert {row.key: row.path for row in rows} == {
+        "ana": course / "ana",
+        "ana (2)": course / "ana (2).zip",
+        "ana (3)": course / "ana.zip",
+    }
+
+
+def test_the_folder_of_the_results_is_no_submission(course: Path, staging: Path) -> None:
+    folder(course / "ana")
+    (course / "results").mkdir()
+    (row,) = take_in(course, staging, out=course / ".." / "class" / "results")
+    assert row.key == "ana"
+
+
+def test_two_files_of_canvas_that_differ_by_a_number_are_both_kept(
+    course: Path, staging: Path
+) -> None:
+    (course / "ana_1_10_node-1.py").write_text("one")
+    (course / "ana_1_11_node-2.py").write_text("two")
+    (course / "ana_1_12_setup-3.py").write_text("three")
+    (row,) = take_in(course, staging)
+    assert row.path is not None
+    assert {file.name: file.read_text() for file in row.path.iterdir()} == {
+        "node-1.py": "one",
+        "node-2.py": "two",
+        "setup.py": "three",
+    }
+
+
 def test_one_submission_is_not_taken_for_a_class(course: Path, staging: Path) -> None:
     (course / "src" / "pkg").mkdir(parents=True)
     (course / "src" / "pkg" / "package.xml").write_text("<package/>")
@@ -218,6 +252,63 @@ def test_a_roster_may_name_paths_and_repositories(tmp_path: Path, staging: Path)
     )
     assert rows["dee"].path is None and rows["dee"].fault == "nowhere does not exist"
     assert rows["eli"].problem == "handed in nothing"
+
+
+def repository(path: Path, branch: str) -> Path:
+    """A bare repository with one branch, to which its HEAD does not point."""
+    origin = folder(path.with_suffix(".work"))
+    git = ["git", "-C", str(origin), "-c", "user.name=a", "-c", "user.email=a@b"]
+    subprocess.run([*git, "init", "-q"], check=True)
+    subprocess.run([*git, "add", "."], check=True)
+    subprocess.run([*git, "commit", "-qm", "first"], check=True)
+    subprocess.run(["git", "init", "-q", "--bare", str(path)], check=True)
+    (path / "HEAD").write_text("ref: refs/heads/elsewhere\n")
+    subprocess.run([*git, "push", "-q", str(path), f"HEAD:{branch}"], check=True)
+    return path
+
+
+def test_a_repository_whose_head_names_no_branch_is_not_taken_for_empty(
+    tmp_path: Path, staging: Path
+) -> None:
+    one = repository(tmp_path / "one.git", "refs/heads/main")
+    two = repository(tmp_path / "two.git", "refs/heads/main")
+    git = ["git", "-C", str(two)]
+    subprocess.run([*git, "branch", "draft", "main"], check=True)
+    subprocess.run(["git", "init", "-q", "--bare", str(tmp_path / "none.git")], check=True)
+    roster = parse_roster(
+        f"login,submission\nana,file://{one}\nben,file://{two}\ncai,file://{tmp_path}/none.git\n",
+        "roster.csv",
+    )
+    ana, ben, cai = take_in_roster(roster, tmp_path, staging)
+    assert ana.path is not None and (ana.path / "pkg" / "package.xml").is_file()
+    assert ben.path is None and ben.fault.endswith("of its branches, which are draft, main")
+    assert cai.path is not None and not cai.fault
+
+
+def test_a_bare_repository_is_told_and_not_graded_as_a_folder(
+    course: Path, tmp_path: Path, staging: Path
+) -> None:
+    repository(course / "ana.git", "refs/heads/main")
+    rows = {row.key: row for row in take_in(course, staging)}
+    roster = parse_roster("login,submission\nana,ana.git\n", "roster.csv")
+    (named,) = take_in_roster(roster, course, staging)
+    for row in (rows["ana.git"], named):
+        assert row.path is None and row.fault.startswith("is a bare git repository")
+
+
+def test_a_path_that_no_file_can_have_is_told_on_its_row(tmp_path: Path, staging: Path) -> None:
+    folder(tmp_path / "here")
+    named = {"ana": "here", "ben": "x" * 300, "cai": "a\0b"}
+    roster = Roster(tuple(Student(2, login=who, submission=path) for who, path in named.items()))
+    ana, ben, cai = take_in_roster(roster, tmp_path, staging)
+    assert ana.path == tmp_path / "here"
+    assert ben.fault.endswith("cannot be read: File name too long")
+    assert cai.fault == "a\\x00b does not exist"
+
+
+def test_a_roster_may_have_tabs_between_its_cells() -> None:
+    roster = parse_roster("id\tname\n1\tLopez, Ana\n", "r.csv")
+    assert [(student.id, student.name) for student in roster.students] == [("1", "Lopez, Ana")]
 
 
 def test_rows_of_a_roster_that_cannot_be_used_are_named() -> None:

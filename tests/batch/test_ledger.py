@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,36 @@ def test_a_grade_that_is_replaced_is_kept_beside_the_new_one(tmp_path: Path) -> 
     assert (folder / "result.json").read_text() == "third"
     earlier = sorted((folder / "earlier").iterdir())
     assert [file.read_text() for file in earlier] == ["first", "second"]
+
+
+def test_a_grade_that_was_about_to_be_replaced_is_put_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ledger = Ledger(tmp_path / "out")
+    with ledger.opened():
+        for text in ("first", "second"):
+            partial = ledger.partial("ana")
+            (partial / "result.json").write_text(text)
+            ledger.put("ana", partial)
+    rename, killed = Path.rename, tmp_path / "killed"
+
+    def kill(path: Path, target: Path) -> Path:
+        # All that is there is kept as a kill -9 would leave it, with the result out of its place.
+        if target == ledger.folder("ana"):
+            shutil.copytree(ledger.out, killed)
+        return rename(path, target)
+
+    with ledger.opened(), monkeypatch.context() as patched:
+        partial = ledger.partial("ana")
+        (partial / "result.json").write_text("third")
+        patched.setattr(Path, "rename", kill)
+        ledger.put("ana", partial)
+    found = Ledger(killed)
+    assert not found.folder("ana").exists()
+    with found.opened():
+        assert (found.folder("ana") / "result.json").read_text() == "second"
+        earlier = {file.read_text() for file in (found.folder("ana") / "earlier").iterdir()}
+        assert "first" in earlier
 
 
 def test_a_gradebook_that_is_replaced_is_kept_beside_the_new_one(tmp_path: Path) -> None:

@@ -135,6 +135,37 @@ def test_after_kill_9_the_same_command_goes_on(
     assert not (out / ".partial").exists()
 
 
+def test_after_ctrl_c_there_is_an_overview_of_what_is_graded(tmp_path: Path, course: Path) -> None:
+    for number in range(3):
+        handed_in(course, f"student{number}", "PERIOD_S = 0.3", f"PERIOD_S = 0.3  # {number}")
+    out = tmp_path / "out"
+    command = ["batch", "timed_publisher", str(course), "--out", str(out), "--sandbox", "none"]
+    batch = subprocess.Popen(
+        [sys.executable, "-m", "grader", *command, "--jobs", "1"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
+    assert batch.stderr is not None
+    for line in batch.stderr:
+        if "1 of 3" in line:
+            break
+    batch.send_signal(signal.SIGINT)
+    _, said = batch.communicate()
+    assert batch.returncode == 130
+    assert "interrupted; " in said and "Traceback" not in said
+    rows = grades(out)
+    assert len(rows) == 3
+    for name, row in rows.items():
+        graded = (out / "submissions" / name / "result.json").is_file()
+        assert row["score"] == ("10" if graded else "")
+        assert row["note"] == ("" if graded else "not graded yet: the batch was interrupted")
+    overview = (out / "index.html").read_text(encoding="utf-8")
+    assert "not graded yet: the batch was interrupted" in overview
+
+
 def test_one_submission_in_place_of_a_class_is_a_mistake_of_use(
     rosgrade: Rosgrade, tmp_path: Path
 ) -> None:

@@ -118,3 +118,13 @@ def test_the_schemas_are_json_schemas(rosgrade: Rosgrade, document: str) -> None
 
     schema = json.loads(rosgrade("schema", document).stdout)
     assert schema["$defs"]
+
+
+@pytest.mark.parametrize("jobs", ["0", "-1", "1.5", "²", "many"])
+def test_a_number_of_jobs_that_is_none_is_told(
+    rosgrade: Rosgrade, tmp_path: Path, jobs: str
+) -> None:
+    place = lesson(tmp_path)
+    ended = rosgrade("batch", place, tmp_path, "--out", tmp_path / "out", f"--jobs={jobs}")
+    assert ended.returncode == 2
+    assert "must be auto or a number from 1 on" in ended.stderr and "Traceback" not in ended.stderr

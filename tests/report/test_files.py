@@ -1,10 +1,12 @@
 """A file is written whole or not at all."""
 
+import errno
 import os
+from pathlib import Path
 
 import pytest
 
-from grader.errors import UsageError
+from grader.errors import GraderFault, UsageError
 from grader.report.files import write_whole
 
 
@@ -48,3 +50,13 @@ def test_a_folder_in_its_place_is_named_and_no_draft_is_left(tmp_path):
     with pytest.raises(UsageError, match=r"result\.json cannot be written: Is a directory"):
         write_whole(folder, "text")
     assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_a_full_disk_is_no_wrong_use(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(GraderFault, match=r"result\.json cannot be written: No space left"):
+        write_whole(tmp_path / "result.json", "text")
+    assert not list(tmp_path.iterdir())

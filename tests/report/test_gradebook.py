@@ -65,12 +65,23 @@ def fill(results, export=EXPORT, column="ROS 2 Publisher"):
         "Ana Lopez",
         "ana_lopez",
         "lopezana_90211_77_hw.zip",
+        "lopezana_90211",
     ],
 )
 def test_a_student_is_found_by_what_canvas_knows(name):
     filled = fill([result(name)])
     assert canvas_reads(filled.text) == {"90211": {"ROS 2 Publisher (48211)": "3"}}
     assert filled.problems == ()
+
+
+def test_a_number_behind_another_name_is_nobody():
+    with pytest.raises(UsageError, match="team_90211: not matched"):
+        fill([result("team_90211")])
+
+
+def test_a_quote_that_never_ends_is_told():
+    with pytest.raises(UsageError, match=r"gb\.csv: is not CSV: field larger"):
+        read_canvas('Student,ID,Section\n"' + "x," * 100_000, "gb.csv")
 
 
 def test_a_late_download_is_found_too():

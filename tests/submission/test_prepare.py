@@ -46,6 +46,7 @@ def test_an_empty_zip(tmp_path: Path, named_ros: RosInstallation) -> None:
         ({"bot/package.xml.txt": ""}, "bot/package.xml.txt must be called package.xml"),
         ({"bot.zip": ""}, "hand in what is in bot.zip"),
         ({"install/bot/package.xml": "", "x": ""}, "nobody looks into install/: hand in src/"),
+        ({".gitmodules": "", "README.md": ""}, "git submodules come empty"),
         ({"COLCON_IGNORE": "", "bot/package.xml": ""}, "below a COLCON_IGNORE"),
         ({".src/bot/package.xml": ""}, "in a hidden folder"),
     ],
