@@ -23,6 +23,13 @@ _LOGGER_HINT = (
     "A logger takes one text: self.get_logger().info(f'x = {x}'), or info(str(x)) for a value "
     "alone."
 )
+_TOO_MANY_BY_PLACE = re.compile(r"Node\.create_\w+\(\) takes .*positional arguments? but")
+_NOT_A_MESSAGE = re.compile(r"Expected <class '[\w.]+\.(\w+)'>, got <class '([\w.]+)'>")
+_NOT_A_PERIOD = re.compile(r"float\(\) argument must be a .*number, not '(\w+)'")
+_TIMER_HINT = (
+    "create_timer takes the period first, a number of seconds, then the function: "
+    "self.create_timer(0.5, self.timer_callback)."
+)
 # Parts of a message -> what to try. The names in them are rclpy's own, or those of Python.
 _HINTS = {
     "no running event loop": "rclpy runs coroutines itself, without asyncio, so that "
@@ -32,10 +39,21 @@ _HINTS = {
     "RcutilsLogger.": _LOGGER_HINT,
     "rclpy_logging_rcutils_log(): incompatible": _LOGGER_HINT,
     "without a depth setting": "Say how many messages are kept: QoSProfile(..., depth=10).",
-    "Expected <class '": "publish() takes a message of the publisher's class: fill one in, "
-    "msg = Int64(data=1), and publish that.",
     "unexpected keyword argument 'qos'": "The argument is called qos_profile; without a name it "
     "is the last one.",
+    "rclpy_resolve_name(): incompatible": "First the class of the messages, then the name of the "
+    "topic as a text: create_publisher(String, 'chatter', 10), and the same way in "
+    "create_subscription.",
+    "'PoseWithCovariance' object has no": "An Odometry holds the pose two levels deep: msg.pose "
+    "has a covariance too, and msg.pose.pose is the pose.",
+    "'TwistWithCovariance' object has no": "An Odometry holds the twist two levels deep: "
+    "msg.twist has a covariance too, and msg.twist.twist is the twist.",
+    "Expected QoSProfile or int": "The queue size comes last: create_publisher(String, 'chatter', "
+    "10), create_subscription(String, 'chatter', self.callback, 10).",
+    "generator already executing": "Do not spin in a callback: the executor that called it spins "
+    "already, and calls the next one when this one returns.",
+    "Node.create_timer() got an unexpected keyword": _TIMER_HINT,
+    "Node.create_timer() missing": _TIMER_HINT,
     "can only concatenate str": "Write an f-string in place of +: f'x = {x:.2f}'.",
     "'Parameter' and": "get_parameter() gives a Parameter; what it holds is "
     "self.get_parameter('name').value.",
@@ -72,7 +90,32 @@ def slip_hint(failure: Failure) -> str | None:
             "Vector3(x=1.0, y=2.0, z=0.0). If it is a class of your own: its __init__ takes "
             "nothing but self."
         )
-    if failure.type == "AssertionError" and failure.frames[-1].file.endswith("rclpy/qos.py"):
+    published = _NOT_A_MESSAGE.match(failure.message)
+    if published and published[2].endswith(f".Metaclass_{published[1]}"):
+        return (
+            f"That is the class {code(published[1])} itself: make a message of it with brackets, "
+            f"msg = {published[1]}(), fill it in and publish that."
+        )
+    if published:
+        return (
+            "publish() takes a message of the publisher's class: make one, "
+            f"msg = {published[1]}(), fill it in and publish that."
+        )
+    if _TOO_MANY_BY_PLACE.match(failure.message):
+        return (
+            "After the queue size, or after the callback of a timer or a service, arguments are "
+            "given by name: callback_group=group."
+        )
+    raised_in = failure.frames[-1].file if failure.frames else ""
+    if _NOT_A_PERIOD.match(failure.message) and raised_in.endswith("rclpy/node.py"):
+        return _TIMER_HINT
+    if failure.message.endswith("is not callable") and raised_in.endswith("rclpy/executors.py"):
+        return (
+            "rclpy was given something else than a function to call, perhaps the result of one: "
+            "hand over a callback without brackets, self.create_timer(0.5, self.timer_callback). "
+            "With them you call it yourself, once and at once."
+        )
+    if failure.type == "AssertionError" and raised_in.endswith("rclpy/qos.py"):
         return (
             "A policy is a member of its enum, such as DurabilityPolicy.TRANSIENT_LOCAL, and not "
             "its name as a text."

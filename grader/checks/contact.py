@@ -42,12 +42,19 @@ _STUCK_HINT = (
     "A loop in a callback never sees a newer scan, because the next one waits for its end: decide "
     "once for each scan, publish once and return."
 )
+_SLOW_HINT = (
+    "A time.sleep() in the callback lets scans wait in the queue, and what is decided then is from "
+    "an old one; so is it in a slow timer. Publish in the callback of the scan, and return at once."
+)
 # Commands that were sent so long before contradict each other.
 _LATELY_NS = NS
 # Fewer commands to stop may come of noise.
 _CONTRADICTIONS = 3
 # A command that is older was not answered to one of the last two scans of the slowest LiDAR.
 _HELD_NS = NS // 2
+# So many scans, of which so many had an answer, are no chance.
+_FEW_SCANS = 10
+_ANSWERED = 0.8
 # Several scans of any LiDAR.
 _BLIND_NS = NS
 # Rest before something moving ran into the robot.
@@ -109,7 +116,9 @@ def why_touched(recording: Recording) -> Cause | None:
     blind = f"; the last scan had come {blind_ns / NS:.2f} s before" if blind_ns else ""
     held_ns = 0 if blind else _held_ns(recording, step, before)
     held = f", sent {held_ns / NS:.2f} s before" if held_ns else ""
-    deeper = None if blind or held else _stuck(recording) or _contradicted(recording, step)
+    deeper = None
+    if not blind and not held:
+        deeper = _stuck(recording) or _contradicted(recording, step) or _slow(recording, step)
     more, hint = deeper or ("", _hint(recording, before))
     return Cause(
         f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, "
@@ -143,6 +152,18 @@ def _contradicted(recording: Recording, step: Truth) -> tuple[str, str] | None:
     return (
         f"; {stops} of {counted(len(lately), 'command')} in the last second were to stop",
         _CONTRADICTED_HINT,
+    )
+
+
+def _slow(recording: Recording, step: Truth) -> tuple[str, str] | None:
+    """Fewer commands than scans, time and again: words for it, and what to try."""
+    sent = [item.time_ns for item in commands(recording) if item.time_ns <= step.time_ns]
+    told = [item for item in scans(recording) if sent and sent[0] <= item.stamp_ns <= step.time_ns]
+    if len(told) < _FEW_SCANS or len(sent) >= _ANSWERED * len(told):
+        return None
+    return (
+        f"; only {counted(len(sent), 'command')} followed the {len(told)} scans until then",
+        f"{_SLOW_HINT} {_DECIDED_HINT}",
     )
 
 

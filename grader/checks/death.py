@@ -67,7 +67,8 @@ _HINTS = {
     "NotInitializedException": "Call rclpy.init() before you create the node.",
     "ParameterNotDeclaredException": "Call self.declare_parameter(name, default) before "
     "self.get_parameter(name).",
-    "InvalidTopicNameException": "A topic name has letters, digits, `_` and `/` only.",
+    "InvalidTopicNameException": "A topic name has letters, digits, `_` and `/` only. No part of "
+    "it begins with a digit, and it does not end with `/`.",
     "InvalidNodeNameException": "A node name has letters, digits and `_` only.",
     "EOFError": "A launched node has no keyboard, so input() cannot read: take the value from a "
     "ROS parameter.",
@@ -119,7 +120,8 @@ _OTHER_CLASS = re.compile(r'convert_from_py: Assertion .strncmp\("[\w.]*\.(\w+)"
 _OTHER_FIELD = re.compile(r"Assertion .Py(Long|Float|Unicode|Bool)_Check\(")
 _FIELD_HINTS = {
     "Long": "A field of integers in a message was given something else, such as a float or a text: "
-    "write int(value), and look for a parameter whose default is 1.0 or '1' in place of 1.",
+    "write int(value), and look for a parameter whose default is 1.0 or '1' in place of 1, or of "
+    "which .value is missing: get_parameter('name').value.",
     "Float": "A field of floats in a message was given something else, such as a text or a whole "
     "vector: write float(value).",
     "Unicode": "A text field of a message was given something else: write str(value).",

@@ -170,10 +170,19 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
             "self.create_timer(0.3, self.callback), and call rclpy.spin(node) in main().",
             evidence,
         )
+    if testimony.timer_of_zero(recording):
+        return Cause(
+            f"{seen}: the process declared a timer of 0 s, whose callbacks take all of the "
+            f"executor's time{where}",
+            "create_timer takes its period in seconds, and less than a second becomes 0 in whole "
+            "numbers, as in 300 // 1000 or int(0.3).",
+            evidence,
+        )
     return why_not_given(recording, seen, (group.node,), evidence.moments) or Cause(
         f"{seen}: something keeps the executor from coming round{where}",
         "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
-        "callback or in the constructor, and let a timer call again instead.",
+        "callback, in the constructor or in a loop around spin_once(), and let a timer call again "
+        "instead.",
         evidence,
     )
 

@@ -15,6 +15,7 @@ from grader.checks.node_absence import why_no_node
 from grader.checks.scan import misreading
 from grader.checks.sighting import endpoints_seen, first_seen
 from grader.checks.silence import why_silent
+from grader.checks.slip import was_integer, what_was_put
 from grader.checks.track import has_moved, index_at, is_at_rest
 from grader.checks.wording import code, codes, counted
 from grader.recording.model import NS, Incident, Kind, Owner, Recording
@@ -167,6 +168,15 @@ def _in_vain(recording: Recording, sent: tuple[Command, ...]) -> Cause:
             "Look at what is straight ahead before you drive.",
             evidence,
         )
+    fields = {"linear.x": first.twist.linear_m_s, "angular.z": first.twist.angular_rad_s}
+    for field, number in fields.items():
+        if was_integer(number):
+            return Cause(
+                f"{_STILL}: {what_was_put(number)} was put into {code(field)}, a float field, "
+                "which ROS misreads",
+                "A number in a message must be a float: write 1.0 instead of 1, or float(value).",
+                evidence,
+            )
     begin_ns = recording.truth[0].time_ns
     lost_s = taken_s(recording, begin_ns, recording.truth[-1].time_ns)
     if left_s < 0.2 and lost_s > 0.0:

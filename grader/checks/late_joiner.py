@@ -57,6 +57,15 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     least = max(0, parameters.last - meanwhile)
     if least <= len(history) <= parameters.last and _is_newest(history, before):
         return Finding.passed(expected, _seen(history, before), evidence)
+    publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
+    if len(history) > parameters.last and len(publishers) > 1:
+        return Finding.failed(
+            expected,
+            f"{_seen(history, before)}, of {len(publishers)} publishers, each of which keeps its "
+            "own",
+            "Call create_publisher once, in the constructor of the node, and not in a callback.",
+            evidence,
+        )
     if len(history) > parameters.last:
         return Finding.failed(
             expected,

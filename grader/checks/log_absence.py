@@ -268,6 +268,8 @@ def _other_values(
     """Lines come, but they show something else."""
     if not near:
         return None
+    # What a process writes at Ctrl+C is no answer to a message.
+    near = [line for line in near if line.time_ns <= recording.stop_ns] or near
     item = wanted[-1]
     printed = [numbers(line.text) for line in near]
     carried = {path for line in printed for path in shown(line, item, decimals)}

@@ -44,7 +44,8 @@ _READINGS = (
     Reading(
         "always 0",
         "A quaternion in ROS is x, y, z, w: read as w, x, y, z, no turn on the ground is left of "
-        f"it. {_FORMULA}.",
+        "it. Nor is one in roll or pitch: of as_euler('xyz') and euler_from_quaternion(), yaw is "
+        f"the last. {_FORMULA}.",
         lambda _: 0.0,
     ),
     Reading(

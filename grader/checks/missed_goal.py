@@ -353,6 +353,17 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
             "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z)): z alone is the sine of half the angle.",
         ),
     )
+    if abs(last.yaw_rad) <= heading_rad and abs(wrap_angle(headings[0][0])) <= heading_rad:
+        # Of a few radians so few degrees are left that nobody can tell them from 0.
+        headings = (
+            (
+                0.0,
+                ": as if goal_theta were 0, or were taken for degrees",
+                f"{radians} Log the value that your node has read: that of a float parameter is "
+                "parameter.value, or get_parameter_value().double_value.",
+            ),
+            *headings[1:],
+        )
     for heading, words, hint in headings:
         if abs(wrap_angle(heading - theta)) > 2.0 * heading_rad and (
             abs(wrap_angle(heading - last.yaw_rad)) <= heading_rad

@@ -177,7 +177,10 @@ def _lives_after(recording: Recording, name: str, time_ns: int) -> bool:
         call.service.startswith(f"{name}/") and (call.answered_ns or 0) > time_ns
         for call in recording.calls
     )
-    topics = {item.topic for item in recording.endpoints if item.node == name}
+    # Not what it subscribed to: that others publish.
+    topics = {
+        item.topic for item in recording.student_endpoints(Kind.PUBLISHER) if item.node == name
+    }
     published = any(
         message.stamp_ns > time_ns for topic in topics for message in recording.on(topic)[-1:]
     )

@@ -8,6 +8,7 @@ from statistics import mean
 
 from grader.assignment.unit import format_duration
 from grader.checks import testimony
+from grader.checks.blockage import long_wait
 from grader.checks.period import Interval, Limits, Verdict
 from grader.recording.model import Kind, Recording
 
@@ -21,6 +22,7 @@ _AT_ONCE = 0.1
 # So many timers of one period are not made by hand.
 _MADE_ANEW = 4
 _WORDS = {2: "twice", 3: "three times", 4: "four times", 5: "five times"}
+_ORDINALS = {2: "second", 3: "third"}
 _ONE_TIMER = "Create one timer in the constructor, once, and publish once in its callback."
 
 
@@ -111,6 +113,9 @@ def _wrong_period(
                 return Explanation(f"{amount} the expected period{said}", _seconds_hint(limits))
     if same:
         return Explanation(said.removeprefix("; "), _seconds_hint(limits))
+    skipped = _skipped(recording, declared, verdict, limits)
+    if skipped is not None:
+        return skipped
     if median_s < wanted_s:
         return _too_fast(recording, topic, limits)
     longer = format_duration(median_s - wanted_s)
@@ -125,8 +130,9 @@ def _wrong_period(
     if right:
         return Explanation(
             f"{longer} too long: the process declared a timer of {wanted}, but the executor "
-            "cannot call it again before the callbacks are done",
-            "Keep callbacks short: no sleep, no loop that waits, no long computation in them.",
+            "does not come round to it in time",
+            "Keep callbacks short: no sleep, no loop that waits, no long computation in them, nor "
+            "in a loop around spin_once().",
         )
     if median_s < 2.0 * wanted_s and verdict.regular:
         no_timer = testimony.traced(recording) and not testimony.said(recording, "timer")
@@ -137,6 +143,37 @@ def _wrong_period(
             "whatever the callback needs.",
         )
     return Explanation(f"{found} instead of {wanted}", _seconds_hint(limits))
+
+
+def _skipped(
+    recording: Recording, declared: list[float], verdict: Verdict, limits: Limits
+) -> Explanation | None:
+    """One timer that is fast enough, and a callback that publishes in some of its calls only."""
+    if len(declared) != 1 or not verdict.regular or declared[0] <= 0.0:
+        return None
+    calls = round(verdict.median_s / declared[0])
+    if calls < 2 or not math.isclose(verdict.median_s, calls * declared[0], rel_tol=_SAME / 2):
+        return None
+    faster = declared[0] < limits.period_s * (1.0 - _SAME)
+    if not faster and not _comes_round(recording, limits):
+        return None
+    hint = f"Publish in every call of a timer of {format_duration(limits.period_s)}."
+    if faster:
+        hint += (
+            " A callback that compares times itself publishes only with the next call after its "
+            "time has come."
+        )
+    return Explanation(
+        f"the process declared a timer of {format_duration(declared[0])}, and only every "
+        f"{_ORDINALS.get(calls, f'{calls}th')} call of it published",
+        hint,
+    )
+
+
+def _comes_round(recording: Recording, limits: Limits) -> bool:
+    """Whether the executor answers so soon that no callback keeps a timer waiting."""
+    waited = long_wait(recording, {node.name for node in recording.student_nodes})
+    return waited is not None and waited[1] < _AT_ONCE * limits.period_s
 
 
 def _too_fast(recording: Recording, topic: str, limits: Limits) -> Explanation:

@@ -30,7 +30,7 @@ from grader.checks.rotation_evidence import evidence_of, right_words, shown
 from grader.checks.rotation_slip import explain, wrong_part
 from grader.checks.sighting import first_seen
 from grader.checks.silence import why_silent
-from grader.checks.slip import was_integer
+from grader.checks.slip import was_integer, what_was_put
 from grader.checks.unanswered import why_raised
 from grader.checks.wording import code, counted, listing
 from grader.recording.model import NS, Recording
@@ -210,10 +210,12 @@ def _wrong(
 
 def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> tuple[str, str]:
     """What went wrong, in words, and what to try."""
-    if any(was_integer(value) for case in wrong for value in case.answers[0].row):
+    misread = [v for case in wrong for v in case.answers[0].row if was_integer(v)]
+    if misread:
         return (
-            "an integer was put into a float field, which ROS misreads",
-            "A number in a message must be a float: write 1.0 instead of 1, and 0.0 instead of 0.",
+            f"{what_was_put(misread[0])} was put into a float field, which ROS misreads",
+            "A number in a message must be a float: write 1.0 instead of 1, 0.0 instead of 0, and "
+            "float(value) of what is another type, such as numpy.float32.",
         )
     infinite = [case for case in wrong if not case.answers[0].finite]
     if 2 * len(infinite) >= len(wrong):

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from grader.checks import ground
 from grader.checks.command import number, scans
 from grader.checks.ground import Sight
 from grader.checks.measure import metres, side
 from grader.checks.wording import code
-from grader.recording.model import Message, Recording
+from grader.recording.model import NS, Message, Recording, Truth
 
 # As near as this is "the same distance" for an explanation.
 _SAME_M = 0.06
 _CONE_RAD = math.radians(20.0)
+# What the robot drove on with for longer than this is not what stopped it: a filter of some
+# scans and a slow timer have decided by then.
+_DECIDED_NS = NS
+# Every so many steps of the simulator are looked at.
+_STRIDE = 10
 
 
 @dataclass(frozen=True)
@@ -63,29 +70,24 @@ def misreading(
         distance_m: At which it should stop, or None where that is not known.
     """
     scan = newest(recording, time_ns)
-    if (
-        nearest is not None
-        and abs(nearest.bearing_rad) > _CONE_RAD
-        and (
-            nearest.distance_m <= distance_m + _SAME_M
-            if distance_m is not None
-            else nearest.distance_m <= 1.0
-        )
-    ):
-        return Misreading(
-            f"{code(nearest.name)} was then {metres(nearest.distance_m)} away, "
-            f"{side(nearest.bearing_rad)}, as if the nearest of all beams counted",
-            "Look at the beam straight ahead only, not at min(ranges): its index is "
-            "round(-angle_min / angle_increment).",
-        )
     turned_rad = 0.0 if recording.scene is None else recording.scene.lidar.yaw_rad
     seen = None if scan is None else front(scan, turned_rad)
-    if seen == 0.0:
+    beside = _beside(recording, time_ns, nearest, distance_m)
+
+    def reported_zero(step: Truth) -> bool:
+        before = newest(recording, step.time_ns)
+        return before is not None and front(before, turned_rad) == 0.0
+
+    # Before the nearest of all: where a beam is 0.0, so is min(ranges).
+    if seen == 0.0 and not _drove_on(recording, time_ns, reported_zero):
         return Misreading(
             "the beam straight ahead reported 0.0 then, which means that nothing came back",
             "A range below range_min is no obstacle: ignore ranges outside of range_min to "
-            "range_max.",
+            "range_max."
+            + (f" If you do: {beside.hint[0].lower()}{beside.hint[1:]}" if beside else ""),
         )
+    if beside is not None:
+        return beside
     if seen is not None and not math.isfinite(seen):
         return Misreading(
             f"the beam straight ahead reported {seen:g} then: nothing within its range",
@@ -93,6 +95,39 @@ def misreading(
             "false.",
         )
     return None
+
+
+def _beside(
+    recording: Recording, time_ns: int, nearest: Sight | None, distance_m: float | None
+) -> Misreading | None:
+    """Whether something beside the robot may have stopped it."""
+    if nearest is None or abs(nearest.bearing_rad) <= _CONE_RAD:
+        return None
+    if nearest.distance_m > (1.0 if distance_m is None else distance_m + _SAME_M):
+        return None
+    scene = recording.scene
+
+    def as_near(step: Truth) -> bool:
+        sight = None if scene is None else ground.nearest(scene, step)
+        return sight is not None and sight.distance_m <= nearest.distance_m
+
+    if _drove_on(recording, time_ns, as_near):
+        return None
+    return Misreading(
+        f"{code(nearest.name)} was then {metres(nearest.distance_m)} away, "
+        f"{side(nearest.bearing_rad)}, as if the nearest of all beams counted",
+        "Look at the beam straight ahead only, not at min(ranges): its index is "
+        "round(-angle_min / angle_increment).",
+    )
+
+
+def _drove_on(recording: Recording, time_ns: int, seen: Callable[[Truth], bool]) -> bool:
+    """Whether the robot was told to drive on long before, although it saw the same then."""
+    return any(
+        step.command_m_s > 0.0 and seen(step)
+        for step in recording.truth[::_STRIDE]
+        if step.time_ns < time_ns - _DECIDED_NS
+    )
 
 
 def _stamp_ns(message: Message) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 import sys
 from collections.abc import Mapping
 from itertools import pairwise
@@ -13,6 +14,8 @@ from grader.checks.wording import value_text
 
 _FACTORS = {1000.0: "1000 times", 100.0: "100 times", 10.0: "10 times"}
 _FACTOR_TOLERANCE = 1e-6
+# As bits of a numpy.float32 this is a number next to nothing, 1e-38.
+_MOST_DIGITS = 1 << 23
 
 
 def explain(
@@ -56,6 +59,16 @@ def was_integer(number: Any) -> bool:
     return isinstance(number, float) and 0.0 < abs(number) < sys.float_info.min
 
 
+def what_was_put(number: float) -> str:
+    """What was put into a float field in place of a float, for one that :func:`was_integer`.
+
+    Of an integer rclpy takes the number of its digits for a float, or a small integer itself; of a
+    numpy.float32 all of its bits, the exponent among them.
+    """
+    (bits,) = struct.unpack("<Q", struct.pack("<d", abs(number)))
+    return "a numpy.float32" if bits > _MOST_DIGITS else "an integer"
+
+
 def accumulates(expected: Any, series: list[Any]) -> bool:
     """Whether a field that should stay the same grows by the same step in every message."""
     if not _is_number(expected) or len(series) < 3 or not all(map(_is_number, series)):
@@ -71,7 +84,8 @@ def _integer(numbers: list[Difference]) -> str:
     bad = next((item for item in numbers if was_integer(item.observed)), None)
     if bad is None:
         return ""
-    return f"{bad.field} is a float field, but an integer was put into it, which ROS misreads"
+    put = what_was_put(bad.observed)
+    return f"{bad.field} is a float field, but {put} was put into it, which ROS misreads"
 
 
 def _not_a_number(numbers: list[Difference]) -> str:

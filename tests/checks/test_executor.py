@@ -101,6 +101,12 @@ class TestBlocked:
         assert "something keeps the executor from coming round" in found
         assert "never called" not in found
 
+    def test_a_timer_of_zero(self):
+        run = recording(calls=calls(None), declarations=declarations(timer_s=0.0))
+        found = failing("executor.responsive", run)
+        assert "the process declared a timer of 0 s" in found
+        assert "300 // 1000" in found and "while True" not in found
+
     def test_a_node_in_spin_when_it_was_interrupted_is_not_blamed_for_that_line(self):
         log = output(traceback("KeyboardInterrupt", source="rclpy.spin(node)", line=30))
         finding = responsive(recording(calls=calls(None), log=log))

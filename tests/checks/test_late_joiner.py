@@ -62,6 +62,13 @@ def test_a_longer_queue():
     assert "depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL" in found
 
 
+def test_a_publisher_made_anew_for_each_message():
+    own = tuple(endpoint(qos=LATCHED, appeared_s=0.35 + 0.1 * n) for n in range(12))
+    found = failing("qos.late_joiner", joined(12, endpoints=(*own, reader())), **LAST_10)
+    assert "of 12 publishers, each of which keeps its own" in found
+    assert "Call create_publisher once" in found
+
+
 def test_a_shorter_queue():
     assert "it got 9 of the 12 messages before it: the publisher's depth is 9" in failing(
         "qos.late_joiner", joined(9, depth=9), **LAST_10

@@ -295,6 +295,12 @@ class TestOtherValues:
     def test_another_beam(self):
         assert "`2.50`, which shows `ranges[180]`" in front(lines("2.50", SCAN_TIMES_S))
 
+    def test_what_is_written_at_ctrl_c_answers_no_message(self):
+        log = lines("2.50", SCAN_TIMES_S) + output(traceback("KeyboardInterrupt"), time_s=4.25)
+        found = front(log, stop_s=4.2)
+        assert "`2.50`, which shows `ranges[180]`" in found
+        assert "File" not in found and "Traceback" not in found
+
     def test_the_nearest_of_all_beams(self):
         found = front(lines("front 0.618", SCAN_TIMES_S))
         assert "none shows `ranges[0]` = 1.83" in found

@@ -313,6 +313,7 @@ class TestEqual:
             # What rclpy makes of `msg.linear.x = 1`, in Python 3.11 and in 3.12.
             (twist((5e-324, 0, 0)), "linear.x is a float field, but an integer was put into it"),
             (twist((4e-323, 0, 0)), "linear.x is a float field, but an integer was put into it"),
+            (twist((5.12e-315, 0, 0)), "but a numpy.float32 was put into it"),
             (twist((math.inf, 0, 0)), "linear.x is infinite"),
             (twist((0, 0, 0), (0, 0, 0)), "published before its fields were set"),
         ],

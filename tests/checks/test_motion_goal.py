@@ -375,6 +375,7 @@ class TestMistakes:
             ((GOAL[1], GOAL[0], GOAL[2]), "x and y are swapped"),
             ((GOAL[0], -GOAL[1], GOAL[2]), "the sign of y changed"),
             ((GOAL[0], GOAL[1], math.radians(GOAL[2])), "taken for degrees"),
+            ((GOAL[0], GOAL[1], 0.0), "as if goal_theta were 0"),
             ((GOAL[0], GOAL[1], wrap(math.degrees(GOAL[2]))), "converted to degrees"),
             ((GOAL[0], GOAL[1], -GOAL[2]), "its sign changed"),
             ((GOAL[0], GOAL[1], GOAL[2] + math.pi), "the opposite of the goal's heading"),

@@ -1,6 +1,7 @@
 """Driving ahead and stopping in front of an obstacle, on runs of the real simulator core."""
 
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -170,6 +171,22 @@ class TestDrives:
             "motion.drives", run, speed="0.1 m/s"
         )
 
+    @pytest.mark.parametrize(
+        ("bits", "words"),
+        [
+            # What rclpy makes of the integer 1, in Python 3.11 and in 3.12, of numpy.float32(0.1)
+            # and of numpy.float32(-0.1).
+            (1, "an integer was put into `linear.x`"),
+            (8, "an integer was put into `linear.x`"),
+            (0x3DCCCCCD, "a numpy.float32 was put into `linear.x`"),
+            (0xBDCCCCCD, "a numpy.float32 was put into `linear.x`"),
+        ],
+    )
+    def test_a_speed_that_is_no_float(self, bits, words):
+        run = drive(on_scan(lambda _: (bits * 5e-324, 0.0)), seconds=2)
+        said = failing("motion.drives", run, speed="0.1 m/s")
+        assert words in said and "or float(value)" in said
+
     def test_the_wrong_field(self):
         run = drive(lambda _: None, seconds=2)
         sent = messages([0.6, 0.8], twist((0, 0.1, 0), (0, 0, 0)))
@@ -219,6 +236,38 @@ class TestStops:
         assert "reported 0.0" in failing("motion.keeps_driving", run, distance="1 m")
         assert "reported 0.0" in failing("motion.drives", run, speed="0.1 m/s")
 
+    def test_zero_ahead_comes_before_what_stands_beside_it(self):
+        def law(ranges):
+            return (0.1 if ranges[0] > 0.2 else 0.0, 0.0)
+
+        world = "{boxes: [{centre: [0.15, 0.21], size: [0.2, 0.1]}]}"
+        run = drive(on_scan(law), world=world, seconds=5, options={"lidar": {"no_return": "zero"}})
+        said = failing("motion.keeps_driving", run, distance="1 m")
+        assert "the beam straight ahead reported 0.0 then" in said
+        assert "`boxes[0]`" not in said
+
+    def test_whoever_drove_on_with_zero_ahead_did_not_stop_for_it(self):
+        def law(ranges):
+            return (0.0 if min(filter(None, ranges), default=1.0) <= 0.2 else 0.1, 0.0)
+
+        world = "{boxes: [{centre: [0.6, 0.21], size: [0.2, 0.1]}]}"
+        run = drive(on_scan(law), world=world, seconds=9, options={"lidar": {"no_return": "zero"}})
+        said = failing("motion.keeps_driving", run, distance="1 m")
+        assert "`boxes[0]` was then" in said and "reported 0.0" not in said
+
+    def test_what_it_drove_along_is_not_what_stopped_it(self):
+        def law(senses: Senses):
+            return (0.1 if senses.time_s < 5.0 else 0.0, 0.0) if senses.new_scan else None
+
+        world = "{segments: [[2, -1, 2, 1]], boxes: [{centre: [0.4, 0.21], size: [0.5, 0.1]}]}"
+        run = drive(law, world=world, seconds=9)
+        for check, parameters in (
+            ("motion.stops", STOPS),
+            ("motion.keeps_driving", {"distance": "1 m"}),
+        ):
+            said = failing(check, run, **parameters)
+            assert "nearest of all" not in said and "made it stop? Log" in said
+
     def test_never_stops(self):
         run = drive(lambda s: (0.1, 0.0) if s.new_scan else None, world=WALL, seconds=3)
         said = failing("motion.stops", run, **STOPS)
@@ -235,6 +284,24 @@ class TestStops:
         run = drive(on_scan(lambda ranges: good([ranges[270]])), world=WALL, seconds=12)
         said = failing("motion.no_contact", run)
         assert "It went on deciding to drive" in said and "sent" not in said
+
+    def test_fewer_commands_than_scans(self):
+        """Each callback sleeps for 300 ms, and decides with the scan that has waited longest."""
+        waiting, free_s = [], 0.0
+
+        def law(senses: Senses):
+            nonlocal free_s
+            if senses.new_scan and senses.scan is not None:
+                waiting.append(senses.scan.ranges_m)
+            if not waiting or senses.time_s < free_s:
+                return None
+            free_s = senses.time_s + 0.3
+            return good(waiting.pop(0))
+
+        run = drive(law, world=WALL, seconds=15)
+        said = failing("motion.no_contact", run)
+        assert re.search(r"only \d\d commands followed the \d\d scans until then", said)
+        assert "lets scans wait in the queue" in said
 
     def test_two_places_that_publish(self):
         def law(senses: Senses):

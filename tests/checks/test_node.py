@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.recording.model import Breach, Ending, Intervention, Owner, Wait
+from grader.recording.model import Breach, Ending, Intervention, Kind, Owner, Wait
 from grader.submission.record import BuildRecord, SourceError
 from tests.checks.builder import (
     BOT,
@@ -404,12 +404,23 @@ class TestAlive:
             (
                 "TypeError: Expected <class 'std_msgs.msg._int64.Int64'>, got <class 'int'>",
                 "self.publisher.publish(1)",
-                "publish() takes a message",
+                "publish() takes a message of the publisher's class: make one, msg = Int64()",
+            ),
+            (
+                "TypeError: Expected <class 'geometry_msgs.msg._twist.Twist'>, got <class "
+                "'geometry_msgs.msg._twist.Metaclass_Twist'>",
+                "self.publisher.publish(Twist)",
+                "with brackets, msg = Twist()",
             ),
             (
                 "TypeError: unsupported operand type(s) for -: 'Parameter' and 'float'",
                 "dx = self.goal_x - x",
                 "self.get_parameter('name').value",
+            ),
+            (
+                "AttributeError: 'PoseWithCovariance' object has no attribute 'position'",
+                "x = msg.pose.position.x",
+                "msg.pose.pose is the pose",
             ),
             (
                 'TypeError: can only concatenate str (not "float") to str',
@@ -445,6 +456,61 @@ class TestAlive:
     def test_what_rclpy_could_not_call(self, raised, words):
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=output(traceback(raised)))
         assert words in failing("node.alive", run)
+
+    @pytest.mark.parametrize(
+        ("raised", "file", "words"),
+        [
+            (
+                "TypeError: rclpy_resolve_name(): incompatible function arguments. The following "
+                "argument types are supported:",
+                "node.py",
+                "First the class of the messages",
+            ),
+            (
+                "TypeError: float() argument must be a string or a real number, not 'method'",
+                "node.py",
+                "create_timer takes the period first",
+            ),
+            (
+                "TypeError: Node.create_timer() got an unexpected keyword argument 'timer_period'",
+                "node.py",
+                "create_timer takes the period first",
+            ),
+            (
+                "TypeError: Node.create_subscription() takes 5 positional arguments but 6 were "
+                "given",
+                "node.py",
+                "callback_group=group",
+            ),
+            (
+                "TypeError: Expected QoSProfile or int, but received <class 'method'>",
+                "node.py",
+                "The queue size comes last",
+            ),
+            ("TypeError: 'NoneType' object is not callable", "executors.py", "without brackets"),
+            (
+                "ValueError: generator already executing",
+                "executors.py",
+                "Do not spin in a callback",
+            ),
+        ],
+    )
+    def test_a_wrong_call_of_rclpy(self, raised, file, words):
+        log = output(traceback(raised).replace("rclpy/node.py", f"rclpy/{file}"))
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        assert words in failing("node.alive", run)
+
+    @pytest.mark.parametrize(
+        "raised",
+        [
+            "TypeError: float() argument must be a string or a real number, not 'list'",
+            "TypeError: 'NoneType' object is not callable",
+        ],
+    )
+    def test_the_same_of_its_own(self, raised):
+        log = output(traceback(raised).replace(_IN_RCLPY, ""))
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        assert "Mend the line that is named here." in failing("node.alive", run)
 
     def test_a_wrong_call_of_its_own_is_no_callback(self):
         raised = "TypeError: Bot.tick() takes 1 positional argument but 2 were given"
@@ -530,6 +596,15 @@ class TestAlive:
     def test_a_node_that_was_destroyed_while_its_process_went_on(self):
         run = recording(nodes=(node(vanished_s=1.5),), messages=messages(every(0.3, 2)), calls=())
         assert "left the ROS graph 1.50 s after launch" in failing("node.alive", run, name=NODE)
+
+    def test_what_others_publish_is_no_sign_of_life(self):
+        run = recording(
+            nodes=(node(vanished_s=1.5),),
+            endpoints=(endpoint(), endpoint("/odom", kind=Kind.SUBSCRIPTION), reader()),
+            messages={**messages(every(0.3, 2)), **messages(every(0.1, 30), topic="/odom")},
+            calls=(),
+        )
+        assert "left the ROS graph 1.50 s after launch" in failing("node.alive", run)
 
     def test_a_helper_node_that_was_destroyed_is_not_the_node(self):
         helper = node("/settings", appeared_s=0.2, vanished_s=0.9)

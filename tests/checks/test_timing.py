@@ -12,6 +12,7 @@ from tests.checks.builder import (
     PERIOD_S,
     after,
     at,
+    call,
     declarations,
     declared,
     died,
@@ -292,6 +293,25 @@ class TestMistakes:
         found = wrong([0.405] * 10, declarations=())
         assert "declared" not in found
         assert "300 ms of sleeping plus 105 ms of work" in found
+
+    @pytest.mark.parametrize(
+        ("interval_s", "call"), [(0.4, "every 4th call"), (0.2, "every second call")]
+    )
+    def test_a_fast_timer_whose_callback_compares_times(self, interval_s, call):
+        found = wrong([interval_s] * 10, declarations=declarations(timer_s=0.1))
+        assert f"the process declared a timer of 100 ms, and only {call} of it published" in found
+        assert "Publish in every call of a timer of 300 ms" in found
+        assert "sleeping" not in found
+
+    def test_a_callback_that_publishes_every_second_time(self):
+        found = wrong([0.6] * 8)
+        assert "a timer of 300 ms, and only every second call of it published" in found
+        assert "compares times" not in found
+
+    def test_a_callback_that_takes_twice_the_period(self):
+        waiting = tuple(call(0.8 + 0.5 * n, 0.4) for n in range(6))
+        found = wrong([0.6] * 8, calls=waiting)
+        assert "the executor does not come round to it in time" in found
 
     def test_a_callback_that_takes_longer_than_the_period(self):
         found = wrong([0.42] * 10)
