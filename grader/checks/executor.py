@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import median
 from typing import Annotated
 
 from pydantic import AfterValidator, Field, field_validator
@@ -24,6 +25,7 @@ from grader.recording.model import NS, Call, Kind, Process, Recording
 
 _FORGIVING_FROM = 3
 _SERVICE = "/list_parameters"
+_MOST_MOMENTS = 5
 
 
 class Responsive(Parameters):
@@ -34,6 +36,10 @@ class Responsive(Parameters):
         0.9,
         description="Share of the calls that must be answered in time. Of three calls or more "
         "one may be late, unless it is 100 %.",
+    )
+    typically: Duration | None = Field(
+        None,
+        description="How long the median of the answers may take; by default it does not matter.",
     )
     node: Annotated[str, AfterValidator(node_name)] | None = Field(
         None,
@@ -78,7 +84,8 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     The probe calls the service `list_parameters` that every node has; a node can answer only
     while its executor spins. Calls count from the node's first message on (or, if it publishes
     nothing, from its appearance); those that were sent too late to be answered before the end
-    do not count. A callback may be busy for a while, as long as answers come in time.
+    do not count. A callback may be busy for a while, as long as answers come in time; with
+    `typically`, only as long as most of them come soon.
 
     Explains a loop with `time.sleep()` in the constructor, in main() or in a callback, and
     `rclpy.spin()` that was never called. For a node without parameter services it relies on
@@ -99,7 +106,9 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
         return _unasked(recording, names, expected)
     bad = [group for group in groups if not group.enough(parameters.share, len(group.late))]
     if not bad:
-        return Finding.passed(expected, _summary(groups, parameters), _evidence(recording, groups))
+        return _judge_median(recording, parameters, groups, expected) or Finding.passed(
+            expected, _summary(groups, parameters), _evidence(recording, groups)
+        )
     if all(_excused(recording, group, parameters) for group in bad):
         return Finding.error(
             expected,
@@ -140,13 +149,54 @@ def _working_from(recording: Recording, node: str) -> int:
 
 def _excused(recording: Recording, group: _Answers, parameters: Responsive) -> bool:
     """Whether few enough calls were late for another reason than what the host took."""
-    unexcused = 0
-    for call in group.late:
-        end_ns = call.answered_ns or recording.stop_ns
-        excess_s = (end_ns - call.requested_ns) / NS - parameters.within
-        if recording.taken_s(call.requested_ns, end_ns) < excess_s:
-            unexcused += 1
+    unexcused = sum(
+        _wait_s(recording, call, excused=True) > parameters.within for call in group.late
+    )
     return group.enough(parameters.share, unexcused)
+
+
+def _judge_median(
+    recording: Recording, parameters: Responsive, groups: list[_Answers], expected: str
+) -> Finding | None:
+    """The finding of nodes that answer in time, but mostly late; or None."""
+    allowed_s = parameters.typically
+    if allowed_s is None:
+        return None
+    expected += f", the median within {format_duration(allowed_s)}"
+    for group in groups:
+        median_s = median(_wait_s(recording, call) for call in group.judged)
+        if median_s <= allowed_s:
+            continue
+        observed = f"{code(group.node)} answered after {format_duration(median_s)} (median)"
+        own_s = median(_wait_s(recording, call, excused=True) for call in group.judged)
+        if own_s <= allowed_s:
+            return Finding.error(
+                expected,
+                f"{observed}, but the machine took the time from the process",
+                disturbed=True,
+            )
+        return Finding.failed(
+            expected,
+            f"{observed}: callbacks keep the executor busy most of the time",
+            "A callback does its work and returns at once: no time.sleep() in it. The timer calls "
+            "it again when its period is over.",
+            Evidence(
+                moments=tuple(
+                    Moment("call answered late", recording.since_launch_s(call.requested_ns))
+                    for call in group.judged
+                    if _wait_s(recording, call) > allowed_s
+                )[:_MOST_MOMENTS],
+                plots=_evidence(recording, groups).plots,
+            ),
+        )
+    return None
+
+
+def _wait_s(recording: Recording, call: Call, *, excused: bool = False) -> float:
+    """How long a call waited for its answer, perhaps without what the machine took meanwhile."""
+    end_ns = call.answered_ns or recording.stop_ns
+    taken_s = recording.taken_s(call.requested_ns, end_ns) if excused else 0.0
+    return (end_ns - call.requested_ns) / NS - taken_s
 
 
 def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> Cause:
@@ -230,7 +280,7 @@ def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
     return Evidence(
         moments=tuple(
             Moment("call not answered in time", recording.since_launch_s(call.requested_ns))
-            for call in late[:5]
+            for call in late[:_MOST_MOMENTS]
         ),
         plots=(plot,) if answered else (),
     )

@@ -75,6 +75,29 @@ class TestGood:
         assert responsive(run).status is Status.PASSED
 
 
+class TestMostlyBusy:
+    BUSY = tuple(call(0.6 + 0.5 * number, wait_s) for number, wait_s in
+                 enumerate([0.25, 0.05, 0.15, 0.25, 0.05, 0.15]))  # fmt: skip
+
+    def test_answers_in_time_that_are_mostly_late(self):
+        run = recording(calls=self.BUSY)
+        assert responsive(run).status is Status.PASSED
+        found = failing("executor.responsive", run, typically="100 ms")
+        assert "answered after 150 ms (median): callbacks keep the executor busy" in found
+        assert "no time.sleep() in it" in found
+
+    def test_a_few_late_answers_do_not_matter(self):
+        waits_s = [0.25, 0.002, 0.003, 0.25, 0.002, 0.002]
+        quick = tuple(call(0.6 + 0.5 * number, wait_s) for number, wait_s in enumerate(waits_s))
+        run = recording(calls=quick)
+        assert judge("executor.responsive", run, typically="100 ms").status is Status.PASSED
+
+    def test_a_busy_machine_is_not_a_busy_callback(self):
+        run = recording(calls=self.BUSY, disturbance=taken(0.6, 4.0, waited_s=1.5))
+        finding = judge("executor.responsive", run, typically="100 ms")
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+
+
 class TestBlocked:
     def test_a_loop_that_never_spins(self):
         found = failing("executor.responsive", recording(**LOOPING))
