@@ -104,16 +104,18 @@ def test_a_class_is_graded_and_nobody_is_forgotten(
     assert list(out.glob("submissions/ben/earlier/result-*.json"))
 
 
-def test_after_kill_9_the_same_command_goes_on(
-    rosgrade: Rosgrade, tmp_path: Path, course: Path
-) -> None:
-    for number in range(4):
+def class_command(course: Path, out: Path, count: int) -> list[str]:
+    """Let so many hand in something of their own; how to grade them."""
+    for number in range(count):
         handed_in(course, f"student{number}", "PERIOD_S = 0.3", f"PERIOD_S = 0.3  # {number}")
-    out = tmp_path / "out"
-    command = ["batch", "timed_publisher", str(course), "--out", str(out), "--sandbox", "none"]
+    return ["batch", "timed_publisher", str(course), "--out", str(out), "--sandbox", "none"]
+
+
+def after_the_first(command: list[str], folder: Path, number: signal.Signals) -> tuple[int, str]:
+    """Send a batch a signal when the first is graded; its exit status, and what it said then."""
     batch = subprocess.Popen(
         [sys.executable, "-m", "grader", *command, "--jobs", "1"],
-        cwd=tmp_path,
+        cwd=folder,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
@@ -121,10 +123,19 @@ def test_after_kill_9_the_same_command_goes_on(
     )
     assert batch.stderr is not None
     for line in batch.stderr:
-        if "1 of 4" in line:
+        if " 1 of " in line:
             break
-    batch.send_signal(signal.SIGKILL)
-    batch.communicate()
+    batch.send_signal(number)
+    _, said = batch.communicate()
+    return batch.returncode, said
+
+
+def test_after_kill_9_the_same_command_goes_on(
+    rosgrade: Rosgrade, tmp_path: Path, course: Path
+) -> None:
+    out = tmp_path / "out"
+    command = class_command(course, out, 4)
+    after_the_first(command, tmp_path, signal.SIGKILL)
     before = results(out)
     assert len(before) in (1, 2)
     ended = rosgrade(*command)
@@ -136,25 +147,9 @@ def test_after_kill_9_the_same_command_goes_on(
 
 
 def test_after_ctrl_c_there_is_an_overview_of_what_is_graded(tmp_path: Path, course: Path) -> None:
-    for number in range(3):
-        handed_in(course, f"student{number}", "PERIOD_S = 0.3", f"PERIOD_S = 0.3  # {number}")
     out = tmp_path / "out"
-    command = ["batch", "timed_publisher", str(course), "--out", str(out), "--sandbox", "none"]
-    batch = subprocess.Popen(
-        [sys.executable, "-m", "grader", *command, "--jobs", "1"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stderr=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        text=True,
-    )
-    assert batch.stderr is not None
-    for line in batch.stderr:
-        if "1 of 3" in line:
-            break
-    batch.send_signal(signal.SIGINT)
-    _, said = batch.communicate()
-    assert batch.returncode == 130
+    status, said = after_the_first(class_command(course, out, 3), tmp_path, signal.SIGINT)
+    assert status == 130
     assert "interrupted; " in said and "Traceback" not in said
     rows = grades(out)
     assert len(rows) == 3
