@@ -282,7 +282,9 @@ def content(install: Path) -> dict[str, str]:
     return {
         path.relative_to(install).as_posix(): place.sub("", path.read_text(errors="replace"))
         for path in install.rglob("*")
-        if path.is_file() and path.suffix not in (".pyc", ".so")
+        # Two generators of rosidl install a bot__type_support.c at one place, and which of them
+        # stays there is not always the same.
+        if path.is_file() and path.suffix not in (".pyc", ".so", ".c")
     }
 
 
