@@ -22,6 +22,8 @@ from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted
 from grader.recording.model import NS, Kind, Recording
 
+_BACKLOG_NS = NS
+"""What the machine holds up so long before keeps later messages waiting."""
 _SHOWN_LINES = 5
 _SENT = {
     "any": "",
@@ -164,8 +166,9 @@ def _too_seldom(
 
 
 def _own_s(recording: Recording, gap: tuple[int, int]) -> float:
-    """How long a gap is without what the machine took."""
-    return (gap[1] - gap[0]) / NS - recording.taken_s(*gap)
+    """How long a gap is without what the machine took in it, and shortly before."""
+    begin_ns, end_ns = gap
+    return (end_ns - begin_ns) / NS - recording.taken_s(begin_ns - _BACKLOG_NS, end_ns)
 
 
 def _passed(

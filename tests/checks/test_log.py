@@ -242,6 +242,9 @@ class TestAnyRhythmIsRight:
         finding = judge("log.follows", machine, **asked)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
         assert "no such line for 2 s, from 1.01 s after launch on" in finding.observed
+        # What waited then is worked on later.
+        before = replace(machine, disturbance=taken(0.3, 1.0, waited_s=0.6))
+        assert judge("log.follows", before, **asked).status is Status.ERROR
 
     def test_a_line_must_come_soon(self):
         late = lines("1.83", SCAN_TIMES_S, delay_s=0.15)
