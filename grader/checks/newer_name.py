@@ -45,7 +45,7 @@ class NewerName:
 
     Attributes:
         name: As in ``enum.StrEnum``.
-        home: What has it, such as ``Python 3.12``.
+        home: What has it, such as ``Python 3.12``, and what that needs in its turn.
     """
 
     name: str
@@ -61,7 +61,7 @@ def newer_name(failure: Failure, recording: Recording) -> NewerName | None:
     """
     dropped = _dropped_by_numpy(failure)
     if dropped is not None:
-        return NewerName(f"numpy.{dropped}", "numpy 1.26")
+        return NewerName(f"numpy.{dropped}", "numpy 1.26 (for Python 3.12 and older)")
     version = recording.environment.get("python", "")
     if not version or tuple(map(int, version.split(".")[:2])) >= _JAZZY_PYTHON:
         return None

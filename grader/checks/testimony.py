@@ -71,7 +71,7 @@ def in_no_executor(recording: Recording, node: str) -> bool:
         return False
     spins = [item.data for item in recording.declared("spin") if item.process == process.name]
     # Older recordings do not tell, and neither does an EventsExecutor, which is made in C++.
-    tells = bool(spins) and all("nodes" in spin for spin in spins)
+    tells = bool(spins) and all("tells_added" in spin for spin in spins)
     return tells and not declares(recording, "added", "node", node)
 
 

@@ -113,7 +113,7 @@ class TestBlocked:
         assert finding.evidence.places[0].line == 17
 
     def test_a_node_that_no_executor_has(self):
-        spin = declared("spin", executor="SingleThreadedExecutor", threads=1, nodes=0)
+        spin = declared("spin", executor="SingleThreadedExecutor", threads=1, tells_added=True)
         told = (*declarations(spin=False), spin)
         found = failing("executor.responsive", recording(calls=calls(None), declarations=told))
         assert ": an executor spins, but" in found

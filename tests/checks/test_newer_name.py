@@ -60,7 +60,7 @@ def test_a_name_that_ubuntu_s_numpy_has_costs_no_point(raised: str, name: str, p
     finding = ended_by(raised, python)
     assert finding.status is Status.ERROR
     assert f"uses `{name}`" in text(finding)
-    assert "it needs numpy 1.26" in text(finding)
+    assert "it needs numpy 1.26 (for Python 3.12 and older)" in text(finding)
 
 
 @pytest.mark.parametrize(

@@ -115,7 +115,7 @@ class TestResponds:
         assert "rclpy.spin() was never called" in failing("service.responds", run, **TRUE)
 
     def test_a_node_that_no_executor_has(self):
-        spin = declared("spin", executor="MultiThreadedExecutor", threads=4, nodes=1)
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=4, tells_added=True)
         told = (declared("started"), declared("node", node=NODE), spin)
         run = serving(asked(answer_s=None), declarations=told)
         assert "was not given to it" in failing("service.responds", run, **TRUE)

@@ -129,7 +129,7 @@ class TestNotAnswered:
         assert "rclpy.spin() was never called" in why(run)
 
     def test_a_node_that_no_executor_has(self):
-        told = (*declarations(timer_s=None, spin=False), spinning(nodes=1))
+        told = (*declarations(timer_s=None, spin=False), spinning(tells_added=True))
         run = asked(listener(), times_s=every(0.3, 5), declarations=told)
         found = why(run)
         assert f"an executor spins, but `{NODE}` was not given to it" in found
@@ -139,13 +139,13 @@ class TestNotAnswered:
         told = (
             *declarations(timer_s=None, spin=False),
             declared("added", 0.4, node=NODE),
-            spinning(nodes=1),
+            spinning(tells_added=True),
         )
         run = asked(listener(), times_s=every(0.3, 5), declarations=told)
         assert "not given to it" not in why(run)
 
     def test_an_executor_that_does_not_tell_which_nodes_it_has(self):
-        told = (*declarations(timer_s=None, spin=False), spinning(), spinning(nodes=1))
+        told = (*declarations(timer_s=None, spin=False), spinning(), spinning(tells_added=True))
         run = asked(listener(), times_s=every(0.3, 5), declarations=told)
         assert "not given to it" not in why(run)
 

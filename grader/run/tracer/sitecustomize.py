@@ -237,8 +237,7 @@ def _patch_executors(module: Any) -> None:
         # From the second call on the executor runs rclpy's own method again.
         self.wait_for_ready_callbacks = original.__get__(self)
         threads = getattr(getattr(self, "_executor", None), "_max_workers", 1)
-        nodes = len(self.get_nodes())
-        _report("spin", executor=type(self).__name__, threads=threads, nodes=nodes)
+        _report("spin", executor=type(self).__name__, threads=threads, tells_added=True)
         return original(self, *args, **kwargs)
 
     def added(self: Any, _: Any) -> None:
