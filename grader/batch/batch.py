@@ -23,6 +23,7 @@ from grader.report.facts import Clock
 from grader.report.files import write_whole
 from grader.report.grade_part import grade_json
 from grader.report.result_model import Result
+from grader.submission.locate import NO_FILES
 from grader.submission.paths import shown
 from grader.submission.prepare import fingerprint
 
@@ -88,7 +89,8 @@ class Batch:
             entry = Entry(row.key, row.name, row.late, problem=row.problem, fault=row.fault)
             if row.path is not None:
                 entry = self._identified(entry, row.path)
-                original = first.setdefault(entry.sha256, row.key) if entry.sha256 else row.key
+                distinct = entry.sha256 in ("", NO_FILES)
+                original = row.key if distinct else first.setdefault(entry.sha256, row.key)
                 if original != row.key:
                     entry = replace(entry, same_as=original)
                 elif not entry.fault:

@@ -10,7 +10,7 @@ import errno
 import os
 import stat
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -23,8 +23,10 @@ from grader.submission.members import (
     LeadsOut,
     resolve_link,
 )
-from grader.submission.paths import join, parents, shown
+from grader.submission.paths import is_within, join, parents, shown
 
+SOURCE_SPACE = "src"
+"""Where a colcon workspace has its packages."""
 IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 _CHANGED = frozenset({errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ESTALE})
 _OF_THE_MACHINE = frozenset(
@@ -60,6 +62,16 @@ class Listing:
 
     files: list[SubmissionFile] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
+
+    def inside(self, folder: str) -> Listing:
+        """The same seen from a folder that holds all files; ``.`` is the whole submission."""
+        if folder == ".":
+            return self
+        start = len(folder) + 1
+        return Listing(
+            [replace(file, path=file.path[start:]) for file in self.files],
+            sorted(path[start:] if is_within(path, folder) else path for path in self.skipped),
+        )
 
 
 class ChangedMeanwhile(GraderFault):
@@ -192,6 +204,39 @@ def _too_large(files: list[SubmissionFile], limits: ArchiveLimits) -> str:
         f"the submission holds more than {limits.total_bytes // MIB} MiB "
         f"(largest file so far: {shown(largest.path)}, {largest.size / MIB:.1f} MiB)"
     )
+
+
+def wrapper_of(files: Iterable[SubmissionFile]) -> str:
+    """The folders around the packages that hold nothing else: ``ana_hw1`` in ``ana_hw1/src/...``.
+
+    The same work is packed under another name by everybody who hands it in.
+
+    Args:
+        files: All files of the submission.
+
+    Returns:
+        The deepest one. ``src`` and what is in it belong to the submission; ``.`` where there is
+        no such folder, or no package, or where a link needs it.
+    """
+    files = tuple(files)
+    packages = find_packages(file.path for file in files)
+    if not packages:
+        return "."
+    wrapper = "."
+    for folder in reversed(parents(packages[0])):
+        if folder.rpartition("/")[2] == SOURCE_SPACE:
+            break
+        if not all(file.path.startswith(f"{folder}/") for file in files):
+            break
+        wrapper = folder
+    start = 0 if wrapper == "." else len(wrapper) + 1
+    links = {file.path[start:]: file.link for file in files if file.link is not None}
+    try:
+        for path in links:
+            resolve_link(path, links)
+    except LeadsOut:
+        return "."
+    return wrapper
 
 
 def find_packages(paths: Iterable[str]) -> list[str]:

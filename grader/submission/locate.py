@@ -28,10 +28,13 @@ from grader.submission.listing import (
     find_packages,
     list_files,
     unreadable,
+    wrapper_of,
 )
 from grader.submission.members import ArchiveLimits
 from grader.submission.paths import is_within, shown
 
+NO_FILES = hashlib.sha256().hexdigest()
+"""The hash of a submission that is empty."""
 _CHUNK = 1024 * 1024
 _PAUSES_S = (0.05, 0.5)
 """Before it is read again because somebody wrote to it meanwhile."""
@@ -46,7 +49,7 @@ class Located:
         id: The folder's or archive's name, without the archive's suffix.
         sha256: Hash over the files' paths, contents and executable bits, as hex.
         root: The private copy; holds exactly ``files``.
-        files: Sorted by path.
+        files: Sorted by path; folders that are just around all of it are left out of the paths.
         packages: Folders with a ``package.xml``, sorted; ``.`` for the submission itself.
         skipped: Folders that were left out, such as ``build`` and ``install``.
     """
@@ -156,13 +159,18 @@ def _snapshot(source: Path, root: Path, limits: ArchiveLimits) -> tuple[Listing,
     """Copy a folder as it was at one moment, as far as one can tell."""
     for pause_s in _PAUSES_S:
         try:
-            listing = list_files(source, limits)
-            return listing, _copy(source, listing, root)
+            return _snapshot_once(source, root, limits)
         except ChangedMeanwhile:
             shutil.rmtree(root, ignore_errors=True)
             time.sleep(pause_s)
+    return _snapshot_once(source, root, limits)
+
+
+def _snapshot_once(source: Path, root: Path, limits: ArchiveLimits) -> tuple[Listing, str]:
     listing = list_files(source, limits)
-    return listing, _copy(source, listing, root)
+    wrapper = wrapper_of(listing.files)
+    listing = listing.inside(wrapper)
+    return listing, _copy(source / wrapper, listing, root)
 
 
 def _copy(source: Path, listing: Listing, root: Path) -> str:

@@ -14,6 +14,7 @@ import pytest
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import NOT_YET, Batch, Done
+from grader.batch.class_files import notes
 from grader.batch.crew import Crew, CrewLost, LocalCrew
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
@@ -107,6 +108,15 @@ def test_of_the_same_submissions_either_may_be_named_to_be_graded_again(
     assert {key for key, item in done.items() if item.fresh} == {"ana", "cai"}
     after = course.written()
     assert after["ana"] != before["ana"] and after["ben"] == before["ben"]
+
+
+def test_two_who_handed_in_nothing_did_not_copy_from_each_other(course: Class) -> None:
+    for name in ("dora", "emil"):
+        (course.folder / "class" / name).mkdir()
+    done = course.grade(course.crew())
+    assert [done[key].entry.same_as for key in ("cai", "dora", "emil")] == ["ana", "", ""]
+    told = notes(list(done.values()))
+    assert told["dora"] == told["emil"] == "the submission is empty"
 
 
 def test_what_could_not_be_graded_is_told_on_the_row_of_its_twin_too(course: Class) -> None:

@@ -23,12 +23,47 @@ def as_zip(prefix: str = "") -> bytes:
 
 
 @pytest.mark.parametrize(
-    "folder", [".", "bot_publisher", "src/bot_publisher", "alice-main/ws/src/bot_publisher"]
+    ("folder", "found"),
+    [
+        (".", "."),
+        ("bot_publisher", "bot_publisher"),
+        ("src/bot_publisher", "src/bot_publisher"),
+        ("alice-main/ws/src/bot_publisher", "src/bot_publisher"),
+        ("alice-main/bot_publisher", "bot_publisher"),
+    ],
 )
-def test_a_package_is_found_under_any_number_of_folders(tree: Tree, folder: str) -> None:
+def test_a_package_is_found_under_any_number_of_folders(
+    tree: Tree, folder: str, found: str
+) -> None:
     with opened(tree.package(folder=folder)) as located:
-        assert located.packages == (folder,)
+        assert located.packages == (found,)
+        assert (located.root / found / "setup.py").read_text() == PACKAGE["setup.py"]
         assert located.id == "alice"
+
+
+def test_the_name_of_a_folder_around_everything_is_not_part_of_the_submission(
+    tree: Tree, tmp_path: Path
+) -> None:
+    tree.package(folder="ana_hw1/bot_publisher")
+    with opened(tree.write({"ana_hw1/README": "x", "ana_hw1/build/.built_by": "colcon"})) as ana:
+        files = [file.path for file in ana.files]
+    assert "README" in files and ana.skipped == ("build",)
+    (tmp_path / "ben.zip").write_bytes(
+        zip_bytes(
+            *((f"b/bot_publisher/{path}", text.encode()) for path, text in PACKAGE.items()),
+            ("b/README", b"x"),
+        )
+    )
+    assert sha256(tmp_path / "ben.zip") == ana.sha256
+
+
+def test_a_folder_around_everything_stays_where_a_link_goes_through_it(tree: Tree) -> None:
+    root = tree.package(folder="hw/bot_publisher")
+    (root / "hw/bot_publisher/again.py").symlink_to("../../hw/bot_publisher/setup.py")
+    with opened(root) as located:
+        assert located.packages == ("hw/bot_publisher",)
+        again = located.root / "hw/bot_publisher/again.py"
+        assert again.read_text() == PACKAGE["setup.py"]
 
 
 @pytest.mark.parametrize("name", ["bob.zip", "bob.ZIP", "bob.tar.gz", "bob.tgz"])
