@@ -129,7 +129,7 @@ def test_a_zip_of_a_whole_workspace_is_built_once(
     archive = tmp_path / "alice.zip"
     archive.write_bytes(zip_bytes(*content))
     found = prepare(archive, real_ros, cache=tmp_path / "cache")
-    assert [package.path for package in found.record.packages] == [f"ws/{FOLDER}"]
+    assert [package.path for package in found.record.packages] == [FOLDER]
     assert build_of(found).succeeded
 
 
@@ -147,6 +147,7 @@ def test_setup_py_that_raises_is_blamed(tree: Tree, real_ros: RosInstallation) -
 
 def test_odd_names_of_folders_are_built(tree: Tree, real_ros: RosInstallation) -> None:
     tree.package(folder="my bot/größe 🤖\n/'x'")
+    tree.write({"README": "A folder around everything would be left out of the path."})
     found = prepared(tree, real_ros)
     assert build_of(found).succeeded
     assert package_of(found).path == "my bot/größe 🤖\\n/'x'"
