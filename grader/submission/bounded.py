@@ -190,7 +190,9 @@ def _drain(
                 # To look may take long where there is much to count; that is not a stop.
                 seen = time.monotonic()
                 next_look = seen + _POLL_S
-            if selector.select(min(left, _POLL_S)):
+            # Asked first: what was written until its end is there to be read afterwards.
+            is_gone = process.poll() is not None
+            if selector.select(0.0 if is_gone else min(left, _POLL_S)):
                 block = os.read(process.stdout.fileno(), _CHUNK)
                 if not block:
                     return None
@@ -198,7 +200,7 @@ def _drain(
                 lines.feed(block)
                 if kept.total > limits.total:
                     return "output"
-            elif process.poll() is not None:
+            elif is_gone:
                 # Somebody holds the pipe although the supervisor is gone.
                 return None
 

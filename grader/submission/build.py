@@ -199,17 +199,19 @@ class _Workshop:
 
     def _check_machine(self, outcome: Outcome, scratch: Path, install: Path) -> None:
         """Raise what is not the student's fault."""
-        if outcome.status == 0 or outcome.ended_by_us:
+        if outcome.ended_by_us:
             return
         if outcome.status is not None and outcome.status < 0:
             raise GraderFault(
                 f"colcon was killed by signal {-outcome.status}; perhaps memory ran out"
             )
-        unstarted = _NOT_STARTED.match(outcome.output)
+        unstarted = _NOT_STARTED.match(outcome.output) if outcome.status else None
         if unstarted and "Starting >>>" not in outcome.output:
             raise GraderFault(f"the sandbox of the build could not be started: {unstarted[0]}")
-        if outcome.status is not None and _is_cut_off(outcome.output, self.sources.folders):
+        if _is_cut_off(outcome.output, self.sources.folders):
             raise GraderFault(f"colcon ended with status {outcome.status} in the middle of a build")
+        if outcome.status == 0:
+            return
         if "No space left on device" in outcome.output:
             free = min(shutil.disk_usage(path).free for path in (scratch, install.parent))
             if free < _LEAST_FREE_BYTES:

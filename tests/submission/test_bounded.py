@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import selectors
 import sys
 import time
 from pathlib import Path
@@ -46,6 +47,28 @@ def test_output_and_exit_status_are_told(tmp_path: Path) -> None:
     assert outcome.status == 3
     assert sorted(outcome.output.split()) == ["err", "out"]
     assert outcome.ended_by_us is None
+
+
+def test_what_is_written_while_nobody_could_read_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a busy machine, where the reader comes to itself when all has ended."""
+
+    class Late(selectors.DefaultSelector):
+        """Finds nothing at first, and tells it when the command is gone."""
+
+        found_nothing = False
+
+        def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+            if self.found_nothing:
+                return super().select(timeout)
+            self.found_nothing = True
+            os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)
+            return []
+
+    monkeypatch.setattr(bounded.selectors, "DefaultSelector", Late)
+    outcome = run("print('Finished')", tmp_path)
+    assert (outcome.status, outcome.output) == (0, "Finished\n")
 
 
 def test_a_signal_is_told_as_a_negative_status(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import os
 import subprocess
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -281,6 +282,21 @@ def test_a_colcon_that_is_killed_is_no_fault_of_the_student(
     tree.package({"setup.py": f"import os\nos.kill(os.getppid(), 9)\n{SETUP_PY}"})
     with pytest.raises(GraderFault, match="killed by signal 9"):
         prepared(tree, real_ros)
+
+
+@pytest.mark.parametrize("status", [0, 1])
+def test_a_colcon_that_never_says_how_a_package_ended_is_no_fault_of_the_student(
+    tree: Tree, real_ros: RosInstallation, tmp_path: Path, status: int
+) -> None:
+    tree.package()
+    python = tmp_path / "bin/python"
+    python.parent.mkdir()
+    python.symlink_to(real_ros.python)
+    python.with_name("colcon").write_text(
+        f"import sys\nprint('Starting >>> bot_publisher')\nsys.exit({status})\n"
+    )
+    with pytest.raises(GraderFault, match=f"status {status} in the middle of a build"):
+        prepared(tree, replace(real_ros, python=python))
 
 
 def test_a_sandbox_that_does_not_start_is_no_fault_of_the_student(
