@@ -38,7 +38,7 @@ _CALM_TICK_S = 0.1
 _GRAPH_PERIOD_S = 0.1
 # Who comes and goes later than the first match matters to no wait.
 _SETTLED_GRAPH_PERIOD_S = 0.25
-_PIPES_LIMIT_S = 1.0
+_PIPES_LIMIT_S = 5.0
 
 
 class Abandoned(Exception):
