@@ -25,10 +25,14 @@ def axis_angle(seed: int) -> list[dict]:
         ((0.6, 0.8, 0.0), -0.0005),
         ((0.0, 1.0, 0.0), 5.0 * math.pi),
         ((0.8, 0.0, 0.6), -3.5 * math.pi),
+        # Its largest part is 0, but it is no zero axis.
+        ((-1.0, 0.0, 0.0), QUARTER),
     ]
-    unit += [(_direction(chance), _angle(chance)) for _ in range(41)]
+    unit += [(_direction(chance), _angle(chance)) for _ in range(40)]
     other = [((1.0, 0.0, 1.0), QUARTER), ((0.0, 0.0, 2.0), QUARTER), ((1.0, 1.0, 1.0), 2.0)]
-    for _ in range(47):
+    # Its sum is 0, but it is no zero axis.
+    other.append(((1.0, -1.0, 0.0), 1.2))
+    for _ in range(46):
         length = 10.0 ** chance.uniform(-2.0, 2.0)
         other.append((_scaled(_direction(chance), length), _angle(chance)))
     return [_turn(axis, angle) for axis, angle in unit + other]
@@ -52,9 +56,11 @@ def quaternion(seed: int) -> list[dict]:
     chance = random.Random(f"{seed}/quaternion")
     half = math.sqrt(0.5)
     found = [(0.0, 0.0, 0.0, 1.0), (half, 0.0, 0.0, half), (0.0, 0.0, -half, half)]
+    # Half a turn: w is 0, but it is no zero quaternion.
+    found.append((1.0, 0.0, 0.0, 0.0))
     # Steep, but no gimbal lock: whoever takes a sine of 0.99 for one is always found out.
     found += [_pitched(math.radians(pitch), chance) for pitch in (84.5, -84.5)]
-    found += [_unit_quaternion(chance) for _ in range(55)]
+    found += [_unit_quaternion(chance) for _ in range(54)]
     return [_quaternion(item) for item in found]
 
 

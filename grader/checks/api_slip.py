@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from grader.checks.failure import Failure
-from grader.checks.wording import code
+from grader.checks.wording import code, codes
 
 # What rclpy's Node has as a property without a setter.
 _NODE_PROPERTIES = (
@@ -25,6 +25,11 @@ _LOGGER_HINT = (
 )
 _TOO_MANY_BY_PLACE = re.compile(r"Node\.create_\w+\(\) takes .*positional arguments? but")
 _NOT_A_MESSAGE = re.compile(r"Expected <class '[\w.]+\.(\w+)'>, got <class '([\w.]+)'>")
+_NO_POLICY = re.compile(r"Invalid arguments passed to constructor: dict_keys\((.*)\)")
+_POLICIES = (
+    *("history", "depth", "reliability", "durability", "lifespan", "deadline", "liveliness"),
+    *("liveliness_lease_duration", "avoid_ros_namespace_conventions"),
+)
 _NOT_A_PERIOD = re.compile(r"float\(\) argument must be a .*number, not '(\w+)'")
 _TIMER_HINT = (
     "create_timer takes the period first, a number of seconds, then the function: "
@@ -38,6 +43,11 @@ _HINTS = {
     "there, such as a float or a text in a field of integers: write int(value).",
     "RcutilsLogger.": _LOGGER_HINT,
     "rclpy_logging_rcutils_log(): incompatible": _LOGGER_HINT,
+    "Context.init() must only be called once": "rclpy.init() is called once in a program, at the "
+    "beginning of main(): remove the second call.",
+    "'numpy.ndarray' object has no attribute 'append'": "An array of fixed length has all its "
+    "values from the start, so that nothing can be appended: assign the whole list, "
+    "msg.values = [a, b].",
     "without a depth setting": "Say how many messages are kept: QoSProfile(..., depth=10).",
     "unexpected keyword argument 'qos'": "The argument is called qos_profile; without a name it "
     "is the last one.",
@@ -114,6 +124,13 @@ def slip_hint(failure: Failure) -> str | None:
             "rclpy was given something else than a function to call, perhaps the result of one: "
             "hand over a callback without brackets, self.create_timer(0.5, self.timer_callback). "
             "With them you call it yourself, once and at once."
+        )
+    unknown = _NO_POLICY.match(failure.message)
+    if unknown:
+        given = [name for name in re.findall(r"'(\w+)'", unknown[1]) if name not in _POLICIES]
+        return (
+            f"QoSProfile has no {codes(given, 'or')}: it takes history, depth, reliability, "
+            "durability, lifespan, deadline and liveliness, and depth is the queue size."
         )
     if failure.type == "AssertionError" and raised_in.endswith("rclpy/qos.py"):
         return (

@@ -246,7 +246,8 @@ def _judge_messages(
         expected,
         observed,
         "A queue size of 10 keeps the messages that come while the callback works. Look for a "
-        "callback that works too long, and for one that keeps the executor from coming round.",
+        "callback that works too long, for one that keeps the executor from coming round, and for "
+        "an `if` that leaves messages out.",
         evidence,
     )
 

@@ -64,9 +64,15 @@ _HINTS = {
     "IndentationError": "Indent the lines of a block by the same four spaces.",
     "TabError": "Indent with spaces only.",
     "NameError": "The name is used before it is defined, misspelt, or not imported.",
+    "UnboundLocalError": "A name that a function assigns anywhere is its own, and empty until "
+    "then, even where the module has one of the same name. What shall last from call to call "
+    "belongs to the node: self.count.",
     "NotInitializedException": "Call rclpy.init() before you create the node.",
     "ParameterNotDeclaredException": "Call self.declare_parameter(name, default) before "
     "self.get_parameter(name).",
+    "InvalidParameterTypeException": "A parameter has the type of its default: 1.0 takes floats, 1 "
+    "takes integers, 'a' takes texts. Give declare_parameter() a default of the type that is "
+    "asked for.",
     "InvalidTopicNameException": "A topic name has letters, digits, `_` and `/` only. No part of "
     "it begins with a digit, and it does not end with `/`.",
     "InvalidNodeNameException": "A node name has letters, digits and `_` only.",
@@ -282,7 +288,8 @@ def _returned(recording: Recording, process: Process, ended: str, evidence: Evid
     return Cause(
         f"{ended} with exit code 0: main() returned, or something called sys.exit()",
         "rclpy.spin(node) keeps a node alive until Ctrl-C. Look for what ends it: spin_once() "
-        "handles one round only, rclpy.shutdown() and sys.exit() end everything.",
+        "handles one round only, a daemon thread ends with main(), rclpy.shutdown() and sys.exit() "
+        "end everything.",
         evidence,
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from pydantic import Field
 
 from grader.assignment.name import Id, TopicName
@@ -18,6 +20,9 @@ from grader.recording.model import NS, Join, Kind, Message, Recording
 # The match is noted in the round after it.
 _NOTED_NS = NS // 10
 _SHOWN = 50
+_ONE_PUBLISHER_HINT = (
+    "Call create_publisher once, in the constructor of the node, and not in a callback."
+)
 
 
 class LateJoiner(Parameters):
@@ -40,7 +45,8 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     may count on either side.
 
     Explains a publisher that is volatile, a queue that is too short or too long, a history of
-    keep_all, a lifespan that is over, and a publisher that had not published enough.
+    keep_all, a lifespan that is over, publishers that are made anew for each message, and a
+    publisher that had not published enough.
     """
     expected = _expected_words(parameters)
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)
@@ -63,7 +69,7 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
             expected,
             f"{_seen(history, before)}, of {len(publishers)} publishers, each of which keeps its "
             "own",
-            "Call create_publisher once, in the constructor of the node, and not in a callback.",
+            _ONE_PUBLISHER_HINT,
             evidence,
         )
     if len(history) > parameters.last:
@@ -197,6 +203,15 @@ def _too_few(
         if queue.depth is not None
     ]
     why = f": the publisher's depth is {depths[0]}, declared by the process" if depths else ""
+    gone = [item for item in publishers if (item.vanished_ns or math.inf) <= join.joined_ns]
+    if gone and len(publishers) > len(gone):
+        return Finding.failed(
+            expected,
+            f"{_seen(history, before)}: what a publisher keeps is lost with it, and "
+            f"{counted(len(gone), 'publisher was', 'publishers were')} destroyed before it joined",
+            _ONE_PUBLISHER_HINT,
+            evidence,
+        )
     if depths and depths[0] >= parameters.last:
         return Finding.error(
             expected,

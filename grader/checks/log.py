@@ -13,14 +13,14 @@ from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.echo import Echo, Wanted, echoes, wanted_values
-from grader.checks.field import FieldPath
+from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.log_absence import why_not_logged
 from grader.checks.printed import quote
 from grader.checks.sighting import endpoints_seen
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted
-from grader.recording.model import NS, Kind, Recording
+from grader.recording.model import NS, Kind, Message, Recording
 
 _BACKLOG_NS = NS
 """What the machine holds up so long before keeps later messages waiting."""
@@ -82,12 +82,8 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     fields under each other's names; values that are logged only in the callback of another topic;
     a callback that logs nothing, and one that logs too seldom.
     """
-    expected = (
-        f"log lines that show {codes(parameters.fields)} of messages on {code(parameters.topic)}, "
-        f"to {counted(parameters.decimals, 'decimal')}, within "
-        f"{format_duration(parameters.within)} of {counted(parameters.at_least, 'message')} or more"
-        f"{_SENT[parameters.sent]}"
-    )
+    carried = recording.carried(parameters.topic)
+    expected = _words(parameters, carried)
     own = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
     if own:
         return Finding.failed(
@@ -99,7 +95,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         )
     messages = [
         message
-        for message in recording.carried(parameters.topic)
+        for message in carried
         if parameters.sent == "any"
         or (parameters.sent == "before_launch") == (message.stamp_ns < recording.launched_ns)
     ]
@@ -126,6 +122,21 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         decimals=parameters.decimals,
         within_ns=within_ns,
     ).finding(expected)
+
+
+def _words(parameters: Follows, messages: Sequence[Message]) -> str:
+    """What is expected; whole numbers have no decimals to speak of."""
+    try:
+        values = [value_at(messages[0].value, path) for path in parameters.fields]
+        whole = all(isinstance(value, int) for value in values)
+    except (IndexError, NoSuchField):
+        whole = False
+    decimals = "" if whole else f"to {counted(parameters.decimals, 'decimal')}, "
+    return (
+        f"log lines that show {codes(parameters.fields)} of messages on {code(parameters.topic)}, "
+        f"{decimals}within {format_duration(parameters.within)} of "
+        f"{counted(parameters.at_least, 'message')} or more{_SENT[parameters.sent]}"
+    )
 
 
 def _too_seldom(

@@ -27,6 +27,8 @@ from grader.recording.model import NS, Kind, LogLine, Recording
 _LOG_LINES = 5
 # A node whose callbacks return at once answers a call to its parameter services sooner.
 _SLOW_S = 0.5
+# Who may log less often than a message comes needs lines for no more than this share of them.
+_SOME = 0.5
 # Share of the time that the host may take before silence says nothing any more.
 _STARVED = 0.5
 
@@ -82,7 +84,7 @@ def why_not_logged(
     if cause is not None:
         return cause
     if found:
-        return _few(recording, topic, wanted, found)
+        return _few(recording, topic, wanted, found, needed)
     near = _near(recording, wanted, within_ns)
     return (
         _behind(recording, topic, wanted, near, decimals, within_ns)
@@ -150,7 +152,11 @@ def _dropped(recording: Recording, topic: str) -> Cause | None:
 
 
 def _few(
-    recording: Recording, topic: str, wanted: Sequence[Wanted], found: Sequence[Echo]
+    recording: Recording,
+    topic: str,
+    wanted: Sequence[Wanted],
+    found: Sequence[Echo],
+    needed: int,
 ) -> Cause:
     times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
@@ -169,9 +175,16 @@ def _few(
             HINT,
             Evidence(moments=(moment,)),
         )
+    seldom_is_right = needed <= _SOME * len(wanted)
     return Cause(
         seen,
-        "Log in every call of the callback, or at least once in a second.",
+        "Log in every call of the callback"
+        + (
+            ", or at least once in a second."
+            if seldom_is_right
+            else ": an `if`, once=True, skip_first=True and throttle_duration_sec=... leave some "
+            "out."
+        ),
         Evidence(
             moments=tuple(Moment(f"logged a message on {topic}", time_s) for time_s in times_s),
             log=tuple(line.text for echo in found for line in echo.lines)[:_LOG_LINES],

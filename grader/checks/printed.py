@@ -15,9 +15,12 @@ _NUMBER = re.compile(
 )
 # `1,37` as some locales write it. In `(1,37)` it could be two numbers as well: both are tried.
 _DECIMAL_COMMA = re.compile(r"(?<![0-9.,])[-+]?[0-9]+,[0-9]+(?![0-9.,])")
-# `123,456` and `123_456`, as the format specifications `,` and `_` write it.
+# `123,456` and `123_456`, as the format specifications `,` and `_` write it; `123 456` and
+# `123'456`, as SI and some locales do. `123 456` could be two numbers as well: both are tried.
 _GROUPED = re.compile(
-    r"(?<![0-9.,_])[-+]?[0-9]{1,3}([,_])[0-9]{3}(?:\1[0-9]{3})*(?:\.[0-9]+)?(?![0-9_]|[.,][0-9])"
+    r"(?<![0-9.,_])[-+]?[0-9]{1,3}([,_'\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}"
+    r"\N{THIN SPACE}\N{NARROW NO-BREAK SPACE}])[0-9]{3}(?:\1[0-9]{3})*(?:\.[0-9]+)?"
+    r"(?![0-9_]|[.,][0-9])"
 )
 # Typographers' sign, which some locales and tables write.
 _MINUS = "\N{MINUS SIGN}"

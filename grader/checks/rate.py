@@ -7,9 +7,10 @@ from itertools import pairwise
 from pydantic import Field, model_validator
 
 from grader.assignment.name import TopicName
-from grader.assignment.quantity import Frequency
+from grader.assignment.quantity import Duration, Frequency
 from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
+from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.sighting import first_seen
 from grader.checks.silence import why_few
@@ -27,6 +28,11 @@ class Rate(Parameters):
     at_least: Frequency | None = Field(None, description="Lowest rate.")
     at_most: Frequency | None = Field(None, description="Highest rate.")
     messages: int = Field(5, ge=2, description="Messages that are needed to judge.")
+    pause: Duration | None = Field(
+        None,
+        description="Longest time without a message after the first one, until the end of the "
+        "observation; by default any.",
+    )
 
     @model_validator(mode="after")
     def _sensible(self) -> Rate:
@@ -44,7 +50,10 @@ class Rate(Parameters):
             bounds.append(f"at least {self.at_least:g} Hz")
         if self.at_most is not None:
             bounds.append(f"at most {self.at_most:g} Hz")
-        return f"{' and '.join(bounds)} on {code(self.topic)}"
+        words = f"{' and '.join(bounds)} on {code(self.topic)}"
+        if self.pause is not None:
+            words += f", never longer than {format_duration(self.pause)} without one"
+        return words
 
 
 @check("timing.rate", Subject.RECORDING, Rate)
@@ -53,8 +62,9 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
 
     The rate is the number of messages after the first, divided by the time from the first to the
     last by source timestamps, as `ros2 topic hz` tells it; how regularly they come does not
-    matter (see timing.period). Messages that the writer numbered but that were lost on their way
-    count. What the machine took from the process is measured, and never costs a point.
+    matter (see timing.period), unless `pause` says how long a pause may be. Messages that the
+    writer numbered but that were lost on their way count. What the machine took from the process
+    is measured, and never costs a point.
 
     Explains a publisher that is silent or stops, as messages.count does.
     """
@@ -105,7 +115,51 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
             "second timer, and for a publish() in a loop or in a callback that is called often.",
             evidence,
         )
-    return Finding.passed(expected, observed, evidence)
+    return _too_long_without(recording, parameters, messages) or Finding.passed(
+        expected, observed, evidence
+    )
+
+
+def _too_long_without(
+    recording: Recording, parameters: Rate, messages: tuple[Message, ...]
+) -> Finding | None:
+    """The finding of the longest time without a message, if it is too long."""
+    if parameters.pause is None:
+        return None
+    # Where numbers are missing, messages came that were lost.
+    gaps = [
+        (one.stamp_ns, other.stamp_ns)
+        for one, other in pairwise(messages)
+        if other.sequence - one.sequence <= 1
+    ]
+    stop_ns = max(recording.stop_ns, messages[-1].stamp_ns)
+    gaps.append((messages[-1].stamp_ns, stop_ns))
+    begin_ns, end_ns = max(gaps, key=lambda gap: gap[1] - gap[0])
+    gap_s = (end_ns - begin_ns) / NS
+    if gap_s <= parameters.pause:
+        return None
+    begin_s = recording.since_launch_s(begin_ns)
+    until = " until the end" if end_ns == stop_ns else ""
+    observed = (
+        f"no message for {format_duration(gap_s)}{until}, from {begin_s:.2f} s after launch on, "
+        f"after {counted(sum(m.stamp_ns <= begin_ns for m in messages), 'message')}"
+    )
+    ended = dead(recording)
+    if ended and until:
+        return cause_of_death(recording, ended[0]).after(observed).finding(parameters.words)
+    if gap_s - recording.taken_s(begin_ns, end_ns) <= parameters.pause:
+        return Finding.error(
+            parameters.words,
+            f"{observed}, but the machine took time from the process",
+            disturbed=True,
+        )
+    return Finding.failed(
+        parameters.words,
+        observed,
+        "Look for an `if` or a `return` before publish(msg), for an `except: pass` that hides an "
+        "error, for a timer that is cancelled, and for a callback that does not return.",
+        Evidence(moments=(Moment("no message from here on", begin_s),)),
+    )
 
 
 def _steps(messages: tuple[Message, ...]) -> int:

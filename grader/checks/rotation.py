@@ -241,6 +241,14 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
             "Only a length of 0 is no rotation. A short axis or quaternion has a direction too: "
             "do not take it for a zero one, and divide it by its length.",
         )
+    if all(_none(row) for _, row in bad) and len(bad) < len(judged):
+        # Before the formulas: of a tiny angle, taken for degrees, as little is left.
+        return (
+            "the answer is no rotation at all",
+            "Only a zero axis, a quaternion of zeros and an angle of 0 are no rotation: look for "
+            "the condition that takes something else for one, such as a small angle, a sum or a "
+            "product that is 0.",
+        )
     if parameters.conversion == "quaternion_to_rpy" and all(
         math.isclose(abs(answer[1]), 0.5 * math.pi, abs_tol=1e-6) for _, answer in bad
     ):

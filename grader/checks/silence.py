@@ -248,7 +248,7 @@ def _unanswered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cau
     return Cause(
         seen,
         "Is publish(msg) reached in the subscription's callback? An `except: pass` hides the error "
-        "that would tell why not.",
+        "that would tell why not, and a lock or a loop that never ends keeps it waiting.",
         Evidence(
             moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
             places=_interrupted(recording),
@@ -379,7 +379,7 @@ def _idle(recording: Recording, topic: str) -> Cause:
     return Cause(
         f"the publisher on {code(topic)} is there but silent{though}",
         "Is publish(msg) reached in the callback? An `except: pass` hides the error that would "
-        "tell why not.",
+        "tell why not, a lock that is never free keeps it waiting, and timer.cancel() ends it.",
         evidence,
     )
 

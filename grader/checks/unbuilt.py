@@ -15,6 +15,7 @@ from grader.submission.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 
 _LOG_LINES = 15
+_SIDE_BY_SIDE = " A package that lies inside another one is not found: put them side by side."
 # Of a culprit's message, which may join several lines of the log.
 _COMPARED = 60
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -63,7 +64,8 @@ def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
     )
     return Cause(
         found,
-        f"Write <name>{name}</name> in package.xml, and the same name {others}.",
+        f"Write <name>{name}</name> in package.xml, and the same name {others}."
+        + ("" if match else _SIDE_BY_SIDE),
         Evidence(places=places[:10]),
     )
 

@@ -16,6 +16,8 @@ from grader.recording.model import Declaration, LogLine
 
 _READ_BYTES = 1 << 16
 _LONGEST_LINE = 8192
+# What a program writes with print(..., end=" ", flush=True) has no line end.
+_LONGEST_WAIT_NS = 200_000_000
 _MOST_DECLARATIONS = 2000
 _MOST_TOLD = 2000
 _LARGEST_NUMBER = 2**63
@@ -81,20 +83,34 @@ class _Stream:
         self.kept = KeptLines(limit)
         self.written_bytes = 0
         self._partial = b""
-        self._returned = False
+        self._begun_ns = 0
+        self._newest_ns = 0
+        self._ended = False
 
-    def feed(self, data: bytes) -> None:
+    def feed(self, data: bytes, now_ns: int | None = None) -> None:
         """Split into lines; a line without end is cut at a bound.
 
         A carriage return ends a line too, so that a line which is written over again and again
-        (a progress bar) counts as many.
+        (a progress bar) counts as many. So does time: what was written 200 ms before and has no
+        end yet gets none, and counts from when it came.
+
+        Args:
+            data: What was read.
+            now_ns: When; by default now.
         """
-        now_ns = time.time_ns()
+        now_ns = time.time_ns() if now_ns is None else now_ns
         self.written_bytes += len(data)
-        if self._returned:
+        waited = bool(self._partial) and now_ns - self._begun_ns > _LONGEST_WAIT_NS
+        if waited and self.name != "tracer":
+            self.finish()
+            self._ended = True
+        if self._ended:
             data = data.removeprefix(b"\n")
-        self._returned = data.endswith(b"\r")
+        self._ended = data.endswith(b"\r")
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        if not self._partial or b"\n" in data:
+            self._begun_ns = now_ns
+        self._newest_ns = now_ns
         *lines, self._partial = (self._partial + data).split(b"\n")
         for line in lines:
             self._add(line, now_ns)
@@ -105,7 +121,7 @@ class _Stream:
     def finish(self) -> None:
         """Keep a last line that has no line end."""
         if self._partial:
-            self._add(self._partial, time.time_ns())
+            self._add(self._partial, self._newest_ns)
             self._partial = b""
 
     def _add(self, line: bytes, now_ns: int) -> None:

@@ -204,6 +204,7 @@ class TestRun:
         words = failed("run", run(*parallel(), sent_s=[2.5] * 10), ["chatter"], stimulus="/chatter")
         assert "started 8 times and ended 8 times for 10 messages" in words
         assert "queue size" in words
+        assert "an `if` that leaves messages out" in words
 
     def test_messages_that_wait_behind_others_do_not_count(self):
         busy = [("timer_1", 1 + 0.4 * index, 1.4 + 0.4 * index) for index in range(13)]

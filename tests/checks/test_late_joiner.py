@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from grader.checks.finding import Status
+from grader.recording.model import NS
 from tests.checks.builder import (
     RELIABLE,
     declarations,
@@ -67,6 +68,21 @@ def test_a_publisher_made_anew_for_each_message():
     found = failing("qos.late_joiner", joined(12, endpoints=(*own, reader())), **LAST_10)
     assert "of 12 publishers, each of which keeps its own" in found
     assert "Call create_publisher once" in found
+
+
+def test_publishers_that_were_destroyed_took_along_what_they_kept():
+    own = [endpoint(qos=LATCHED, appeared_s=0.3 + PERIOD_S * n) for n in range(12)]
+    gone = [replace(item, vanished_ns=item.appeared_ns + NS // 2) for item in own[:-1]]
+    run = joined(1, endpoints=(*gone, own[-1], reader()))
+    found = failing("qos.late_joiner", run, **LAST_10)
+    assert "lost with it, and 11 publishers were destroyed before it joined" in found
+    assert "Call create_publisher once" in found
+
+
+def test_a_publisher_that_was_out_of_sight_is_not_the_student_s_fault():
+    seen = replace(endpoint(qos=LATCHED), vanished_ns=join(JOINED_S).joined_ns - NS)
+    run = joined(7, endpoints=(seen, reader()))
+    assert judge("qos.late_joiner", run, **LAST_10).status is Status.ERROR
 
 
 def test_a_shorter_queue():

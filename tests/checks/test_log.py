@@ -154,7 +154,12 @@ class TestAnyFormatIsRight:
         assert finding.status is Status.PASSED, finding
 
     @pytest.mark.parametrize(
-        "text", ["765,072", "765_072", "Received: 765,072.", "765,072, 5", "n=+765_072.0"]
+        "text",
+        [
+            *("765,072", "765_072", "Received: 765,072.", "765,072, 5", "n=+765_072.0"),
+            *("765 072", "12: 765 072.", "765'072", "765\N{RIGHT SINGLE QUOTATION MARK}072"),
+            *("765\N{NO-BREAK SPACE}072", "765\N{NARROW NO-BREAK SPACE}072"),
+        ],
     )
     def test_of_a_number_whose_digits_are_grouped(self, text):
         value = {**scan(), "ranges": [765072.0, *RANGES[1:]]}
@@ -162,7 +167,9 @@ class TestAnyFormatIsRight:
         grouped = run(lines(text, SCAN_TIMES_S), messages=changed)
         assert judge("log.follows", grouped, **FRONT).status is Status.PASSED
 
-    @pytest.mark.parametrize("text", ["765,07", "1765,072", "765,0722", "765_072_1", "0.765,072"])
+    @pytest.mark.parametrize(
+        "text", ["765,07", "1765,072", "765,0722", "765_072_1", "0.765,072", "765  072", "1765 072"]
+    )
     def test_other_digits_are_no_groups(self, text):
         value = {**scan(), "ranges": [765072.0, *RANGES[1:]]}
         changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
@@ -222,6 +229,14 @@ class TestAnyRhythmIsRight:
         assert "only 1 of 6" in failing(
             "log.follows", run(stale, messages={"/odom": changed}), **POSITION
         )
+
+    def test_where_every_message_must_be_logged_less_often_is_no_advice(self):
+        kept_apart = lines("1.37 -0.62", ODOM_TIMES_S[1:])
+        found = failing("log.follows", run(kept_apart), **{**POSITION, "at_least": 6})
+        assert "only 5 of 6" in found
+        assert "skip_first=True" in found and "once in a second" not in found
+        found = failing("log.follows", run(kept_apart[:1]), **POSITION)
+        assert "at least once in a second" in found
 
     def test_lines_that_come_too_seldom(self):
         once = [1.0 + 0.2 * index for index in range(16)]
@@ -288,6 +303,14 @@ class TestOtherValues:
         text = "x = -0.62, y = 1.37\nx = 1.37, y = -0.62"
         finding = judge("log.follows", run(lines(text, ODOM_TIMES_S)), **POSITION)
         assert finding.status is Status.PASSED
+
+    def test_a_whole_number_has_no_decimals(self):
+        changed = {"/scan": sent("/scan", SCAN, {"data": 765072}, SCAN_TIMES_S)}
+        asked = {**FRONT, "fields": ["data"]}
+        finding = judge("log.follows", run(lines("7", SCAN_TIMES_S), messages=changed), **asked)
+        assert "messages on `/scan`, within 500 ms" in finding.expected
+        finding = judge("log.follows", run(), **FRONT)
+        assert "messages on `/scan`, to 2 decimals, within 500 ms" in finding.expected
 
     def test_one_more_than_a_whole_number(self):
         value = {**scan(), "ranges": [765072.0, *RANGES[1:]]}

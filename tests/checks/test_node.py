@@ -109,7 +109,22 @@ class TestExists:
                 "rclpy.exceptions.ParameterNotDeclaredException: Invalid access to undeclared",
                 "declare_parameter",
             ),
+            (
+                "rclpy.exceptions.InvalidParameterTypeException: Trying to set parameter 'model' "
+                "to '3' of type 'INTEGER', expecting type 'DOUBLE': model",
+                "the type of its default",
+            ),
             ("EOFError: EOF when reading a line", "no keyboard"),
+            (
+                "AttributeError: 'numpy.ndarray' object has no attribute 'append'",
+                "assign the whole list",
+            ),
+            ("RuntimeError: Context.init() must only be called once", "remove the second call"),
+            (
+                "UnboundLocalError: cannot access local variable 'count' where it is not "
+                "associated with a value",
+                "belongs to the node: self.count",
+            ),
             (
                 "AttributeError: 'BotPublisher' object has no attribute '_default_callback_group'",
                 "super().__init__",
@@ -539,6 +554,17 @@ class TestAlive:
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
         assert "DurabilityPolicy.TRANSIENT_LOCAL" in failing("node.alive", run)
 
+    def test_a_policy_that_there_is_not(self):
+        raised = (
+            "AssertionError: Invalid arguments passed to constructor: "
+            "dict_keys(['reliability', 'queue_size'])"
+        )
+        log = output(traceback(raised).replace(_IN_RCLPY, _IN_QOS))
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
+        found = failing("node.alive", run)
+        assert "QoSProfile has no `queue_size`" in found
+        assert "`reliability`" not in found and "its name as a text" not in found
+
     def test_another_with_is_not_that_of_rclpy(self):
         raised = "TypeError: 'NoneType' object does not support the context manager protocol"
         log = output(traceback(raised, source="with self.lock():").replace(_IN_RCLPY, ""))
@@ -566,7 +592,9 @@ class TestAlive:
 
     def test_a_main_that_returned_although_it_spun(self):
         run = recording(processes=(died(0),), ending=Ending.EXITED)
-        assert "spin_once() handles one round only" in failing("node.alive", run)
+        found = failing("node.alive", run)
+        assert "spin_once() handles one round only" in found
+        assert "a daemon thread ends with main()" in found
 
     def test_a_process_that_was_broken_off_did_not_return(self):
         said = tuple(item for item in declarations() if item.kind != "exiting")

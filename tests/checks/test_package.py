@@ -71,6 +71,7 @@ class TestFound:
     def test_other_packages_only(self):
         found = self.found(submission(package("alpha"), package("omega")))
         assert "found `alpha` and `omega` only" in found
+        assert "inside another one is not found" in found
 
     def test_broken_xml_is_named_with_its_line(self):
         error = SourceError("src/bot_publisher/package.xml", 8, "mismatched tag")

@@ -1,10 +1,13 @@
 """timing.rate."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.checks.finding import Status
 from tests.checks.builder import (
     declarations,
+    died,
     every,
     failing,
     judge,
@@ -14,6 +17,8 @@ from tests.checks.builder import (
     silent,
     taken,
 )
+
+PAUSED = {"topic": "/cmd_vel", "at_least": "5 Hz", "pause": "1 s"}
 
 
 def at_rate(period_s, count=20, **changes):
@@ -50,6 +55,44 @@ def test_what_the_machine_took_costs_no_point():
     run = at_rate(0.2, disturbance=taken(0.7, 4.0, waited_s=2.5))
     finding = judge("timing.rate", run, topic="/cmd_vel", at_least="9 Hz")
     assert finding.status is Status.ERROR and finding.disturbed
+
+
+class TestAPause:
+    def paused(self, *times_s, stop_s=4.0, **changes):
+        sent = messages(times_s)
+        return recording(messages=sent, stop_s=stop_s, end_s=stop_s + 0.1, **changes)
+
+    def test_that_is_short_enough(self):
+        run = self.paused(*every(0.1, 15), *(2.9 + 0.1 * n for n in range(11)))
+        assert judge("timing.rate", run, **PAUSED).status is Status.PASSED
+
+    def test_between_messages(self):
+        run = self.paused(*every(0.1, 10), *(2.9 + 0.1 * n for n in range(11)))
+        found = failing("timing.rate", run, **PAUSED)
+        assert "no message for 1.3 s, from 1.60 s after launch on, after 10 messages" in found
+        assert judge("timing.rate", run, topic="/cmd_vel", at_least="5 Hz").status is Status.PASSED
+
+    def test_until_the_end(self):
+        found = failing("timing.rate", self.paused(*every(0.1, 20)), **PAUSED)
+        assert "no message for 1.4 s until the end" in found
+        assert "Look for an `if`" in found
+
+    def test_of_a_process_that_ended(self):
+        run = self.paused(*every(0.1, 20), processes=(died(1, exited_s=2.7),))
+        found = failing("timing.rate", run, **PAUSED)
+        assert "ended 2.70 s after launch" in found and "until the end" in found
+
+    def test_in_which_messages_were_lost_on_their_way(self):
+        run = self.paused(*every(0.1, 10), *(2.9 + 0.1 * n for n in range(11)))
+        kept = run.messages["/cmd_vel"]
+        later = tuple(replace(item, sequence=item.sequence + 5) for item in kept[10:])
+        lost = replace(run, messages={"/cmd_vel": (*kept[:10], *later)})
+        assert judge("timing.rate", lost, **PAUSED).status is Status.PASSED
+
+    def test_that_the_machine_made(self):
+        run = self.paused(*every(0.1, 20), disturbance=taken(2.6, 4.0, waited_s=1.0))
+        finding = judge("timing.rate", run, **PAUSED)
+        assert finding.status is Status.ERROR and finding.disturbed
 
 
 def test_silence_is_told_as_such():

@@ -304,6 +304,37 @@ def test_a_short_axis_that_is_taken_for_a_zero_one():
     assert "the answer is no rotation at all" in words and "do not take it for a zero one" in words
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_small_angle_that_is_taken_for_none_is_no_matter_of_degrees(seed):
+    conversion, asked = asked_of("axis_angle", seed)
+    answers = [
+        [0, 0, 0, 1] if abs(row[3]) < 1e-3 else answered
+        for row, answered in zip(asked, right(conversion, asked), strict=True)
+    ]
+    words = failed(conversion, asked, answers, {"cases": ["ordinary"]})
+    assert "the answer is no rotation at all" in words and "such as a small angle" in words
+
+
+@pytest.mark.parametrize(
+    ("function", "is_zero"),
+    [
+        ("axis_angle", lambda row: sum(row[:3]) == 0.0),
+        ("axis_angle", lambda row: max(row[:3]) == 0.0),
+        ("quaternion", lambda row: sum(row) == 0.0),
+        ("quaternion", lambda row: row[3] == 0.0),
+    ],
+)
+@pytest.mark.parametrize("seed", range(5))
+def test_the_cases_find_who_tests_for_zero_in_a_wrong_way(function, is_zero, seed):
+    conversion, asked = asked_of(function, seed)
+    nothing = [0, 0, 0] if function == "quaternion" else [0, 0, 0, 1]
+    answers = [
+        nothing if is_zero(row) else answered
+        for row, answered in zip(asked, right(conversion, asked), strict=True)
+    ]
+    assert "the answer is no rotation at all" in failed(conversion, asked, answers)
+
+
 def test_the_same_answer_to_everything():
     _, asked = asked_of("axis_angle")
     words = failed("axis_angle_to_quaternion", asked, [[0, 0, 0, 1]] * len(asked))

@@ -97,6 +97,7 @@ class TestNotAnswered:
         found = why(asked(listener(), times_s=every(0.3, 5)))
         assert "although 5 messages on `/chatter` reached the node" in found
         assert "Is publish(msg) reached in the subscription's callback?" in found
+        assert "a lock or a loop that never ends" in found
 
     def test_a_coroutine_that_nobody_awaited(self):
         warning = "executor.py:12: RuntimeWarning: coroutine 'Bot.reply' was never awaited"

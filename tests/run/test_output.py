@@ -45,6 +45,29 @@ def test_a_carriage_return_ends_a_line_too() -> None:
     assert texts == ["10 %", "20 %", "30 %", "40 %", "", "end"]
 
 
+def test_what_has_no_line_end_is_cut_by_time() -> None:
+    """As print(..., end="; ", flush=True) writes, or a status line with escape sequences."""
+    stream = _Stream("p/e", "stdout", 1 << 16)
+    for milliseconds in (0, 30, 60, 500, 530):
+        stream.feed(b"x=%d; " % milliseconds, milliseconds * 1_000_000)
+    stream.feed(b"end\nnext", 531_000_000)
+    stream.feed(b"\n", 900_000_000)
+    stream.finish()
+    found = [(line.text, line.time_ns // 1_000_000) for line in stream.kept.head]
+    assert found == [
+        ("x=0; x=30; x=60; ", 60),
+        ("x=500; x=530; end", 531),
+        ("next", 531),
+    ]
+
+
+def test_what_a_tracer_reports_is_never_cut_by_time() -> None:
+    stream = _Stream("p/e", "tracer", 1 << 16)
+    stream.feed(b'{"kind": ', 0)
+    stream.feed(b'"spin"}\n', 10**9)
+    assert [line.text for line in stream.kept.head] == ['{"kind": "spin"}']
+
+
 def test_bytes_that_are_not_text_are_replaced() -> None:
     assert read(b"\xff\xfe ok\n")[0].text == "\ufffd\ufffd ok"
 
