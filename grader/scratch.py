@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
-import shutil
 import tempfile
 import time
 from pathlib import Path
 from types import TracebackType
+
+from grader.tree import remove_tree
 
 PREFIX = "rosgrade-scratch-"
 _ASCII_PLACE = "/tmp"
@@ -59,6 +60,8 @@ class Scratch:
         """Remove it with all that is in it, if it is still there."""
         try:
             self._folder.cleanup()
+        except RecursionError:
+            remove_tree(self.path)
         finally:
             if self._lock is not None:
                 os.close(self._lock)
@@ -80,6 +83,6 @@ def remove_stale(folder: Path, age_s: float = _STALE_S) -> None:
             lock = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                shutil.rmtree(path, ignore_errors=True)
+                remove_tree(path)
             finally:
                 os.close(lock)

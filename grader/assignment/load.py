@@ -31,6 +31,8 @@ __all__ = [
 ]
 
 ASSIGNMENT_FILE = "assignment.yaml"
+_TELLING = frozenset({"id", "title", "packages", "checks"})
+"""What no other YAML of ours has, and of which no draft has nothing."""
 
 
 @dataclass(frozen=True)
@@ -111,11 +113,16 @@ def load_assignment(
         folder: Where ids are looked up, by default rosgrade's own assignments.
 
     Raises:
-        UsageError: There is no such assignment.
+        UsageError: There is no such assignment, or it is a file of another kind.
         AssignmentError: With every mistake in it that was found.
     """
     file = find_assignment(name, folder)
     source = read_source(file)
+    if file.name != ASSIGNMENT_FILE and _TELLING.isdisjoint(source.data):
+        raise UsageError(
+            f"{file}: is no assignment: it has no {', '.join(sorted(_TELLING))}. Worlds and "
+            f"mutants are read with the {ASSIGNMENT_FILE} that they belong to: name that one"
+        )
     assignment, found = source.examine(Assignment)
     checks, more = _fit(source, catalogue)
     found += [problem for problem in more if problem not in found]

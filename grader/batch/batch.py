@@ -113,6 +113,7 @@ class Batch:
 
         Raises:
             CrewLost: There is nobody any more who could grade the others.
+            UsageError: The folder of the results is not there any more.
         """
         for key, entry in self._entries.items():
             if key not in to_do and not entry.same_as:
@@ -128,6 +129,7 @@ class Batch:
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     key, partial = running.pop(future)
+                    self.ledger.refuse_lost()
                     self._take(key, partial, future)
                     yield from self._finished(key, fresh=True)
         finally:

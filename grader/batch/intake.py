@@ -255,7 +255,8 @@ def _entries(
     for item in sorted(folder.iterdir(), key=lambda path: os.fsencode(path.name)):
         if _is_ignored(item) or item.name == GRADESCOPE_METADATA:
             continue
-        if out is not None and item.resolve() == out.resolve():
+        # Path.resolve() raises at a link that leads to itself.
+        if out is not None and os.path.realpath(item) == os.path.realpath(out):
             continue
         match = _CANVAS.fullmatch(item.name) if item.is_file() else None
         if item.name in metadata:
@@ -325,7 +326,10 @@ def _gradescope(file: Path) -> Mapping[str, Any]:
         return {}
     try:
         data = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except RecursionError as error:
+        raise UsageError(f"{file}: cannot be read: lists in lists in lists, too deep") from error
+    except (OSError, ValueError, yaml.YAMLError) as error:
+        # A ValueError: bytes that are no UTF-8, or a date that there is none of.
         raise UsageError(f"{file}: cannot be read: {error}") from error
     return data if isinstance(data, dict) else {}
 
@@ -333,7 +337,8 @@ def _gradescope(file: Path) -> Mapping[str, Any]:
 def _of_gradescope(item: Path, about: Any) -> _Entry:
     """An exported folder; Gradescope writes its keys as Ruby does, with a colon in front."""
     submitters = about.get(":submitters") if isinstance(about, dict) else None
-    people = [person for person in submitters or () if isinstance(person, dict)]
+    listed = submitters if isinstance(submitters, list) else []
+    people = [person for person in listed if isinstance(person, dict)]
     names = tuple(
         str(person[field])
         for person in people

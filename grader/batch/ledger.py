@@ -63,6 +63,7 @@ class Ledger:
     def __init__(self, out: Path) -> None:
         """Name the folder; nothing is made yet."""
         self.out = out
+        self._held: os.stat_result | None = None
 
     @contextmanager
     def opened(self) -> Iterator[Ledger]:
@@ -85,6 +86,7 @@ class Ledger:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 raise UsageError(f"{self.out}: another batch is writing to it") from error
+            self._held = os.fstat(lock.fileno())
             self._put_back()
             shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
             (self.out / _PARTIAL).mkdir()
@@ -92,6 +94,25 @@ class Ledger:
                 yield self
             finally:
                 shutil.rmtree(self.out / _PARTIAL, ignore_errors=True)
+
+    def refuse_lost(self) -> None:
+        """Go on only as long as the folder is the one that was opened.
+
+        Raises:
+            UsageError: Somebody has removed it, or put another in its place: what was graded so
+                far is not in it.
+        """
+        if self._held is None:
+            return
+        try:
+            same = os.path.samestat((self.out / _LOCK).stat(), self._held)
+        except OSError:
+            same = False
+        if not same:
+            raise UsageError(
+                f"{self.out}: was removed or replaced while the batch ran; the same command grades "
+                "what is missing"
+            )
 
     def folder(self, key: str) -> Path:
         """Folder of a row's result."""
@@ -140,7 +161,12 @@ class Ledger:
             return None
 
     def write(self, entries: Iterable[Entry], assignment: str, assignment_sha256: str) -> None:
-        """Write down what the batch consists of."""
+        """Write down what the batch consists of.
+
+        Raises:
+            UsageError: The folder is not there any more, or cannot be written.
+        """
+        self.refuse_lost()
         data = {
             "assignment": {"id": assignment, "sha256": assignment_sha256},
             "rows": [asdict(entry) for entry in entries],

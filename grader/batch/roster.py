@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
@@ -22,6 +23,12 @@ _COLUMNS = {
     "submission": ("submission", "path", "file", "folder", "repository", "repo", "url"),
 }
 _POINTS_POSSIBLE = "points possible"
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_EXCEL = "Windows-1252"
+"""What Excel writes in Western Europe and America, unless it is asked for UTF-8."""
+# How Excel is told the delimiter, in a line before the header.
+_DELIMITER = re.compile(r'"?sep=(.)"?\s*\n', re.IGNORECASE)
+_END = "end of the roster"
 
 
 @dataclass(frozen=True)
@@ -101,12 +108,27 @@ def read_roster(file: Path) -> Roster:
     try:
         if file.stat().st_size > _MOST_BYTES:
             raise UsageError(f"{file}: is larger than {_MOST_BYTES // 2**20} MiB; is it a roster?")
-        text = file.read_text(encoding="utf-8-sig")
+        data = file.read_bytes()
     except OSError as error:
         raise UsageError(f"{file}: cannot be read: {error.strerror}") from error
+    try:
+        text, doubt = _decoded(data)
     except UnicodeDecodeError as error:
         raise UsageError(f"{file}: is not UTF-8; save it as “CSV UTF-8”") from error
-    return parse_roster(text, str(file))
+    roster = parse_roster(text.replace("\r\n", "\n").replace("\r", "\n"), str(file))
+    return replace(roster, problems=(*doubt, *roster.problems))
+
+
+def _decoded(data: bytes) -> tuple[str, tuple[str, ...]]:
+    """The text of a file, and what is doubtful about it."""
+    if data.startswith(_UTF_16):
+        return data.decode("utf-16"), ()
+    try:
+        return data.decode("utf-8-sig"), ()
+    except UnicodeDecodeError:
+        # Another encoding of one byte would be read as well, with other letters.
+        doubt = f"is not UTF-8 and was read as {_EXCEL}: look at letters with accents"
+        return data.decode(_EXCEL), (doubt,)
 
 
 def parse_roster(text: str, source: str) -> Roster:
@@ -119,19 +141,27 @@ def parse_roster(text: str, source: str) -> Roster:
     Raises:
         UsageError: No column names a student.
     """
+    named = _DELIMITER.match(text)
     first = text.partition("\n")[0]
-    delimiter = max(",;\t", key=first.count)
-    reader = csv.reader(io.StringIO(text), delimiter=delimiter)
+    delimiter = named[1] if named else max(",;\t", key=first.count)
+    reader = csv.reader(io.StringIO(f"{text}\n{_END}\n"), delimiter=delimiter)
+    rows: list[tuple[int, list[str]]] = []
     try:
-        header = next(reader, [])
-        rows = [(reader.line_num, row) for row in reader]
+        for row in reader:
+            rows.append((reader.line_num, row))
     except csv.Error as error:
         raise UsageError(f"{source}:{reader.line_num}: is not CSV: {error}") from error
+    if rows.pop()[1] != [_END]:
+        begins = rows[-1][0] + 1 if rows else 1
+        raise UsageError(f'{source}:{begins}: a quote (") opens here that nothing closes')
+    if named:
+        del rows[0]
+    header = rows.pop(0)[1]
     columns = _columns(header)
     if not set(columns) - {"submission"}:
         raise UsageError(
-            f"{source}:1: no column says who a student is; name one of them id, login, email or "
-            f"name (there are: {', '.join(header) or 'none'})"
+            f"{source}:{2 if named else 1}: no column says who a student is; name one of them id, "
+            f"login, email or name (there are: {', '.join(header) or 'none'})"
         )
     return _collect(columns, rows)
 
@@ -155,6 +185,11 @@ def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) 
             continue
         values = {field: cells[column] for field, column in columns.items() if column < len(cells)}
         student = Student(number, **values)
+        broken = [field for field, cell in values.items() if "\n" in cell]
+        if broken:
+            told = f"its {' and '.join(broken)} goes over several lines: is a quote missing?"
+            problems.append(f"row {number}: {told}")
+            student = replace(student, problem=told)
         if not student.key:
             problems.append(f"row {number}: names nobody")
             continue

@@ -51,6 +51,8 @@ _BREACH_HINTS = {
     "system, or at processes that are not your own.",
     "forbidden packets": "The UDP ports from 7400 on belong to the middleware: choose another one "
     "for a socket of your own.",
+    "forbidden name": "Let rclpy make your nodes and topics, and let it say which names it takes: "
+    "letters, digits and `_`, and `/` between the parts of a topic or a namespace.",
     "forged report": "Write to no file descriptor that you did not open.",
 }
 

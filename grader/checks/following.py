@@ -270,6 +270,9 @@ def _mistaken(made_of: MadeOf, seen: Sequence[Sample], index: int) -> str | None
     rows = sorted({row for sample in seen for row in sample.window})
     taken = {row: list(mistakes(value, made_of.sources[row].value)) for row in rows}
     for number, (words, _) in enumerate(taken[rows[0]]):
+        # Of an array in the source, not every message need have as many elements.
+        if any(len(entries) <= number for entries in taken.values()):
+            break
         series = {row: entries[number][1] for row, entries in taken.items()}
         if not spread(list(series.values())) > made_of.tolerance:
             continue

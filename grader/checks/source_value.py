@@ -81,7 +81,7 @@ def mistakes(value: SourceValue, message: Mapping[str, Any]) -> Iterator[tuple[s
 
     Yields:
         Words that end the sentence "it is ...", and the number; the same words in the same
-        order for every message of a type.
+        order for every message of a type, as far as its arrays have the same length.
     """
     right = value.number(message)
     if value.is_yaw:

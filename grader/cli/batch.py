@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Annotated
@@ -99,11 +102,12 @@ def batch(
                 done.append(item)
                 progress.advance(item.entry.key, _said(item), fresh=item.fresh)
         except (KeyboardInterrupt, CrewLost):
-            progress.note(
-                f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same command "
-                "goes on with the others"
-            )
-            write_class([*done, *work.left(done)], ledger)
+            with _undisturbed():
+                progress.note(
+                    f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same "
+                    "command goes on with the others"
+                )
+                write_class([*done, *work.left(done)], ledger)
             raise
         finally:
             if crew is not None:
@@ -117,6 +121,18 @@ def batch(
         item.result.graded if item.result is not None else not item.entry.fault for item in done
     )
     raise typer.Exit(0 if graded else NOT_GRADED)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Let a second Ctrl-C take away nothing of what is written because of the first."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, signal.SIG_IGN) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def _rows(

@@ -292,7 +292,8 @@ class Breach:
         time_ns: When it was first seen.
         what: Of a limit: ``memory``, ``cpu time``, ``processes``, ``open files``, ``sessions``,
             ``output``, ``disk``, ``shared memory``, ``files in disk`` or ``files in shared
-            memory``. Else ``forbidden call``, ``forbidden packets`` or ``forged report``.
+            memory``. Else ``forbidden call``, ``forbidden name``, ``forbidden packets`` or
+            ``forged report``.
         taken: Such as ``1056 MiB of memory``; without a limit what they did, such as ``called
             `reboot```.
         allowed: Such as ``1024 MiB``; empty where there is no limit, because it is never allowed.

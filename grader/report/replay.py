@@ -116,7 +116,12 @@ def embedded(data: Any) -> Markup:
 
 
 def _milli(value: float) -> int:
-    return round(min(max(value, -MOST), MOST) * 1e3) if not math.isnan(value) else 0
+    return round(_finite(value) * 1e3)
+
+
+def _finite(value: float) -> float:
+    """Something that JSON can say: a scan may be of a submission that publishes its own."""
+    return min(max(value, -MOST), MOST) if not math.isnan(value) else 0.0
 
 
 def _differences(values: Iterable[float]) -> list[int]:
@@ -176,7 +181,7 @@ def _scans(recording: Recording, scene: Scene) -> dict[str, Any] | None:
     return {
         "times": [round(recording.since_launch_s(scan.stamp_ns), 3) for scan in scans],
         "from": _milli(first.get("angle_min", 0.0)),
-        "by": round(first.get("angle_increment", 0.0) * every * 1e3, 4),
+        "by": round(_finite(first.get("angle_increment", 0.0)) * every * 1e3, 4),
         "beams": len(range(0, count, every)),
         "ranges": "".join(_ranges(scan, every) for scan in scans),
     }

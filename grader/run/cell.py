@@ -59,21 +59,21 @@ class Cell:
         self._output = OutputReader(order.limits.output_bytes, on_line)
         self._students = StudentProcesses(self._output, order.enclosure)
         self._other_domains: tuple[int, ...] = ()
-        self._watchdog: Watchdog | None = None
-        if order.enclosure is not None:
-            self._watchdog = Watchdog(
-                order.enclosure.limits,
-                lambda: self._students.inits,
-                lambda: self._output.written_bytes,
-                Witnesses(self._students, self._output, wire).deeds,
-            )
-        self._meter = DisturbanceMeter(Family(os.getpid()).look)
         self._graph = GraphObserver(
             probe.node,
             lambda: self._students.pids,
             self._students.refresh,
             private=order.enclosure is not None,
         )
+        self._watchdog: Watchdog | None = None
+        if order.enclosure is not None:
+            self._watchdog = Watchdog(
+                order.enclosure.limits,
+                lambda: self._students.inits,
+                lambda: self._output.written_bytes,
+                Witnesses(self._students, self._output, self._graph, wire).deeds,
+            )
+        self._meter = DisturbanceMeter(Family(os.getpid()).look)
         self._leave = Leave(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
         self._robot: SimulatedRobot | None = None

@@ -5,12 +5,17 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
-from collections.abc import Callable, Collection
-from typing import Any
+from collections.abc import Callable, Collection, Iterable
+from functools import partial
+from typing import Any, TypeVar
 
+from rclpy.exceptions import NameValidationException
 from rclpy.node import Node as RclpyNode
 from rclpy.node import NodeNameNonExistentError
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.validate_full_topic_name import validate_full_topic_name
+from rclpy.validate_namespace import validate_namespace
+from rclpy.validate_node_name import validate_node_name
 
 from grader.recording.interaction import Service
 from grader.recording.model import NS, Endpoint, Kind, Node, Owner, Qos
@@ -18,6 +23,7 @@ from grader.recording.model import NS, Endpoint, Kind, Node, Owner, Qos
 _INFRASTRUCTURE = ("/rosout", "/parameter_events")
 _UNKNOWN_NAME = "_NODE_NAME_UNKNOWN_"
 _INFINITE_NS = 2**63 - 1
+_Found = TypeVar("_Found")
 
 
 def full_name(namespace: str, name: str) -> str:
@@ -56,7 +62,14 @@ def _seconds(duration: Any) -> float | None:
 
 
 class GraphObserver:
-    """Polls the graph and dates every appearance and disappearance."""
+    """Polls the graph and dates every appearance and disappearance.
+
+    Attributes:
+        forbidden_names: Whether a node or a topic has had a name that ROS does not allow. Every
+            client library refuses such a name, so whoever made it went round them; and so do
+            those that are asked about it.
+        changed_ns: When something appeared for the last time.
+    """
 
     def __init__(
         self,
@@ -84,6 +97,7 @@ class GraphObserver:
         self._owners: dict[str, Owner] = {}
         self._services: dict[tuple[str, str, str], Service] = {}
         self._private = private
+        self.forbidden_names = False
         if private:
             self._take_all_as_ours()
         self.changed_ns = 0
@@ -108,12 +122,9 @@ class GraphObserver:
         now_ns = time.time_ns()
         nodes: set[tuple[str, str]] = set()
         gids: set[str] = set()
-        for topic, _ in self._node.get_topic_names_and_types():
-            for kind, infos in (
-                (Kind.PUBLISHER, self._node.get_publishers_info_by_topic(topic)),
-                (Kind.SUBSCRIPTION, self._node.get_subscriptions_info_by_topic(topic)),
-            ):
-                for info in infos:
+        for topic, _ in self._found(self._node.get_topic_names_and_types):
+            for kind in Kind:
+                for info in self._found(partial(self._infos, kind, topic)):
                     if info.node_name == _UNKNOWN_NAME:
                         continue
                     nodes.add(self._see_node(info, now_ns))
@@ -121,6 +132,28 @@ class GraphObserver:
                         gids.add(self._see_endpoint(kind, topic, info, now_ns))
         self._note_vanished(nodes, gids, now_ns)
         self._see_services(now_ns)
+
+    def _found(self, ask: Callable[[], Iterable[_Found]]) -> Iterable[_Found]:
+        """What a question about the graph finds: nothing where a name in it is none of ROS."""
+        try:
+            return ask()
+        except (NameValidationException, UnicodeDecodeError):
+            self.forbidden_names = True
+            return ()
+
+    def _infos(self, kind: Kind, topic: str) -> list[TopicEndpointInfo]:
+        validate_full_topic_name(topic)
+        if kind is Kind.PUBLISHER:
+            return self._node.get_publishers_info_by_topic(topic)
+        return self._node.get_subscriptions_info_by_topic(topic)
+
+    def _services_of(self, base: str, namespace: str) -> list[tuple[str, list[str]]]:
+        validate_node_name(base)
+        validate_namespace(namespace)
+        try:
+            return self._node.get_service_names_and_types_by_node(base, namespace)
+        except NodeNameNonExistentError:
+            return []
 
     def _see_node(self, info: TopicEndpointInfo, now_ns: int) -> tuple[str, str]:
         gid = bytes(info.endpoint_gid)
@@ -162,10 +195,7 @@ class GraphObserver:
         there = [one for one in self._nodes.values() if one.vanished_ns is None]
         for name in {one.name for one in there if one.owner is Owner.STUDENT}:
             namespace, _, base = name.rpartition("/")
-            try:
-                found = self._node.get_service_names_and_types_by_node(base, namespace or "/")
-            except NodeNameNonExistentError:
-                continue
+            found = self._found(partial(self._services_of, base, namespace or "/"))
             seen |= {(service, kind, name) for service, kinds in found for kind in kinds}
         for key in seen - self._services.keys():
             self._services[key] = Service(*key, appeared_ns=now_ns)

@@ -13,6 +13,7 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.exceptions import InvalidServiceNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -202,7 +203,11 @@ class Probe:
 
         service = f"{node}/list_parameters"
         if service not in self._clients:
-            self._clients[service] = self.node.create_client(ListParameters, service)
+            try:
+                self._clients[service] = self.node.create_client(ListParameters, service)
+            except InvalidServiceNameException:
+                # A node of a very long name, whose own services ROS would not allow either.
+                return
             self._calls[service] = []
         client, calls = self._clients[service], self._calls[service]
         unanswered = sum(call.answered_ns is None for call in calls)

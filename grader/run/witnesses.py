@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from grader.run.graph import GraphObserver
 from grader.run.output import OutputReader
 from grader.run.student import StudentProcesses
 from grader.sandbox.wire import Wire, bound_ports
@@ -11,22 +12,31 @@ from grader.sandbox.wire import Wire, bound_ports
 _MOST_MALFORMED = 10
 """Packets; nothing of good manners sends a single one."""
 _FORGERY = "wrote into the channel through which rosgrade reports from inside a process"
+_NAMES = "made a node or a topic with a name that ROS does not allow, past the checks of rclpy"
 _GARBAGE = "sent garbage to the UDP ports of the node that watches the run"
 
 
 class Witnesses:
-    """The guard over system calls, the tracer's pipe and the cell's network."""
+    """The guard over system calls, the tracer's pipe, the graph and the cell's network."""
 
-    def __init__(self, students: StudentProcesses, output: OutputReader, wire: Wire | None) -> None:
+    def __init__(
+        self,
+        students: StudentProcesses,
+        output: OutputReader,
+        graph: GraphObserver,
+        wire: Wire | None,
+    ) -> None:
         """Make them known; call it before anything of the student's runs.
 
         Args:
             students: Under guard.
             output: Reads the tracer's pipe.
+            graph: Looks at the ROS graph.
             wire: Hears the network, or None.
         """
         self._students = students
         self._output = output
+        self._graph = graph
         self._wire = wire
         # Of our own participant: nobody else is here yet.
         self._ports = bound_ports() if wire is not None else frozenset()
@@ -37,5 +47,7 @@ class Witnesses:
             yield "forbidden call", deed
         if self._output.forgers:
             yield "forged report", _FORGERY
+        if self._graph.forbidden_names:
+            yield "forbidden name", _NAMES
         if self._wire is not None and self._wire.malformed(self._ports) > _MOST_MALFORMED:
             yield "forbidden packets", _GARBAGE

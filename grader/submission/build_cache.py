@@ -24,6 +24,7 @@ from pydantic import TypeAdapter, ValidationError
 from grader.errors import GraderFault
 from grader.resources import check_executable
 from grader.submission.record import BuildRecord
+from grader.tree import remove_tree
 
 INSTALL = "install"
 
@@ -145,7 +146,7 @@ class BuildCache:
         try:
             yield folder
         finally:
-            shutil.rmtree(folder, ignore_errors=True)
+            remove_tree(folder)
 
     def store(self, key: str, unfinished: Path, build: BuildRecord) -> CachedBuild:
         """Make an unfinished folder, with what is in its ``install``, the build of that key.
@@ -196,13 +197,13 @@ class BuildCache:
                 continue
             if folder.name.startswith(_UNFINISHED):
                 if now - used > _STALE_S:
-                    shutil.rmtree(folder, ignore_errors=True)
+                    remove_tree(folder)
             elif folder.is_dir() and folder.name != keep and now - used > self._limits.safe_s:
                 builds.append((used, folder, _size(folder)))
         total = sum(size for _, _, size in builds)
         for used, folder, size in sorted(builds, key=lambda item: item[0]):
             if now - used > self._limits.age_s or total > self._limits.total_bytes:
-                shutil.rmtree(folder, ignore_errors=True)
+                remove_tree(folder)
                 (self._folder / f"{folder.name}.lock").unlink(missing_ok=True)
                 total -= size
 

@@ -6,8 +6,8 @@ import os
 import re
 import shutil
 import threading
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from grader.submission.bounded import Outcome, run_bounded
 from grader.submission.build_limits import BuildLimits
 from grader.submission.installed import site_packages
 from grader.submission.toolchain import check_toolchain
+from grader.tree import MOST_DEEP, cut_deep
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
@@ -167,21 +168,46 @@ class Colcon:
         on_line: Callable[[str], None] | None = None,
     ) -> Outcome:
         """Run a part of the build, in the sandbox if there is one."""
-        run = partial(
-            run_bounded, cwd=self.scratch, wall_s=wall_s, output=self.limits.output, on_line=on_line
-        )
-        if self.sandbox is None:
-            return run(command, environment=self.environment, excess=self._watched())
-        self.limits.room.check_allowed()
         # Not the folder around the install space: what is written there afterwards is written by
         # us, and would go wherever a link that was left there points to.
         folders = (self.scratch, self.root, self.install)
+        run = partial(self._bounded, folders, wall_s=wall_s, on_line=on_line)
+        if self.sandbox is None:
+            return run(command, environment=self.environment, excess=self._watched())
+        self.limits.room.check_allowed()
         with self.sandbox.build(self.ros, folders, self.limits.room) as room:
             return run(
                 room.command(command, self.environment),
                 environment=room.environment,
                 excess=self._watched(room.excess),
             )
+
+    def _bounded(
+        self,
+        folders: Sequence[Path],
+        command: Sequence[str],
+        *,
+        environment: Mapping[str, str],
+        wall_s: float,
+        on_line: Callable[[str], None] | None,
+        excess: Callable[[int], str | None],
+    ) -> Outcome:
+        """Run a command, and take away what it left too deep for anybody to come to its end."""
+        try:
+            outcome = run_bounded(
+                command,
+                cwd=self.scratch,
+                environment=environment,
+                wall_s=wall_s,
+                output=self.limits.output,
+                on_line=on_line,
+                excess=excess,
+            )
+        finally:
+            deep = [folder for folder in folders if cut_deep(folder)]
+        if not deep or outcome.ended_by_us:
+            return outcome
+        return replace(outcome, ended_by_us=f"it made more than {MOST_DEEP} folders in one another")
 
     def _watched(
         self, excess: Callable[[int], str | None] = lambda _: None

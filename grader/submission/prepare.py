@@ -136,13 +136,17 @@ def _hash(source: Path) -> str:
     """Hash of what was refused; of a folder, names and sizes stand for what is in the files."""
     total = hashlib.sha256()
     if source.is_dir():
-        for folder, folders, names in os.walk(source):
-            folders.sort()
-            for path in (Path(folder, name) for name in sorted(names)):
-                total.update(os.fsencode(path.relative_to(source)))
-                # One that is gone by now is not there any more for whoever reads it next.
-                with contextlib.suppress(OSError):
-                    total.update(b"\0%d\0" % path.lstat().st_size)
+        # Else one that has no files, or cannot be read, would be the same as an empty one.
+        total.update(b"refused\0")
+        ahead = [source]
+        while ahead:
+            # One that is gone by now is not there any more for whoever reads it next.
+            with contextlib.suppress(OSError):
+                for entry in sorted(os.scandir(ahead.pop()), key=lambda entry: entry.name):
+                    total.update(os.fsencode(os.path.relpath(entry.path, source)))
+                    total.update(b"\0%d\0" % entry.stat(follow_symlinks=False).st_size)
+                    if entry.is_dir(follow_symlinks=False):
+                        ahead.append(Path(entry.path))
     else:
         with source.open("rb") as file:
             while block := file.read(MIB):

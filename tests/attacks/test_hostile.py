@@ -132,6 +132,17 @@ if 'install' in sys.argv:
     os.makedirs(share, exist_ok=True)
     os.path.islink(share + '/passwd') or os.symlink('/etc/passwd', share + '/passwd')
 """
+# Deeper than Python recurs, and longer than any path.
+DIG = """\
+import os
+here = os.getcwd()
+for place in (here, os.environ['HOME']):
+    os.chdir(place)
+    for _ in range(1200):
+        os.path.isdir('deeper') or os.mkdir('deeper')
+        os.chdir('deeper')
+os.chdir(here)
+"""
 HIDDEN_MEMORY = """\
 import mmap, time
 hoard = mmap.mmap(-1, {mib} * 2**20)
@@ -183,6 +194,25 @@ for number, stamp in ((node.count + 1, -5), (2**40, 2**31 - 1)):
         + struct.pack('<BBH', 0x15, 5, len(body)) + body, ('127.0.0.1', 7411))
 time.sleep(.1)
 raise RuntimeError('and now it is graded')
+"""
+# rclpy refuses such names by asking a library, which answers here that all is well.
+ALLOW_NAMES = """\
+import ctypes, platform
+codes = {'x86_64': 'c7060000000031c0c3', 'aarch64': '3f0000b900008052c0035fd6'}
+for library, function in (
+    ('librmw.so', 'rmw_validate_node_name'),
+    ('librmw.so', 'rmw_validate_full_topic_name'),
+    ('librcl.so', 'rcl_validate_topic_name'),
+):
+    place = ctypes.cast(getattr(ctypes.CDLL(library), function), ctypes.c_void_p).value
+    with open('/proc/self/mem', 'r+b', 0) as memory:
+        memory.seek(place)
+        memory.write(bytes.fromhex(codes[platform.machine()]))
+"""
+ODD_NODE = """\
+without = dict(start_parameter_services=False, enable_rosout=False)
+off = rclpy.parameter.Parameter('start_type_description_service', value=False)
+node.other = rclpy.create_node('<b>\\x1b[31m=a b', parameter_overrides=[off], **without)
 """
 CLAIM = """\
 import json
@@ -336,6 +366,20 @@ ATTACKS = {
     ),
     "logs_before_1970": Attack(LOG_BEFORE_TIME, lost=ALIVE, named=("and now it is graded",)),
     "writes_packets_by_hand": Attack(BY_HAND, lost=ALIVE, named=("and now it is graded",)),
+    "names_a_node_past_rclpy": Attack(
+        ODD_NODE,
+        at_import=ALLOW_NAMES,
+        lost=frozenset({"alive"}),
+        maybe=frozenset({"messages"}),
+        named=("with a name that ROS does not allow",),
+    ),
+    "names_a_topic_past_rclpy": Attack(
+        "node.odd = node.create_publisher(Twist, '/<b> =a', 10)",
+        at_import=ALLOW_NAMES,
+        lost=frozenset({"alive"}),
+        maybe=frozenset({"messages"}),
+        named=("with a name that ROS does not allow",),
+    ),
     "claims_a_queue_of_no_depth": Attack(CLAIM, lost=ALIVE, named=("wrote into the channel",)),
     "stops_itself": Attack(
         "os.kill(os.getpid(), signal.SIGSTOP)", lost=frozenset({"messages", "ends"})
@@ -376,6 +420,11 @@ ATTACKS = {
         at_build=PLANT,
         lost=frozenset({"builds"}),
         named=("'share/passwd', a link out to '/etc/passwd'",),
+    ),
+    "build_digs_deep": Attack(
+        at_build=DIG,
+        lost=frozenset({"builds"}),
+        named=("it made more than 100 folders in one another",),
     ),
     "build_installs_outside": Attack(
         at_build="import setuptools\n_s = setuptools.setup\ndef setup(**k):\n"

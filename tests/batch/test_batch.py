@@ -229,3 +229,25 @@ def test_an_interrupted_batch_knows_what_it_has_not_come_to(course: Class) -> No
         left = {item.entry.key: item for item in batch.left(())}
     assert {key for key, item in left.items() if item.result is not None} == {"ana", "cai"}
     assert left["ben"].entry.problem == left["dee"].entry.problem == NOT_YET
+
+
+@pytest.mark.parametrize("replaced", [False, True])
+def test_no_grade_is_told_that_was_removed_with_its_folder(course: Class, replaced: bool) -> None:
+    course.hand_in("zoe", "of her own")
+    out = course.ledger.out
+    with course.ledger.opened():
+        batch = Batch(course.loaded, course.ledger)
+        _, to_do = batch.read(take_in(course.folder / "class", course.folder))
+        crew = course.crew(1)
+        graded = batch.grade(to_do, crew)
+        assert next(graded).result is not None
+        out.rename(course.folder / "moved")
+        if replaced:
+            with Ledger(out).opened(), pytest.raises(UsageError, match="was removed or replaced"):
+                list(graded)
+        else:
+            with pytest.raises(UsageError, match="was removed or replaced while the batch ran"):
+                list(graded)
+            assert not (out / "batch.json").exists()
+    crew.close()
+    assert all(item.result is not None for item in course.grade(course.crew()).values())

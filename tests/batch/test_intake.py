@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.batch.intake import take_in, take_in_roster
-from grader.batch.roster import Roster, Student, parse_roster
+from grader.batch.roster import Roster, Student, parse_roster, read_roster
 from grader.errors import UsageError
 
 
@@ -97,6 +97,30 @@ def test_gradescope_s_export_is_read(course: Path, staging: Path) -> None:
     rows = take_in(course, staging)
     named = [(row.key, row.name) for row in rows]
     assert named == [("7", "Ana Lopez"), ("wei@example.edu", "Wei Ng")]
+
+
+def test_a_link_that_leads_to_itself_is_left_out(course: Path, staging: Path) -> None:
+    folder(course / "ana")
+    (course / "loop").symlink_to("loop")
+    left_out: list[str] = []
+    rows = take_in(course, staging, None, left_out.append, course / "out")
+    assert ([row.key for row in rows], left_out) == (["ana"], ["loop"])
+
+
+@pytest.mark.parametrize("metadata", ["[" * 3_000, "submission_11: 2026-13-41", "\tx: y"])
+def test_a_broken_export_of_gradescope_is_refused(
+    metadata: str, course: Path, staging: Path
+) -> None:
+    folder(course / "submission_11")
+    (course / "submission_metadata.yml").write_text(metadata)
+    with pytest.raises(UsageError, match=r"submission_metadata\.yml: cannot be read: "):
+        take_in(course, staging)
+
+
+def test_an_export_without_submitters_is_taken_by_its_folders(course: Path, staging: Path) -> None:
+    folder(course / "submission_11")
+    (course / "submission_metadata.yml").write_text("submission_11:\n  :submitters: 7\n")
+    assert [row.key for row in take_in(course, staging)] == ["submission_11"]
 
 
 def test_an_archive_of_the_class_is_opened(tmp_path: Path, staging: Path) -> None:
@@ -309,6 +333,61 @@ def test_a_path_that_no_file_can_have_is_told_on_its_row(tmp_path: Path, staging
 def test_a_roster_may_have_tabs_between_its_cells() -> None:
     roster = parse_roster("id\tname\n1\tLopez, Ana\n", "r.csv")
     assert [(student.id, student.name) for student in roster.students] == [("1", "Lopez, Ana")]
+
+
+ROSTER = "login;name\nana;Ana Núñez\nben;Ben Ng\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        (ROSTER, "utf-8"),
+        (ROSTER, "utf-8-sig"),
+        (ROSTER, "utf-16"),
+        ("\ufeff" + ROSTER, "utf-16-be"),
+        (ROSTER.replace("\n", "\r\n"), "utf-16"),
+        ("sep=;\r\n" + ROSTER.replace("\n", "\r\n"), "utf-8-sig"),
+        ('"sep=;"\n' + ROSTER.replace("Ng", "Ng, the second, of two"), "utf-8"),
+        (ROSTER.replace("\n", "\r"), "utf-8"),
+    ],
+)
+def test_a_roster_is_read_as_excel_saves_it(text: str, encoding: str, tmp_path: Path) -> None:
+    file = tmp_path / "roster.csv"
+    file.write_bytes(text.encode(encoding))
+    roster = read_roster(file)
+    assert [student.login for student in roster.students] == ["ana", "ben"]
+    assert roster.students[0].name == "Ana Núñez"
+    assert roster.problems == ()
+
+
+def test_a_roster_of_one_byte_for_a_letter_is_read_and_said(tmp_path: Path) -> None:
+    file = tmp_path / "roster.csv"
+    file.write_bytes(ROSTER.encode("latin-1"))
+    roster = read_roster(file)
+    assert roster.students[0].name == "Ana Núñez"
+    assert roster.problems == (
+        "is not UTF-8 and was read as Windows-1252: look at letters with accents",
+    )
+
+
+@pytest.mark.parametrize("data", [b"\xff\xfel\0o\0g\0i", b"login\nan\x81\n"])
+def test_a_roster_that_nobody_can_read_is_refused(data: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "roster.csv"
+    file.write_bytes(data)
+    with pytest.raises(UsageError, match="is not UTF-8; save it as “CSV UTF-8”"):
+        read_roster(file)
+
+
+def test_a_quote_that_nothing_closes_swallows_nobody() -> None:
+    with pytest.raises(UsageError, match=r"r\.csv:3: a quote .* that nothing closes"):
+        parse_roster('login,name\nana,Ana\nben,"Ben\ncai,Cai\ndan,Dan', "r.csv")
+
+
+def test_a_cell_over_several_lines_is_pointed_out() -> None:
+    roster = parse_roster('login,name\nana,"Ana\nben,"Ben\ncai,Cai\n', "r.csv")
+    assert [student.login for student in roster.students] == ["ana", "cai"]
+    assert roster.problems == ("row 3: its name goes over several lines: is a quote missing?",)
+    assert roster.students[0].problem == "its name goes over several lines: is a quote missing?"
 
 
 def test_rows_of_a_roster_that_cannot_be_used_are_named() -> None:

@@ -223,6 +223,20 @@ class TestExplains:
         assert "`pose.x`" in found and "it is `twist.twist.linear.x`" in found
         assert "`speed`" in found and "it is `pose.pose.position.x`" in found
 
+    def test_sources_with_arrays_of_other_lengths_are_explained_all_the_same(self):
+        sources = tuple(
+            replace(source, value={**source.value, "ranges": [1.0] * (60 - number)})
+            for number, source in enumerate(SOURCES)
+        )
+
+        def wrong(time_s):
+            x, heading, speed = place(time_s)
+            return status(-7.0 * x, heading, speed)
+
+        found = run(wrong)
+        said = told(replace(found, messages={**found.messages, ODOM: sources}))
+        assert "pose.x" in said
+
     @pytest.mark.parametrize("items", [[], [1.0]])
     def test_an_array_that_is_too_short(self, items):
         subject = run(lambda t: {**right(t), "speeds": items})

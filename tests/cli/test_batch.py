@@ -111,8 +111,17 @@ def class_command(course: Path, out: Path, count: int) -> list[str]:
     return ["batch", "timed_publisher", str(course), "--out", str(out), "--sandbox", "none"]
 
 
-def after_the_first(command: list[str], folder: Path, number: signal.Signals) -> tuple[int, str]:
-    """Send a batch a signal when the first is graded; its exit status, and what it said then."""
+def after_the_first(
+    command: list[str], folder: Path, number: signal.Signals, *, again: bool = False
+) -> tuple[int, str]:
+    """Send a batch a signal when the first is graded; its exit status, and what it said then.
+
+    Args:
+        command: What to run.
+        folder: Where.
+        number: The signal.
+        again: Whether it gets another one while it writes what came of it.
+    """
     batch = subprocess.Popen(
         [sys.executable, "-m", "grader", *command, "--jobs", "1"],
         cwd=folder,
@@ -126,8 +135,14 @@ def after_the_first(command: list[str], folder: Path, number: signal.Signals) ->
         if " 1 of " in line:
             break
     batch.send_signal(number)
-    _, said = batch.communicate()
-    return batch.returncode, said
+    if again:
+        # At this line it begins to write what there is.
+        said = next(line for line in batch.stderr if "interrupted; " in line)
+        batch.send_signal(number)
+    else:
+        said = ""
+    _, more = batch.communicate()
+    return batch.returncode, said + more
 
 
 def test_after_kill_9_the_same_command_goes_on(
@@ -146,9 +161,13 @@ def test_after_kill_9_the_same_command_goes_on(
     assert not (out / ".partial").exists()
 
 
-def test_after_ctrl_c_there_is_an_overview_of_what_is_graded(tmp_path: Path, course: Path) -> None:
+@pytest.mark.parametrize("again", [False, True])
+def test_after_ctrl_c_there_is_an_overview_of_what_is_graded(
+    again: bool, tmp_path: Path, course: Path
+) -> None:
     out = tmp_path / "out"
-    status, said = after_the_first(class_command(course, out, 3), tmp_path, signal.SIGINT)
+    command = class_command(course, out, 3)
+    status, said = after_the_first(command, tmp_path, signal.SIGINT, again=again)
     assert status == 130
     assert "interrupted; " in said and "Traceback" not in said
     rows = grades(out)

@@ -43,6 +43,15 @@ def test_beams_are_those_of_the_scans_to_the_centimetre(run, replay):
     assert len(scans["ranges"]) == 2 * scans["beams"] * len(scans["times"])
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e38])
+def test_a_scan_that_a_submission_forged_stops_no_report(run, value):
+    forged, *others = run.on("/scan")
+    odd = {"angle_min": value, "angle_increment": value, "ranges": [value] * 3}
+    forged = replace(forged, value={**forged.value, **odd})
+    faked = replace(run, messages={**run.messages, "/scan": (forged, *others)})
+    assert embedded(make_replay(faked, gallery().grade.assignment.scenarios[1]))
+
+
 def test_headings_do_not_jump_at_the_wrap(replay):
     assert max(map(abs, replay["yaw"])) < 1000
 

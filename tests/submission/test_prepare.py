@@ -105,3 +105,12 @@ def test_two_folders_that_are_refused_are_not_taken_for_the_same(tmp_path: Path)
         (folder / "b.py").touch()
         prints |= {fingerprint(folder, limits), fingerprint(folder, limits)}
     assert len(prints) == 2
+
+
+def test_a_folder_that_is_refused_is_never_the_same_as_an_empty_one(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    folders = [tmp_path / name for name in ("deep", "other")]
+    for folder in folders:
+        (folder / folder.name / "d" / "d").mkdir(parents=True)
+    limits = ArchiveLimits(depth=1)
+    assert len({fingerprint(path, limits) for path in (*folders, tmp_path / "empty")}) == 3
