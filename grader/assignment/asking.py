@@ -20,7 +20,8 @@ class ListParameters(Model):
     """Call the parameter service `list_parameters` of every node of the student.
 
     It answers only while the node's executor spins, and so shows from outside whether a
-    callback blocks the executor.
+    callback blocks the executor. A node without parameter services is asked for
+    `get_type_description` instead.
     """
 
     call: Literal["list_parameters"] = Field(description="Always `list_parameters`.")

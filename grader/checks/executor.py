@@ -21,11 +21,13 @@ from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.node_absence import why_no_node, why_not_node
 from grader.checks.node_name import node_name
 from grader.checks.wording import code, codes, counted
+from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Process, Recording
 
 _FORGIVING_FROM = 3
-_SERVICE = "/list_parameters"
 _MOST_MOMENTS = 5
+_LONG_NS = NS
+"""In this time the graph tells which services a node has, several times over."""
 
 
 class Responsive(Parameters):
@@ -81,15 +83,16 @@ class _Answers:
 def responsive(recording: Recording, parameters: Responsive) -> Finding:
     """The executor keeps spinning while the node works.
 
-    The probe calls the service `list_parameters` that every node has; a node can answer only
-    while its executor spins. Calls count from the node's first message on (or, if it publishes
-    nothing, from its appearance); those that were sent too late to be answered before the end
-    do not count. A callback may be busy for a while, as long as answers come in time; with
-    `typically`, only as long as most of them come soon.
+    The probe calls the service `list_parameters` that every node has, and `get_type_description`
+    of a node without parameter services; a node can answer only while its executor spins. Calls
+    count from the node's first message on (or, if it publishes nothing, from its appearance);
+    those that were sent too late to be answered before the end do not count. A callback may be
+    busy for a while, as long as answers come in time; with `typically`, only as long as most of
+    them come soon.
 
     Explains a loop with `time.sleep()` in the constructor, in main() or in a callback, and
-    `rclpy.spin()` that was never called. For a node without parameter services it relies on
-    what the process declared: that it spins and has a timer.
+    `rclpy.spin()` that was never called. Where no call can be judged it relies on what the
+    process declared: that it spins and has a timer.
     """
     expected = f"parameter services of the node answer within {format_duration(parameters.within)}"
     if parameters.node:
@@ -124,7 +127,7 @@ def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answer
     begin_ns = _working_from(recording, node)
     judged, late = [], []
     for call in recording.calls:
-        if call.service != node + _SERVICE:
+        if call.service not in executor_services(node):
             continue
         answered = call.answered_ns is not None and (
             call.answered_ns - call.requested_ns <= within_ns
@@ -246,6 +249,15 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
     ended = dead(recording)
     if ended:
         return cause_of_death(recording, ended[0]).finding(expected)
+    lacking = [name for name in names if _without_services(recording, name)]
+    if lacking:
+        # What a process says of itself would be all that there is, and it can say anything.
+        return Finding.error(
+            expected,
+            f"{codes(lacking)} has none of the services "
+            f"{codes(EXECUTOR_SERVICES, 'and')} that rclpy makes for every node: "
+            "nothing shows from outside whether its executor spins. Leave them on",
+        )
     if testimony.said(recording, "spin") and testimony.said(recording, "timer"):
         return Finding.passed(
             expected,
@@ -254,9 +266,17 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
         )
     return Finding.error(
         expected,
-        f"no call to {codes(name + _SERVICE for name in names)} could be judged, of "
+        f"no call to {codes(executor_services(name)[0] for name in names)} could be judged, of "
         f"{counted(len(recording.calls), 'call')} that the probe sent",
     )
+
+
+def _without_services(recording: Recording, name: str) -> bool:
+    """Whether a node was there for long, and offered nothing that its executor answers."""
+    offered = {service.name for service in recording.services}
+    appeared = [node.appeared_ns for node in recording.student_nodes if node.name == name]
+    long = bool(appeared) and recording.stop_ns - min(appeared) > _LONG_NS
+    return long and offered.isdisjoint(executor_services(name))
 
 
 def _summary(groups: list[_Answers], parameters: Responsive) -> str:

@@ -12,9 +12,9 @@ from grader.checks.death import cause_of_death, dead, ended_early
 from grader.checks.failure import interrupted_place, parse_failures, student_place
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
+from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
 
-_LIST_PARAMETERS = "/list_parameters"
 _LOG_LINES = 10
 _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]+)' was never awaited")
 
@@ -166,7 +166,7 @@ def _blocked(recording: Recording, node: str, asked_ns: int) -> bool:
     calls = [
         call
         for call in recording.calls
-        if call.service == node + _LIST_PARAMETERS
+        if call.service in executor_services(node)
         and asked_ns <= call.requested_ns <= recording.stop_ns - NS
     ]
     answered = any(call.answered_ns is not None and call.answered_ns > asked_ns for call in calls)

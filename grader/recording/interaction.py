@@ -9,6 +9,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+EXECUTOR_SERVICES = {
+    "list_parameters": "rcl_interfaces/srv/ListParameters",
+    "get_type_description": "type_description_interfaces/srv/GetTypeDescription",
+}
+"""What nodes offer by themselves and answer only while their executor spins: name -> type.
+
+The first is called; the second where a node was made with ``start_parameter_services=False``.
+"""
+
+
+def executor_services(node: str) -> tuple[str, ...]:
+    """The same of one node, by their full names.
+
+    Args:
+        node: Fully qualified name.
+    """
+    return tuple(f"{node}/{name}" for name in EXECUTOR_SERVICES)
+
 
 @dataclass(frozen=True)
 class Service:

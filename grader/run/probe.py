@@ -19,6 +19,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from grader.recording.interaction import EXECUTOR_SERVICES
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Call, Endpoint, Kind, Owner
 from grader.run.order import Limits, Topic
@@ -29,7 +30,6 @@ _BEFORE_ALL_NS = 1
 _LAST_SEQUENCE = 2**32 - 1
 # One lost answer must not end the observation, and a blocked node must not be flooded.
 _MOST_UNANSWERED = 5
-_LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
 
 
 def import_interface(name: str) -> Any:
@@ -197,14 +197,20 @@ class Probe:
         self._fallbacks.add(topic.name)
         self._subscribe(topic, "best_effort", "volatile")
 
-    def call_list_parameters(self, node: str) -> None:
-        """Call a node's parameter service, unless several calls are still unanswered."""
-        from rcl_interfaces.srv import ListParameters
+    def call_executor(self, node: str, name: str) -> None:
+        """Call a service that a node answers only while it spins.
 
-        service = f"{node}/list_parameters"
+        Nothing happens as long as several calls are still unanswered.
+
+        Args:
+            node: Fully qualified name.
+            name: One of :data:`grader.recording.interaction.EXECUTOR_SERVICES`.
+        """
+        kind = import_interface(EXECUTOR_SERVICES[name])
+        service = f"{node}/{name}"
         if service not in self._clients:
             try:
-                self._clients[service] = self.node.create_client(ListParameters, service)
+                self._clients[service] = self.node.create_client(kind, service)
             except InvalidServiceNameException:
                 # A node of a very long name, whose own services ROS would not allow either.
                 return
@@ -214,7 +220,7 @@ class Probe:
         if unanswered >= _MOST_UNANSWERED or not client.service_is_ready():
             return
         pending = _Pending(time.time_ns(), None)
-        pending.future = client.call_async(ListParameters.Request())
+        pending.future = client.call_async(kind.Request())
 
         def answered(_: Any) -> None:
             pending.answered_ns = time.time_ns()
@@ -226,7 +232,7 @@ class Probe:
     def calls(self) -> tuple[Call, ...]:
         """Every call so far, oldest first."""
         found = [
-            Call(service, _LIST_PARAMETERS, call.requested_ns, call.answered_ns)
+            Call(service, _type_of(service), call.requested_ns, call.answered_ns)
             for service, calls in self._calls.items()
             for call in calls
         ]
@@ -270,6 +276,10 @@ class Probe:
         if len(data) > self._limits.message_bytes:
             return
         self.messages.append(_raw(topic.name, topic.type, data, info))
+
+
+def _type_of(service: str) -> str:
+    return EXECUTOR_SERVICES[service.rpartition("/")[2]]
 
 
 def _raw(topic: str, type: str, data: bytes, info: Any, join: str = "") -> RawMessage:

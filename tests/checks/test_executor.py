@@ -1,8 +1,11 @@
 """executor.responsive: a callback may be busy, but must come back."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.checks.finding import Status
+from grader.recording.interaction import Service
 from grader.recording.model import Ending
 from tests.checks.builder import (
     NODE,
@@ -26,6 +29,7 @@ from tests.checks.builder import (
     traceback,
 )
 
+OFFERED = Service(f"{NODE}/list_parameters", "rcl_interfaces/srv/ListParameters", NODE, 0)
 LOOPING = {"calls": calls(None), "declarations": declarations(timer_s=None, spin=False)}
 
 
@@ -57,10 +61,24 @@ class TestGood:
         assert responsive(run).status is Status.PASSED
         assert responsive(run, share="100 %").status is Status.FAILED
 
-    def test_a_node_without_parameter_services_is_judged_by_what_it_declares(self):
-        finding = responsive(recording(calls=()))
+    def test_a_node_without_parameter_services_is_judged_by_another_one(self):
+        asked = tuple(
+            replace(item, service="/bot_publisher/get_type_description") for item in calls(0.01)
+        )
+        assert responsive(recording(calls=asked)).status is Status.PASSED
+        never = tuple(replace(item, answered_ns=None) for item in asked)
+        found = failing("executor.responsive", recording(calls=never))
+        assert "answered 0 of 6 calls within 1 s" in found
+
+    def test_a_node_that_nothing_could_be_asked_of_is_judged_by_what_it_declares(self):
+        finding = responsive(recording(calls=(), services=(OFFERED,)))
         assert finding.status is Status.PASSED
         assert "the process declared a timer and that its executor spins" in finding.observed
+
+    def test_what_a_process_says_of_itself_is_no_proof_where_it_left_nothing_to_ask(self):
+        finding = responsive(recording(calls=()))
+        assert finding.status is Status.ERROR
+        assert "has none of the services" in finding.observed
 
     def test_a_second_node_that_nobody_spins_and_that_is_not_on_the_topic(self):
         settings = "/settings"
@@ -189,7 +207,9 @@ class TestNotJudged:
         assert responsive(recording(**LOOPING, disturbance=noise)).status is Status.FAILED
 
     def test_no_call_and_nothing_declared(self):
-        finding = responsive(recording(calls=(), declarations=(declared("started"),)))
+        finding = responsive(
+            recording(calls=(), declarations=(declared("started"),), services=(OFFERED,))
+        )
         assert (finding.status, finding.disturbed) == (Status.ERROR, False)
         assert f"`{NODE}/list_parameters`" in finding.observed
 

@@ -114,6 +114,23 @@ def test_which_nodes_an_executor_was_given(run_node: RunNode) -> None:
     assert given == {"/bot_publisher": False, "/first": True, "/second": True}
 
 
+@pytest.mark.parametrize("spins", [True, False])
+def test_a_node_without_parameter_services_is_asked_for_something_else(
+    run_node: RunNode, spins: bool
+) -> None:
+    source = (nodes.timed() if spins else nodes.BLOCKED).replace(
+        '"bot_publisher")', '"bot_publisher", start_parameter_services=False)'
+    )
+    recording = run_node(
+        source,
+        until={"elapsed": "3 s"},
+        stimuli=[{"call": "list_parameters", "every": "100 ms"}],
+    )
+    asked = [call for call in recording.calls if call.requested_ns < recording.stop_ns - 10**9]
+    assert {call.service for call in asked} == {"/bot_publisher/get_type_description"}
+    assert {call.answered_ns is not None for call in asked} == {spins}
+
+
 def test_messages_after_sigint_are_not_recorded(run_node: RunNode) -> None:
     source = nodes.timed().replace(
         "rclpy.spin(node)\n",

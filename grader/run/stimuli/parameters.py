@@ -1,16 +1,20 @@
-"""Calls the parameter services of the student's nodes, which answer only while they spin."""
+"""Calls services of the student's nodes that answer only while they spin."""
 
 from __future__ import annotations
 
 import time
 
-from grader.recording.model import Owner
+from grader.recording.interaction import EXECUTOR_SERVICES
+from grader.recording.model import NS, Owner
 from grader.run.stimuli.orders import ListParametersOrder
 from grader.run.stimuli.stage import Playing, Stage
 
+_SETTLED_NS = NS // 2
+"""A node whose other services were seen so long ago has no parameter services."""
+
 
 class ListingParameters(Playing):
-    """Calls ``list_parameters`` of every node; it has no end."""
+    """Calls ``list_parameters`` of every node, or what stands in for it; it has no end."""
 
     def __init__(self, order: ListParametersOrder, stage: Stage) -> None:
         """Nothing is called yet."""
@@ -26,4 +30,17 @@ class ListingParameters(Playing):
         self._next = now + self._every_s
         for node in self._stage.graph.nodes:
             if node.owner is Owner.STUDENT and node.vanished_ns is None:
-                self._stage.probe.call_list_parameters(node.name)
+                self._stage.probe.call_executor(node.name, self._name(node.name))
+
+    def _name(self, node: str) -> str:
+        """Which service to call."""
+        first, second = EXECUTOR_SERVICES
+        seen = {
+            service.name: service.appeared_ns
+            for service in self._stage.graph.services
+            if service.node == node
+        }
+        appeared_ns = seen.get(f"{node}/{second}")
+        if f"{node}/{first}" in seen or appeared_ns is None:
+            return first
+        return second if time.time_ns() - appeared_ns > _SETTLED_NS else first
