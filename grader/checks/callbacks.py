@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from grader.assignment.model import TopicName
 from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
+from grader.checks import testimony
 from grader.checks.callback_run import Reports, read_reports, spans
 from grader.checks.check import Subject, check
 from grader.checks.death import cause_of_death, dead
@@ -129,7 +130,7 @@ def _judge_period(
             )
         return Finding.failed(expected, observed, _period_hint(recording, 0.0, period_s), evidence)
     if good and len(reports.ended([callback])) >= parameters.at_least:
-        return None
+        return _by_chance(recording, parameters, reports, callback, limits)
     if seconds and not good:
         middle_s = median(seconds)
         observed = f"{code(callback)} starts every {format_duration(middle_s)} (median)"
@@ -146,6 +147,30 @@ def _judge_period(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
     return None if cause is None else cause.finding(expected)
+
+
+def _by_chance(
+    recording: Recording, parameters: Runs, reports: Reports, callback: str, limits: Limits
+) -> Finding | None:
+    """The finding where the work alone may have made the period, or None.
+
+    An executor that is never free calls each of its timers when it comes round, however short
+    their periods are. Only then it matters what the process declared, and it decides nothing.
+    """
+    begins = [item.begin_ns for item in reports.of(callback)]
+    if not all(_worked(recording, reports, one, other) for one, other in pairwise(begins)):
+        return None
+    declared_s = {timer.period_s for timer in testimony.timers(recording)}
+    if not declared_s or any(judge([period_s], limits).good for period_s in declared_s):
+        return None
+    return Finding.error(
+        _run_words(parameters),
+        f"{code(callback)} starts as often as it should, but the executor was never free between "
+        f"its starts, and the process declared "
+        f"{listing(f'a timer of {format_duration(item)}' for item in sorted(declared_s))}: "
+        "its period does not show",
+        disturbed=True,
+    )
 
 
 def _gained_s(recording: Recording, begins: Sequence[int], period_s: float) -> tuple[float, float]:

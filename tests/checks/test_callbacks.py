@@ -10,6 +10,7 @@ from grader.assignment.load import load_assignment
 from grader.checks.callback_run import read_reports
 from grader.checks.finding import Status
 from tests.checks.builder import (
+    NODE,
     at,
     declared,
     died,
@@ -161,6 +162,20 @@ class TestRun:
         runs = [(name, begin, begin + 0.4) for name, begin in zip(names, begins, strict=True)]
         finding = judged("run", run(*runs), TIMERS, period="1 s")
         assert finding.status is Status.PASSED
+
+    def test_a_thread_that_is_never_free_hides_a_wrong_period(self):
+        begins = [1.0 + 0.405 * index for index in range(13)]
+        names = ["timer_1", "timer_2", "chatter"] * 4 + ["timer_1"]
+        runs = [(name, begin, begin + 0.4) for name, begin in zip(names, begins, strict=True)]
+        told = tuple(declared("timer", node=NODE, period_s=0.5) for _ in TIMERS)
+        finding = judged("run", run(*runs, declarations=told), TIMERS, period="1 s")
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "the process declared a timer of 500 ms" in finding.observed
+        right = tuple(declared("timer", node=NODE, period_s=1.0) for _ in TIMERS)
+        finding = judged("run", run(*runs, declarations=right), TIMERS, period="1 s")
+        assert finding.status is Status.PASSED
+        free = run(*only(parallel(), "timer_1"), declarations=told)
+        assert judged("run", free, ["timer_1"], period="1 s").status is Status.PASSED
 
     def test_a_short_period_is_told_where_the_median_is_right_by_chance(self):
         """Two timers of 0.5 s that work 0.4 s, and a message in every second round of them."""
