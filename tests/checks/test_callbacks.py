@@ -163,6 +163,23 @@ class TestRun:
         finding = judged("run", run(*runs), TIMERS, period="1 s")
         assert finding.status is Status.PASSED
 
+    def test_who_comes_first_to_a_lock_may_change(self):
+        """As seen of two timers of 1 s that waited for the same lock."""
+        begins = [(1.366, 1.767), (2.366, 2.768), (3.371, 3.773), (4.779, 4.375), (5.38, 5.781)]
+        runs = [
+            (name, begin, begin + 0.4)
+            for row in begins
+            for name, begin in zip(TIMERS, row, strict=True)
+        ]
+        messages = [("chatter", begin, begin + 0.2) for begin in (3.17, 4.174, 5.179)]
+        runs = sorted([*runs, *messages], key=lambda item: item[1])
+        assert "too often" in failed("run", run(*runs), TIMERS, period="1 s")
+        right = tuple(declared("timer", node=NODE, period_s=1.0) for _ in TIMERS)
+        finding = judged("run", run(*runs, declarations=right), TIMERS, period="1 s")
+        assert finding.status is Status.PASSED
+        told = run(*runs, declarations=(*right, *right))
+        assert "too often" in failed("run", told, TIMERS, period="1 s")
+
     def test_a_thread_that_is_never_free_hides_a_wrong_period(self):
         begins = [1.0 + 0.405 * index for index in range(13)]
         names = ["timer_1", "timer_2", "chatter"] * 4 + ["timer_1"]
