@@ -94,7 +94,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     `rclpy.spin()` that was never called. Where no call can be judged it relies on what the
     process declared: that it spins and has a timer.
     """
-    expected = f"parameter services of the node answer within {format_duration(parameters.within)}"
+    expected = f"services of the node answer within {format_duration(parameters.within)}"
     if parameters.node:
         missing = why_not_node(recording, parameters.node)
     else:
@@ -291,7 +291,7 @@ def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
     late = [call for group in groups for call in group.late]
     answered = [call for group in groups for call in group.judged if call.answered_ns is not None]
     plot = Plot(
-        title="Time until the parameter service answered",
+        title="Time until the service answered",
         x_label="time since launch (s)",
         y_label="time to the answer (s)",
         x=tuple(recording.since_launch_s(call.requested_ns) for call in answered),

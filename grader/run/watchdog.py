@@ -77,7 +77,8 @@ class Watchdog:
         limits = self._limits
         usages = usage_of(self._inits())
         if self._looks % _LOOKS_PER_SEARCH == 0:
-            self._hidden_bytes = hidden_bytes(usages)
+            room = limits.memory_bytes - memory_bytes(usages, limits.memory_bytes)
+            self._hidden_bytes = hidden_bytes(usages, room)
         self._looks += 1
         taken = memory_bytes(usages, limits.memory_bytes, self._hidden_bytes)
         if taken > limits.memory_bytes:

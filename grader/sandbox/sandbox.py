@@ -253,7 +253,8 @@ class BuildRoom:
         """
         limits = self.limits
         usages = usage_of([pid])
-        taken = memory_bytes(usages, limits.memory_bytes, hidden_bytes(usages))
+        room = limits.memory_bytes - memory_bytes(usages, limits.memory_bytes)
+        taken = memory_bytes(usages, limits.memory_bytes, hidden_bytes(usages, room))
         if taken > limits.memory_bytes:
             return f"it took more than {size_words(limits.memory_bytes)} of memory"
         if sum(usage.cpu_s for usage in usages) > limits.cpu_s:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -72,13 +73,20 @@ def own_bytes() -> int:
     return usage.resident_bytes if usage is not None else 0
 
 
-def hidden_bytes(usages: Iterable[Usage]) -> int:
+def hidden_bytes(usages: Iterable[Usage], room: int = 0) -> int:
     """Shared memory that processes hold and that is in the resident set of none of them.
 
     A page of it stays when a process lets go of its place (madvise(2), MADV_DONTNEED), or ends,
     as long as anybody has mapped that memory. Nobody but the kernel knows how much of it there
     is, so all that is mapped counts as taken.
+
+    Args:
+        usages: Of the processes.
+        room: Where all shared memory of this machine is no more than this, it is not looked for:
+            to read what processes have mapped takes longer than all else that is read of them.
     """
+    if _shared_bytes() <= room:
+        return 0
     sizes: dict[bytes, int] = {}
     seen = 0
     for usage in usages:
@@ -133,6 +141,18 @@ def _usage(pid: int) -> Usage | None:
         )
     except (OSError, IndexError, ValueError):
         return None
+
+
+def _shared_bytes() -> int:
+    """No less than all shared memory that this machine holds: see proc_meminfo(5)."""
+    try:
+        with open(f"{_PROC}/meminfo", "rb") as file:  # noqa: PTH123  often
+            found = dict(re.findall(rb"^(\w+):\s*(\d+) kB$", file.read(), re.MULTILINE))
+        # Whose the swapped pages are is not said there.
+        swapped = int(found[b"SwapTotal"]) - int(found[b"SwapFree"])
+        return 1024 * (int(found[b"Shmem"]) + swapped)
+    except (OSError, KeyError):
+        return sys.maxsize
 
 
 def _shared_memory(pid: int) -> dict[bytes, int]:

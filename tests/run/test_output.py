@@ -51,7 +51,7 @@ def test_what_has_no_line_end_is_cut_by_time() -> None:
     for milliseconds in (0, 30, 60, 500, 530):
         stream.feed(b"x=%d; " % milliseconds, milliseconds * 1_000_000)
     stream.feed(b"end\nnext", 531_000_000)
-    stream.feed(b"\n", 900_000_000)
+    stream.feed(b"\n", 950_000_000)
     stream.finish()
     found = [(line.text, line.time_ns // 1_000_000) for line in stream.kept.head]
     assert found == [

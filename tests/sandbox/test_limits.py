@@ -124,6 +124,8 @@ def test_shared_memory_counts_although_it_is_resident_nowhere() -> None:
         child.stdin.write(b"\n")
         child.stdout.read(1)
         assert hidden_bytes(usage_of([child.pid])) == 2**25
+        assert hidden_bytes(usage_of([child.pid]), room=2**25 - 1) == 2**25
+        assert hidden_bytes(usage_of([child.pid]), room=2**50) == 0
         child.stdin.write(b"\n")
     assert memory_bytes([], 0, 2**25) == 2**25
 
