@@ -12,7 +12,7 @@ import subprocess
 from pathlib import Path
 
 MOST_DEEP = 100
-"""Folders in one another. What colcon makes of a package is not half as deep."""
+"""Folders in one another. What colcon makes of a package with interfaces is 9 deep."""
 _LONGEST_PATH = 3000
 """In bytes; the system takes 4096, and what walks here appends names to it."""
 
