@@ -8,7 +8,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import yaml
@@ -363,31 +363,39 @@ def _with_problem(row: HandedIn, problem: str) -> HandedIn:
 def _matched(entries: list[_Entry], roster: Roster) -> list[HandedIn]:
     """Give each entry to the student of the roster that it names."""
     known: dict[str, set[str]] = {}
+    named: dict[str, set[str]] = {}
     students = {student.key: student for student in roster.students}
     for student in roster.students:
         for form in student.identifiers:
             known.setdefault(form, set()).add(student.key)
+        if student.submission:
+            file = PurePosixPath(student.submission).name.removesuffix(".git")
+            named.setdefault(file, set()).add(student.key)
     rows: list[HandedIn] = []
     handed: dict[str, str] = {}
     for entry in entries:
-        keys = _owners(entry, known)
-        if len(keys) != 1:
+        # What the roster says itself needs no guess, and a team may have handed in one for all.
+        told = named.get(entry.path.name, set()) | named.get(_stem(entry.path), set())
+        keys = told or _owners(entry, known)
+        if not told and len(keys) != 1:
             why = "not in the roster" if not keys else f"may be {' or '.join(sorted(keys))}"
             rows.append(replace(_row(entry), problem=why))
             continue
-        (key,) = keys
-        student = students[key]
-        row = replace(_row(entry), key=key, name=student.name, problem=student.problem)
-        if key in handed:
-            row = _with_problem(row, f"handed in twice: {handed[key]} too")
-        handed.setdefault(key, shown(entry.path.name))
-        rows.append(row)
-    missing = [student for student in roster.students if student.key not in handed]
-    rows += [
-        _with_problem(HandedIn(s.key, None, s.name, problem=s.problem), "handed in nothing")
-        for s in missing
-    ]
-    return rows
+        for key in sorted(keys):
+            student = students[key]
+            row = replace(_row(entry), key=key, name=student.name, problem=student.problem)
+            if key in handed:
+                row = _with_problem(row, f"handed in twice: {handed[key]} too")
+            handed.setdefault(key, shown(entry.path.name))
+            rows.append(row)
+    return rows + [_missing(s) for s in roster.students if s.key not in handed]
+
+
+def _missing(student: Student) -> HandedIn:
+    why = "handed in nothing"
+    if student.submission:
+        why += f": {shown(student.submission)} is not among the submissions"
+    return _with_problem(HandedIn(student.key, None, student.name, problem=student.problem), why)
 
 
 def _owners(entry: _Entry, known: Mapping[str, set[str]]) -> set[str]:

@@ -155,6 +155,30 @@ def test_a_name_that_two_students_have_is_given_to_neither(course: Path, staging
     assert rows["1"].path is None and rows["2"].path is None
 
 
+def test_what_a_roster_names_is_whose_it_says(course: Path, staging: Path) -> None:
+    folder(course / "hw1-final")
+    archive(course / "team.zip")
+    archive(course / "Ana Lopez.zip")
+    students = (
+        Student(2, id="1", name="Ana Lopez", submission="clones/hw1-final"),
+        Student(3, id="2", name="Lopez, Ana", submission="Ana Lopez.zip"),
+        Student(4, id="3", submission="team.zip"),
+        Student(5, id="4", submission="https://example.org/them/team.git"),
+        Student(6, id="5", submission="lost.zip"),
+    )
+    rows = {row.key: row for row in take_in(course, staging, Roster(students))}
+    found = {key: row.path and row.path.name for key, row in rows.items()}
+    assert found == {
+        "1": "hw1-final",
+        "2": "Ana Lopez.zip",
+        "3": "team.zip",
+        "4": "team.zip",
+        "5": None,
+    }
+    assert rows["5"].problem == "handed in nothing: lost.zip is not among the submissions"
+    assert not any(row.problem for key, row in rows.items() if key != "5")
+
+
 def test_two_submissions_of_one_student_are_both_rows(course: Path, staging: Path) -> None:
     folder(course / "ana")
     archive(course / "Ana.zip")
