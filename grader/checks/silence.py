@@ -376,8 +376,15 @@ def _idle(recording: Recording, topic: str) -> Cause:
     runs = [format_duration(timer.period_s) for timer in timers]
     spins = testimony.said(recording, "spin")
     though = f", although the process declared a timer of {listing(runs)}" if runs and spins else ""
+    seen = f"the publisher on {code(topic)} is there but silent{though}"
+    if runs and all(timer.callback.endswith("<lambda>") for timer in timers):
+        hint = (
+            "A lambda has to call the method, with brackets: `lambda: self.callback()`. Without a "
+            "lambda it is self.callback, without brackets."
+        )
+        return Cause(seen, hint, evidence)
     return Cause(
-        f"the publisher on {code(topic)} is there but silent{though}",
+        seen,
         "Is publish(msg) reached in the callback? An `except: pass` hides the error that would "
         "tell why not, a lock that is never free keeps it waiting, and timer.cancel() ends it.",
         evidence,

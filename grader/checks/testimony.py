@@ -22,10 +22,12 @@ class DeclaredTimer:
     Attributes:
         period_s: Its period.
         declared_ns: When the probe read of it.
+        callback: Qualified name of what it calls.
     """
 
     period_s: float
     declared_ns: int
+    callback: str = ""
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,8 @@ def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
     for item in recording.declared("timer"):
         period_s = _number(item.data, "period_s")
         if period_s is not None and period_s > 0.0:
-            found.append(DeclaredTimer(period_s, item.time_ns))
+            callback = _text(item.data, "callback") or ""
+            found.append(DeclaredTimer(period_s, item.time_ns, callback))
     return tuple(found)
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from grader.checks.finding import Status
 from grader.recording.model import Ending, Kind, Owner
 from tests.checks.builder import (
+    NODE,
     RELIABLE,
     SOURCE,
     STOP_S,
@@ -219,6 +220,12 @@ class TestSilence:
         found = self.found(log=output("something went wrong"))
         assert "there but silent, although the process declared a timer of 300 ms" in found
         assert "except: pass" in found
+
+    def test_a_lambda_that_calls_nothing(self):
+        timer = declared("timer", 0.4, node=NODE, period_s=0.3, callback="Bot.__init__.<lambda>")
+        found = self.found(declarations=(*declarations(timer_s=None), timer))
+        assert "there but silent, although the process declared a timer of 300 ms" in found
+        assert "A lambda has to call the method, with brackets" in found
 
     def test_simulated_time_that_nobody_publishes(self):
         clock = endpoint("/clock", kind=Kind.SUBSCRIPTION, type="rosgraph_msgs/msg/Clock")
