@@ -85,7 +85,7 @@ def echoes(
     """Messages that are followed by lines which show their values.
 
     A line serves one message, so that a single line does not stand for many messages with the
-    same values.
+    same values; unless it lists the values of several, as print(..., end=" ") writes them.
 
     Args:
         recording: The run.
@@ -97,9 +97,11 @@ def echoes(
     lines = output_lines(recording)
     times = [line.time_ns for line in lines]
     printed = [numbers(line.text) for line in lines]
-    found = []
-    free = 0
-    for item in wanted:
+    found: list[Echo] = []
+    free = number = 0
+    while number < len(wanted):
+        item = wanted[number]
+        number += 1
         begin_ns = item.message.stamp_ns
         end_ns = item.due_ns + within_ns
         if forgive:
@@ -119,9 +121,29 @@ def echoes(
                 missing, serving = set(item.values), []
             if not missing:
                 free = index + 1
-                found.append(Echo(item, lines[first:free]))
+                others = wanted[number : number + len(printed[index]) - 1]
+                before = [one for one in others if one.message.stamp_ns <= times[index]]
+                listed = _listed(printed[index], [item, *before], decimals)
+                found += [Echo(one, lines[first:free]) for one in [item, *before][:listed]]
+                number += listed - 1
                 break
     return tuple(found)
+
+
+def _listed(printed: Sequence[float], wanted: Sequence[Wanted], decimals: int) -> int:
+    """How many messages a line serves: its numbers are their values in order, and no two the same.
+
+    Args:
+        printed: Numbers of the line, the value of the first message among them.
+        wanted: Messages that came before it, the oldest first.
+        decimals: How many decimals must be right.
+    """
+    values = [value for item in wanted for value in item.values.values()][: len(printed)]
+    single = all(len(item.values) == 1 for item in wanted)
+    if not single or len(values) < len(printed) or len(set(printed)) < len(printed):
+        return 1
+    right = all(shows(*pair, decimals) for pair in zip(printed, values, strict=True))
+    return len(printed) if right else 1
 
 
 def shown(printed: Sequence[float], wanted: Wanted, decimals: int) -> set[str]:

@@ -203,6 +203,30 @@ class TestAnyRhythmIsRight:
         assert "log lines follow only 1 of 6 messages on `/odom`" in found
         assert "Log in every call of the callback" in found
 
+    @pytest.mark.parametrize(
+        ("text", "served"),
+        [
+            ("765072 765073 765074 765075 765076 ", 5),
+            ("765073; 765074; 765075; ", 3),
+            ("n=765075, n=765076", 2),
+            ("765072 765074 765073", 1),
+            ("765072 765073 17", 1),
+            ("765072 765072", 1),
+        ],
+    )
+    def test_a_line_that_lists_messages_stands_for_each(self, text, served):
+        values = [{"data": 765072 + index} for index in range(len(SCAN_TIMES_S))]
+        changed = tuple(
+            message(t, value, topic="/scan", type=SCAN)
+            for t, value in zip(SCAN_TIMES_S, values, strict=True)
+        )
+        log = lines(text, [SCAN_TIMES_S[-1] + 0.1])
+        asked = {**FRONT, "fields": ["data"], "within": "5 s", "at_least": served}
+        changes = {"messages": {"/scan": changed}}
+        assert judge("log.follows", run(log, **changes), **asked).status is Status.PASSED
+        asked["at_least"] += 1
+        assert f"only {served} of" in failing("log.follows", run(log, **changes), **asked)
+
     def test_a_callback_that_sleeps_keeps_the_others_waiting(self):
         log = lines("1.83", [3.9])
         slow = front(log, calls=tuple(call(0.5 * n, 1.0, of=BOT) for n in range(1, 7)))
