@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from concurrent.futures import Future, ThreadPoolExecutor
+import threading
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -11,7 +12,9 @@ from grader.batch.grading import Grading
 from grader.batch.worker import Order, Parcel, grade_into, grade_remotely, unpack
 from grader.errors import GraderFault, RosgradeError, UsageError
 
-_CONNECT_S = "15s"
+_CONNECT_S = 15
+_ANSWER_S = _CONNECT_S + 5.0
+"""Dask itself waits for ever for the words of something that is no scheduler."""
 _EACH_WORKER = 2
 """Submissions on their way to a thread of a worker: one is graded, one waits."""
 
@@ -65,6 +68,33 @@ class LocalCrew:
         grade_into(self._grading, key, path, folder)
 
 
+def _connected(address: str, connect: Any) -> Any:
+    """A client of a scheduler.
+
+    Raises:
+        UsageError: None answers.
+    """
+    answer: Future[Any] = Future()
+
+    def ask() -> None:
+        try:
+            answer.set_result(connect(address, timeout=f"{_CONNECT_S}s", set_as_default=False))
+        except Exception as error:
+            answer.set_exception(error)
+
+    threading.Thread(target=ask, name="connect", daemon=True).start()
+    wait([answer], _ANSWER_S)
+    error = answer.exception() if answer.done() else None
+    if isinstance(error, OSError | ValueError | TimeoutError):
+        raise UsageError(f"no Dask scheduler answers at {address}: {error}") from error
+    if error is not None or not answer.done():
+        raise UsageError(
+            f"no Dask scheduler answers at {address}: something else does; its dashboard has "
+            "another port (8787) than the scheduler itself (8786)"
+        ) from error
+    return answer.result()
+
+
 class DaskCrew:
     """Workers of a cluster: one task for each submission.
 
@@ -88,11 +118,7 @@ class DaskCrew:
                 "--scheduler needs Dask: install rosgrade's extra `cluster`, or run `make setup` "
                 "in its checkout"
             ) from error
-        try:
-            connect: Any = distributed.Client
-            self._client = connect(address, timeout=_CONNECT_S, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
-            raise UsageError(f"no Dask scheduler answers at {address}: {error}") from error
+        self._client = _connected(address, distributed.Client)
         # That a scheduler is lost is told by us, and without Dask's tracebacks.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         self._order = order

@@ -31,6 +31,7 @@ _POLICIES = (
     *("liveliness_lease_duration", "avoid_ros_namespace_conventions"),
 )
 _NOT_A_PERIOD = re.compile(r"float\(\) argument must be a .*number, not '(\w+)'")
+_PLAIN = re.compile(r"'(?:float|int|str|bool|list|tuple|dict)' object has no attribute '(\w+)'")
 _TIMER_HINT = (
     "create_timer takes the period first, a number of seconds, then the function: "
     "self.create_timer(0.5, self.timer_callback)."
@@ -86,6 +87,11 @@ def slip_hint(failure: Failure) -> str | None:
         )
     called = _CALLED.search(failure.message)
     source = failure.frames[-1].source if failure.frames else ""
+    if called and "load_entry_point(" in source:
+        return (
+            f"`ros2 run` calls {code(f'{called[1]}()')} without arguments: write "
+            f"{code(f'def {called[1]}(args=None):')}."
+        )
     if called and re.search(rf"\b{called[1]}\(\)\s*[,)]", source):
         return (
             f"Hand over a callback without brackets, {code(f'self.{called[1]}')}: with them you "
@@ -117,6 +123,23 @@ def slip_hint(failure: Failure) -> str | None:
             "given by name: callback_group=group."
         )
     raised_in = failure.frames[-1].file if failure.frames else ""
+    plain = _PLAIN.match(failure.message)
+    if plain and raised_in.endswith("rclpy/publisher.py"):
+        return (
+            "The line that publishes is right, but a field that is itself a message was given a "
+            f"plain value before: set what is in it, msg.field.{plain[1]} = 1.0 instead of "
+            "msg.field = 1.0."
+        )
+    if "'property' object" in failure.message and raised_in.endswith("rclpy/executors.py"):
+        return (
+            "An executor runs nodes, not their classes: create one with brackets, node = MyNode(), "
+            "and call rclpy.spin(node)."
+        )
+    if raised_in.endswith("rclpy/guard_condition.py"):
+        return (
+            "There is no context at this point: call rclpy.init() first, and rclpy.shutdown() only "
+            "after rclpy.spin() has returned."
+        )
     if _NOT_A_PERIOD.match(failure.message) and raised_in.endswith("rclpy/node.py"):
         return _TIMER_HINT
     if failure.message.endswith("is not callable") and raised_in.endswith("rclpy/executors.py"):

@@ -15,7 +15,7 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.echo import Echo, Wanted, echoes, wanted_values
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.log_absence import why_not_logged
+from grader.checks.log_absence import why_not_logged, why_slow
 from grader.checks.printed import quote
 from grader.checks.sighting import endpoints_seen
 from grader.checks.value import NoSuchField
@@ -168,9 +168,13 @@ def _too_seldom(
             f"{observed}, but the machine took the time from the process",
             disturbed=True,
         )
+    observed += f", although messages came on {code(parameters.topic)}"
+    slow = why_slow(recording, parameters.topic, observed)
+    if slow is not None:
+        return slow.finding(expected)
     return Finding.failed(
         expected,
-        f"{observed}, although messages came on {code(parameters.topic)}",
+        observed,
         "Log in every call of the callback, or at least once in a second.",
         Evidence(moments=(Moment("no line from here on", begin_s),)),
     )

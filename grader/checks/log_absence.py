@@ -151,6 +151,28 @@ def _dropped(recording: Recording, topic: str) -> Cause | None:
     )
 
 
+def why_slow(recording: Recording, topic: str, seen: str) -> Cause | None:
+    """The cause if callbacks keep the executor from coming round for long, or None.
+
+    Args:
+        recording: The run.
+        topic: That the student's nodes subscribe to.
+        seen: What was seen of it.
+    """
+    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
+    waited = long_wait(recording, nodes)
+    if waited is None or waited[1] <= _SLOW_S:
+        return None
+    call, wait_s = waited
+    moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
+    return Cause(
+        f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
+        f"service waited {format_duration(wait_s)} and more",
+        HINT,
+        Evidence(moments=(moment,)),
+    )
+
+
 def _few(
     recording: Recording,
     topic: str,
@@ -164,17 +186,9 @@ def _few(
         f"log lines follow only {len(found)} of {counted(len(wanted), 'message')} on "
         f"{code(topic)}, written {written} after launch"
     )
-    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
-    waited = long_wait(recording, nodes)
-    if waited is not None and waited[1] > _SLOW_S:
-        call, wait_s = waited
-        moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
-        return Cause(
-            f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
-            f"service waited {format_duration(wait_s)} and more",
-            HINT,
-            Evidence(moments=(moment,)),
-        )
+    slow = why_slow(recording, topic, seen)
+    if slow is not None:
+        return slow
     seldom_is_right = needed <= _SOME * len(wanted)
     return Cause(
         seen,

@@ -14,11 +14,11 @@ from grader.assignment.quantity import Duration
 from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import Comparison, comparisons, duration_words
-from grader.checks.finding import Evidence, Finding, Table
+from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.sighting import endpoints_seen
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.wording import code, counted
-from grader.recording.model import Endpoint, Kind, Qos, Recording
+from grader.recording.model import Kind, Qos, Recording
 
 # DDS carries durations as seconds and a fraction of 2**32.
 _SAME_DURATION = 1e-3
@@ -32,6 +32,8 @@ _DURATION_POLICIES = {
     "lease": "liveliness_lease_s",
 }
 """Key of the YAML -> attribute of the profile."""
+_DECLARED_POLICIES = {"reliability", "durability"}
+"""What a process declares of an endpoint."""
 
 
 class Profile(Parameters):
@@ -140,20 +142,33 @@ def _judge(recording: Recording, parameters: Profile, side: _Side) -> Finding:
     if cause is not None:
         return cause.finding(expected)
     endpoints = recording.student_endpoints(side.kind, parameters.topic)
-    for endpoint in endpoints:
-        wrong = _wrong(endpoint.qos, parameters)
+    profiles = [(item.node, item.qos) for item in endpoints]
+    source = ""
+    if not endpoints and set(parameters.policies) <= _DECLARED_POLICIES:
+        # One that published and was destroyed before anybody could look at it.
+        profiles += testimony.profiles(recording, side.kind, parameters.topic)
+        source = ", declared by the process"
+    for node, qos in profiles:
+        wrong = _wrong(qos, parameters)
         if wrong:
-            return _mismatch(recording, endpoint, wrong, parameters, expected, side)
+            at = endpoints_seen(recording, [item for item in endpoints if item.qos is qos])
+            at = at or tuple(
+                Moment("message published", recording.since_launch_s(item.stamp_ns))
+                for item in recording.on(parameters.topic)[:1]
+            )
+            return _mismatch(node, qos, wrong, parameters, expected, side, source, at)
     hidden = [
         name
         for name in parameters.policies
         if name in _WORD_POLICIES
-        and (not endpoints or any(getattr(item.qos, name) == "unknown" for item in endpoints))
+        and (not profiles or any(getattr(qos, name) == "unknown" for _, qos in profiles))
     ]
-    if hidden or not endpoints:
+    if hidden or not profiles:
         names = ", ".join(hidden) or "QoS"
         return Finding.error(expected, f"{names} of the {side.kind.value} was not discovered")
-    return Finding.passed(expected, f"{side.did} by {counted(len(endpoints), side.kind.value)}")
+    return Finding.passed(
+        expected, f"{side.did} by {counted(len(profiles), side.kind.value)}{source}"
+    )
 
 
 def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
@@ -172,19 +187,22 @@ def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
 
 
 def _mismatch(
-    recording: Recording,
-    endpoint: Endpoint,
+    node: str,
+    qos: Qos,
     wrong: dict[str, tuple[Any, Any]],
     parameters: Profile,
     expected: str,
     side: _Side,
+    source: str,
+    moments: tuple[Moment, ...],
 ) -> Finding:
-    found = side.comparisons(endpoint.qos, parameters.qos)
+    found = side.comparisons(qos, parameters.qos)
     refused = {item.policy for item in found if item.compatible is False}
-    observed = f"the {side.kind.value} of {code(endpoint.node)} {side.has} " + ", ".join(
+    observed = f"the {side.kind.value} of {code(node)} {side.has} " + ", ".join(
         f"{name} {_words(actual)} instead of {_words(wanted)}"
         for name, (wanted, actual) in wrong.items()
     )
+    observed += source
     if refused:
         observed += f": a {side.partner} the expected profile does not match it"
     else:
@@ -204,7 +222,7 @@ def _mismatch(
         observed,
         _hint(parameters, side),
         Evidence(
-            moments=endpoints_seen(recording, (endpoint,)),
+            moments=moments,
             tables=(Table("Requested against offered", header, rows),),
         ),
     )

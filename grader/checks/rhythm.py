@@ -9,7 +9,7 @@ from statistics import mean
 from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.blockage import long_wait
-from grader.checks.period import Interval, Limits, Verdict
+from grader.checks.period import Interval, Limits, Verdict, judge
 from grader.recording.model import Kind, Recording
 
 _TENS = (10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
@@ -62,6 +62,26 @@ def explain(
     if verdict.period_good:
         return _irregular(measured, verdict)
     return _wrong_period(recording, topic, verdict, limits, declared)
+
+
+def is_declared(recording: Recording, verdict: Verdict, limits: Limits) -> bool:
+    """Whether the process declared a wrong period that is the median, and no right one.
+
+    A hold-up moves single messages of a timer, never its period: then it is not the machine's
+    doing.
+
+    Args:
+        recording: The run.
+        verdict: On the intervals.
+        limits: What was allowed.
+    """
+    declared = [timer.period_s for timer in testimony.timers(recording)]
+    right = [item for item in declared if judge([item], limits).period_good]
+    return (
+        not verdict.period_good
+        and not right
+        and any(math.isclose(item, verdict.median_s, rel_tol=_SAME) for item in declared)
+    )
 
 
 def _too_often(

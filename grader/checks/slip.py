@@ -16,6 +16,8 @@ _FACTORS = {1000.0: "1000 times", 100.0: "100 times", 10.0: "10 times"}
 _FACTOR_TOLERANCE = 1e-6
 # As bits of a numpy.float32 this is a number next to nothing, 1e-38.
 _MOST_DIGITS = 1 << 23
+# Python 3.11 has the number of digits of a negative integer with a minus.
+_LEAST_NEGATIVE = (1 << 64) - (1 << 8)
 
 
 def explain(
@@ -54,19 +56,30 @@ def was_integer(number: Any) -> bool:
     """Whether a float is what rclpy makes of an integer that was put into a float field.
 
     rclpy does not check the types of fields (unless ROS_PYTHON_CHECK_FIELDS=1), and takes the
-    bits of Python's integer for a float: a number next to nothing, such as 5e-324.
+    bits of Python's integer for a float: a number next to nothing, such as 5e-324, or the NaN of
+    the bits of -1, which no computation makes.
     """
-    return isinstance(number, float) and 0.0 < abs(number) < sys.float_info.min
+    return isinstance(number, float) and (
+        0.0 < abs(number) < sys.float_info.min or _bits(number) >= _LEAST_NEGATIVE
+    )
 
 
 def what_was_put(number: float) -> str:
     """What was put into a float field in place of a float, for one that :func:`was_integer`.
 
-    Of an integer rclpy takes the number of its digits for a float, or a small integer itself; of a
-    numpy.float32 all of its bits, the exponent among them.
+    Of an integer rclpy takes the number of its digits for a float, or a small integer itself; of
+    a numpy.float32 all of its bits, the exponent among them; of a text how long it is.
     """
-    (bits,) = struct.unpack("<Q", struct.pack("<d", abs(number)))
-    return "a numpy.float32" if bits > _MOST_DIGITS else "an integer"
+    bits = _bits(number)
+    if bits < _LEAST_NEGATIVE and _bits(abs(number)) > _MOST_DIGITS:
+        return "a numpy.float32"
+    # Digits are counted from 1 in Python 3.11, in eights in 3.12 with 2 for a negative integer.
+    return "an integer" if bits <= 2 or bits >= _LEAST_NEGATIVE or bits % 8 in (0, 2) else "a text"
+
+
+def _bits(number: float) -> int:
+    (bits,) = struct.unpack("<Q", struct.pack("<d", number))
+    return int(bits)
 
 
 def accumulates(expected: Any, series: list[Any]) -> bool:

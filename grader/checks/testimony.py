@@ -12,7 +12,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from grader.recording.model import Kind, Process, Recording
+from grader.recording.model import Kind, Process, Qos, Recording
+
+_RELIABILITIES = ("reliable", "best_effort")
+_DURABILITIES = ("volatile", "transient_local")
 
 
 @dataclass(frozen=True)
@@ -128,6 +131,24 @@ def queues(recording: Recording, kind: Kind, topic: str) -> tuple[DeclaredQueue,
     return tuple(found)
 
 
+def profiles(recording: Recording, kind: Kind, topic: str) -> tuple[tuple[str, Qos], ...]:
+    """Node and QoS of the endpoints that the processes declared on a topic.
+
+    Only reliability and durability are told; any other word than DDS's counts as unknown.
+    """
+    return tuple(
+        (
+            _text(item.data, "node") or "unknown",
+            Qos(
+                reliability=_one_of(item.data, "reliability", _RELIABILITIES),
+                durability=_one_of(item.data, "durability", _DURABILITIES),
+            ),
+        )
+        for item in recording.declared(kind.value)
+        if _text(item.data, "topic") == topic
+    )
+
+
 def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
     """Whether a declaration of a kind holds a text, such as a ``publisher`` on a ``topic``."""
     return any(_text(item.data, key) == value for item in recording.declared(kind))
@@ -156,3 +177,8 @@ def _number(data: Mapping[str, Any], key: str) -> float | None:
 def _text(data: Mapping[str, Any], key: str) -> str | None:
     value = data.get(key)
     return value if isinstance(value, str) else None
+
+
+def _one_of(data: Mapping[str, Any], key: str, words: tuple[str, ...]) -> str:
+    value = _text(data, key)
+    return value if value in words else "unknown"

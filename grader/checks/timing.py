@@ -20,7 +20,7 @@ from grader.checks.period import (
     intervals,
     judge,
 )
-from grader.checks.rhythm import explain
+from grader.checks.rhythm import explain, is_declared
 from grader.checks.silence import why_few
 from grader.checks.stamps import why_not_believed
 from grader.checks.tolerance import TimeTolerance, Tolerance
@@ -113,7 +113,8 @@ def period(recording: Recording, parameters: Period) -> Finding:
             _figures(measured, verdict),
             _evidence(recording, parameters, measured, verdict),
         )
-    if judge(forgiven(recording, measured, limits), limits).good:
+    forgivable = not is_declared(recording, verdict, limits)
+    if forgivable and judge(forgiven(recording, measured, limits), limits).good:
         taken_s = recording.taken_s(measured[0].begin_ns, measured[-1].end_ns)
         return Finding.error(
             expected,

@@ -19,6 +19,7 @@ from grader.run.leave import Leave
 from grader.run.order import CellOrder, Command
 from grader.run.output import OutputReader
 from grader.run.probe import Probe
+from grader.run.shortage import Shortage
 from grader.run.stimuli.player import Player
 from grader.run.stimuli.stage import Stage
 from grader.run.stopwatch import Stopwatch
@@ -106,6 +107,7 @@ class Cell:
         if self._watchdog is not None:
             self._watchdog.start()
         clock = WallClock()
+        shortage = Shortage()
         launched_ns = time.time_ns()
         try:
             ending = self._observe()
@@ -123,9 +125,9 @@ class Cell:
         written = self._output.close(_PIPES_LIMIT_S)
         log = sorted((*written, *self._probe.rosout.lines), key=lambda line: line.time_ns)
         disturbance = self._meter.stop()
-        was_set = clock.fault
-        if was_set is not None:
-            self._faults.append(was_set)
+        processes = self._students.records()
+        found = (clock.fault, shortage.fault(processes, breaches))
+        self._faults += [fault for fault in found if fault is not None]
         others = ", ".join(map(str, self._other_domains))
         return Recording(
             scenario=self._order.scenario,
@@ -138,7 +140,7 @@ class Cell:
             submission=SubmissionRecord(id="", sha256=""),
             nodes=self._graph.nodes,
             endpoints=self._graph.endpoints,
-            processes=self._students.records(),
+            processes=processes,
             log=tuple(log),
             declarations=self._output.declarations,
             calls=_by_time((*self._probe.calls, *self._stage.asker.calls)),

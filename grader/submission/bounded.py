@@ -232,10 +232,10 @@ class _Lines:
         if self._on_line is None:
             return
         *complete, self._rest = (self._rest + block).split(b"\n")
-        # An endless line must not be kept.
+        # An endless line must not be kept; who speaks last is heard.
         self._rest = self._rest[-_LONGEST_LINE:]
         for line in complete:
-            self._on_line(line[:_LONGEST_LINE].decode("utf-8", "replace"))
+            self._on_line(line[-_LONGEST_LINE:].decode("utf-8", "replace"))
 
 
 def _close(stream: IO[bytes] | None) -> None:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.errors import GraderFault
+from grader.oom import oom_kills
 from grader.ros import RosInstallation
 from grader.submission import apart, buildlog
 from grader.submission.bounded import Outcome
@@ -38,8 +39,10 @@ if TYPE_CHECKING:
 
 _UNSAID = "colcon could not build this package; the log says why"
 _WHOLE_LOG = 60_000
+_SUMMARY = re.compile(r"Summary: \d+ packages? finished")
 _SIGNALLED = 128
-_VMSTAT = Path("/proc/vmstat")
+# What colcon, Python, compilers and make say of a program of theirs that was killed.
+_KILLED = re.compile(r"code -9\b|\bSIGKILL\b|\bKilled\b")
 _LEAST_FREE_BYTES = 64 * MIB
 # What makes the sandbox, each with its own complaint; colcon is only started by the last.
 _NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|prlimit): .*")
@@ -169,11 +172,13 @@ class _Workshop:
         # It is there before anything of the student's runs, who could else put a link in its place.
         install.mkdir(exist_ok=True)
         colcon = self.colcon(scratch, install)
-        oom_kills = _oom_kills()
+        kills = oom_kills()
         check_python = colcon.sandbox.watched() if colcon.sandbox else None
         outcome = colcon.build(finished)
         killed = None
-        if colcon.sandbox is not None and oom_kills is not None and oom_kills == _oom_kills():
+        if kills != oom_kills():
+            _check_memory(outcome)
+        elif colcon.sandbox is not None and kills is not None:
             killed = _killed_from_within(outcome)
         if killed is None:
             self._check_machine(outcome, scratch, install)
@@ -267,13 +272,10 @@ def _terms(limits: BuildLimits, sandbox: Sandbox | None) -> list[str]:
     return terms
 
 
-def _oom_kills() -> int | None:
-    """How many processes the kernel has ended for want of memory; None where it does not tell."""
-    try:
-        found = re.search(r"^oom_kill (\d+)$", _VMSTAT.read_text(), re.MULTILINE)
-    except OSError:
-        return None
-    return int(found[1]) if found else None
+def _check_memory(outcome: Outcome) -> None:
+    """Raise that a program of a build may be what the kernel ended for want of memory."""
+    if not outcome.ended_by_us and outcome.status != 0 and _KILLED.search(outcome.output):
+        raise GraderFault("this machine ran out of memory: a program of the build was killed")
 
 
 def _killed_from_within(outcome: Outcome) -> str | None:
@@ -284,14 +286,18 @@ def _killed_from_within(outcome: Outcome) -> str | None:
     status = outcome.status
     # As a shell tells of a signal, and bubblewrap does.
     number = status - _SIGNALLED if status is not None and status > _SIGNALLED else None
-    if number not in [int(one) for one in signal.Signals]:
+    if number is None or number >= signal.NSIG:
         return None
-    name = signal.Signals(number).name
+    # Few of the real-time signals have a name.
+    name = next((one.name for one in signal.Signals if one == number), f"signal {number}")
     return f"colcon was ended by {name}, which only a program of the build can have sent"
 
 
 def _is_cut_off(output: str, packages: Collection[str]) -> bool:
     """Whether colcon started a package and never said how that ended, nor why it stopped."""
+    if _SUMMARY.search(output):
+        # It came to its end, so whatever it says nothing of was only named by a build file.
+        return False
     started = set(re.findall(r"^Starting >>> (\S+)", output, re.MULTILINE)) & set(packages)
     ended = set(re.findall(r"^(?:Finished|Failed|Aborted) +<<< (\S+)", output, re.MULTILINE))
     # Of a very long log only the beginning and the end are there.

@@ -15,6 +15,7 @@ _NOISE = re.compile(
 )
 # setup.py is run in the package's folder and names colcon's folders relative to it.
 _RELATIVE_SCRATCH = re.compile(r"(?:\.\./)+scratch/(?=build/)")
+_ENDED = re.compile(r"(?<!^)(?=(?:Finished|Failed  |Aborted ) <<< \S+ \[)", re.MULTILINE)
 _MISSING_CMAKE_PACKAGE = re.compile(
     r"Could not find a package configuration file provided by\s+\"([\w-]+)\""
 )
@@ -35,6 +36,14 @@ def clean(output: str, paths: Mapping[str, str]) -> str:
         text = text.replace(f"{folder}/", f"{name}/" if name else "")
         text = text.replace(folder, name or ".")
     return _NOISE.sub("", text)
+
+
+def own_lines(output: str) -> str:
+    """Begin a line wherever colcon says how a package ended.
+
+    It says so behind the last words of a build file, which may have no line end.
+    """
+    return _ENDED.sub("\n", output)
 
 
 def ending(log: str) -> str:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
+from grader.submission import buildlog
 from grader.submission.bounded import Outcome, run_bounded
 from grader.submission.build_limits import BuildLimits
 from grader.submission.installed import site_packages
@@ -75,6 +76,10 @@ class Colcon:
         """
         started: set[str] = set()
 
+        def on_output(text: str) -> None:
+            for line in buildlog.own_lines(text).split("\n"):
+                on_line(line)
+
         def on_line(line: str) -> None:
             self.on_output(line)
             match = _PROGRESS.match(line)
@@ -100,9 +105,9 @@ class Colcon:
             outcome = self._run(
                 command,
                 self.wall_s - sum(item.duration_s for item in outcomes),
-                on_line,
+                on_output,
             )
-            outcomes.append(outcome)
+            outcomes.append(replace(outcome, output=buildlog.own_lines(outcome.output)))
             # Where setup.py raises before anything is built, colcon's executor stops with the
             # exception, whatever --continue-on-error says; the others are still to be built.
             stopped = not outcome.ended_by_us and STOPPED in outcome.output

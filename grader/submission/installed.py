@@ -151,13 +151,21 @@ def normalised(distribution: str) -> str:
 
 
 def regular_files(folder: Path) -> Iterator[Path]:
-    """All regular files below a folder, without following links, sorted."""
+    """All regular files below a folder, without following links, sorted.
+
+    But for those of names that are no text: nobody could write them down, or ask ROS for them.
+    """
     for parent, folders, names in os.walk(folder):
-        folders[:] = sorted(name for name in folders if name != "__pycache__")
-        for name in sorted(names):
+        folders[:] = sorted(name for name in folders if name != "__pycache__" and _is_text(name))
+        for name in sorted(filter(_is_text, names)):
             path = Path(parent, name)
             if stat.S_ISREG(path.lstat().st_mode):
                 yield path
+
+
+def _is_text(name: str) -> bool:
+    """Whether a name as the file system gave it has no undecodable bytes, which are surrogates."""
+    return not any("\ud800" <= char <= "\udfff" for char in name)
 
 
 def match_files(python: Mapping[str, str], sources: Mapping[str, str]) -> dict[str, str]:

@@ -222,12 +222,19 @@ os.write(int(os.environ['ROSGRADE_TRACER_FD']), json.dumps(claim).encode() + b'\
 KILL_COLCON = """\
 import os, sys
 if 'install' in sys.argv:
-    os.kill(os.getppid(), 9)
+    os.kill(os.getppid(), {signal})
 """
 SPEAK_AS_COLCON = """\
 import sys
 if 'install' in sys.argv:
     print('Starting >>> ghost', 'Finished <<< bot_publisher', sep='\\n', flush=True)
+    sys.exit(1)
+"""
+# As if colcon had been cut off in the middle, which would be a fault of the machine.
+SPEAK_UNFINISHED = """\
+import sys
+if 'install' in sys.argv:
+    print('Starting >>> bot_publisher', 'and no line end', sep='\\n', end='', flush=True)
     sys.exit(1)
 """
 UNUSUAL = """\
@@ -433,12 +440,22 @@ ATTACKS = {
         lost=frozenset({"builds"}),
     ),
     "build_kills_colcon": Attack(
-        at_build=KILL_COLCON,
+        at_build=KILL_COLCON.format(signal=9),
         lost=frozenset({"builds"}),
         named=("colcon was ended by SIGKILL, which only a program of the build",),
     ),
+    "build_kills_colcon_in_real_time": Attack(
+        at_build=KILL_COLCON.format(signal=40),
+        lost=frozenset({"builds"}),
+        named=("colcon was ended by signal 40, which only a program of the build",),
+    ),
     "build_speaks_as_colcon": Attack(
         at_build=SPEAK_AS_COLCON,
+        lost=frozenset({"builds"}),
+        named=("setup.py: colcon could not build this package",),
+    ),
+    "build_speaks_without_a_line_end": Attack(
+        at_build=SPEAK_UNFINISHED,
         lost=frozenset({"builds"}),
         named=("setup.py: colcon could not build this package",),
     ),

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shutil
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -139,6 +141,29 @@ def judged(done: Done) -> tuple[str, str, str | None]:
     submission = done.result.submission
     assert submission.sha256 == done.entry.sha256
     return grade_json(done.result), submission.id, submission.problem
+
+
+@pytest.mark.parametrize("words", [b"", b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n"])
+def test_what_is_no_scheduler_is_not_waited_for(
+    words: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("grader.batch.crew._CONNECT_S", 1)
+    monkeypatch.setattr("grader.batch.crew._ANSWER_S", 2.0)
+    over = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            with server.accept()[0] as connection:
+                connection.sendall(words)
+                if not words:
+                    over.wait()
+
+        threading.Thread(target=answer, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        order = Order(ASSIGNMENT, "", None, Choice.NONE)
+        with pytest.raises(UsageError, match=rf"no Dask scheduler answers at {address}: "):
+            DaskCrew(address, order)
+        over.set()
 
 
 def test_no_scheduler_is_said() -> None:

@@ -274,6 +274,11 @@ class TestAnyRhythmIsRight:
             found = failing("log.follows", seldom, **asked)
             assert f"from {since} s after launch on" in found
             assert "Log in every call" in found
+        waiting = (call(1.1, 1.9, BOT), call(1.6, 1.4, BOT), call(2.1, 0.9, BOT))
+        asleep = run(lines("1.37 -0.62", [1.0, 3.0]), messages=messages, calls=waiting)
+        found = failing("log.follows", asleep, **asked)
+        assert "calls to the node's parameter service waited 1.4 s and more" in found
+        assert "A callback must return soon" in found and "Log in every call" not in found
         machine = run(
             lines("1.37 -0.62", [1.0, 3.0]), messages=messages,
             disturbance=taken(1.0, 3.0, waited_s=0.8),

@@ -1,6 +1,7 @@
 """messages.count and messages.equal, and why a topic is silent."""
 
 import math
+import struct
 from dataclasses import replace
 
 import pytest
@@ -35,6 +36,7 @@ from tests.checks.builder import (
 )
 
 UNREADABLE = "1 message on `/cmd_vel` cannot be read: what was published are other bytes"
+(NAN_OF_MINUS_ONE,) = struct.unpack("<d", b"\xff" * 8)
 VALUE = {"linear": {"x": 1.0}, "angular": {"z": 0.5}}
 
 
@@ -321,6 +323,11 @@ class TestEqual:
             (twist((5e-324, 0, 0)), "linear.x is a float field, but an integer was put into it"),
             (twist((4e-323, 0, 0)), "linear.x is a float field, but an integer was put into it"),
             (twist((5.12e-315, 0, 0)), "but a numpy.float32 was put into it"),
+            # Of -1 in Python 3.11 and in 3.12, and of '1.0' in both.
+            (twist((-math.nan, 0, 0)), "linear.x is not a number"),
+            (twist((NAN_OF_MINUS_ONE, 0, 0)), "but an integer was put into it"),
+            (twist((5e-323, 0, 0)), "but an integer was put into it"),
+            (twist((1.5e-323, 0, 0)), "but a text was put into it"),
             (twist((math.inf, 0, 0)), "linear.x is infinite"),
             (twist((0, 0, 0), (0, 0, 0)), "published before its fields were set"),
         ],

@@ -504,6 +504,17 @@ class TestAlive:
             ),
             ("TypeError: 'NoneType' object is not callable", "executors.py", "without brackets"),
             (
+                "AttributeError: 'float' object has no attribute 'x'",
+                "publisher.py",
+                "msg.field.x = 1.0 instead of msg.field = 1.0",
+            ),
+            ("TypeError: 'property' object is not iterable", "executors.py", "node = MyNode()"),
+            (
+                "TypeError: 'NoneType' object does not support the context manager protocol",
+                "guard_condition.py",
+                "rclpy.shutdown() only after rclpy.spin() has returned",
+            ),
+            (
                 "ValueError: generator already executing",
                 "executors.py",
                 "Do not spin in a callback",
@@ -520,12 +531,22 @@ class TestAlive:
         [
             "TypeError: float() argument must be a string or a real number, not 'list'",
             "TypeError: 'NoneType' object is not callable",
+            "AttributeError: 'float' object has no attribute 'x'",
+            "TypeError: 'property' object is not iterable",
         ],
     )
     def test_the_same_of_its_own(self, raised):
         log = output(traceback(raised).replace(_IN_RCLPY, ""))
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
         assert "Mend the line that is named here." in failing("node.alive", run)
+
+    def test_an_entry_point_that_asks_for_arguments(self):
+        raised = "TypeError: main() missing 1 required positional argument: 'args'"
+        at_entry, _ = traceback(raised).split('  File "/w/install/lib/python', 1)
+        run = recording(processes=(died(1),), ending=Ending.EXITED, log=output(at_entry + raised))
+        assert "`ros2 run` calls `main()` without arguments: write `def main(args=None):`" in (
+            failing("node.alive", run)
+        )
 
     def test_a_wrong_call_of_its_own_is_no_callback(self):
         raised = "TypeError: Bot.tick() takes 1 positional argument but 2 were given"

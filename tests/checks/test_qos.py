@@ -134,6 +134,18 @@ class TestOffered:
         assert finding.status is Status.ERROR
         assert "reliability of the publisher was not discovered" in finding.observed
 
+    def test_a_publisher_too_short_lived_for_the_graph_counts_as_it_was_declared(self):
+        run = recording(endpoints=(reader(),))
+        asked = {"topic": "/cmd_vel", "reliability": "reliable"}
+        good = judge("qos.offered", run, **asked, durability="volatile")
+        assert good.status is Status.PASSED
+        assert good.observed == "offered by 1 publisher, declared by the process"
+        found = failing("qos.offered", run, topic="/cmd_vel", reliability="best_effort")
+        assert "reliability reliable instead of best_effort, declared by the process" in found
+        assert judge("qos.offered", run, **asked, deadline="1 s").status is Status.ERROR
+        silent = replace(run, declarations=())
+        assert judge("qos.offered", silent, **asked).status is Status.ERROR
+
     def test_no_publisher(self):
         run = recording(messages={}, endpoints=(endpoint("/cmdvel"), reader()))
         found = failing("qos.offered", run, topic="/cmd_vel", reliability="reliable")

@@ -215,6 +215,31 @@ class TestDisturbance:
         )
         assert period(run).status is Status.FAILED
 
+    @pytest.mark.parametrize(
+        ("timers_s", "status"),
+        [
+            ([0.316], Status.FAILED),
+            ([0.3], Status.ERROR),
+            ([0.316, 0.3], Status.ERROR),
+            ([1.0], Status.ERROR),
+            ([], Status.ERROR),
+        ],
+    )
+    def test_disturbance_explains_no_period_that_the_process_declared(self, timers_s, status):
+        timers = [
+            item
+            for period_s in timers_s
+            for item in declarations(timer_s=period_s)
+            if item.kind == "timer"
+        ]
+        run = recording(
+            messages=messages(every(0.316, 11)),
+            stop_s=4.5,
+            declarations=(*declarations(timer_s=None), *timers),
+            disturbance=taken(1.0, 4.4, waited_s=0.1),
+        )
+        assert period(run).status is status
+
     def test_too_few_messages_on_a_busy_machine(self):
         run = recording(messages=messages(every(0.3, 4)), disturbance=taken(1.5, 4.4, waited_s=2.9))
         finding = period(run)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
+from statistics import median
 
 import pytest
 from mcap_ros2.writer import Writer
@@ -70,6 +72,21 @@ class TwoEars(Node):
 
 rclpy.init()
 rclpy.spin(TwoEars())
+"""
+
+TICKING = """\
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+class Ticking(Node):
+    def __init__(self):
+        super().__init__("ticking")
+        self.publisher = self.create_publisher(String, "/echo", 10)
+        self.create_timer(0.3, lambda: self.publisher.publish(String()))
+
+rclpy.init()
+rclpy.spin(Ticking())
 """
 
 
@@ -214,3 +231,12 @@ def test_without_a_subscription_nothing_is_published_and_the_run_ends(run_node: 
     assert recording.sent == {"/chatter": ()}
     (wait,) = [wait for wait in recording.waits if wait.what == "a subscription on /chatter"]
     assert wait.met_ns is None
+
+
+def test_calls_keep_their_own_rhythm_beside_that_of_the_messages(run_node: RunNode) -> None:
+    stimulus = {"call": "list_parameters", "every": "230 ms"}
+    recording = run_node(TICKING, **echoing(stimuli=[stimulus], until={"messages": 11}))
+    asked = [call.requested_ns for call in recording.calls]
+    gaps_s = [(other - one) / 1e9 for one, other in pairwise(asked)]
+    # Whoever waits for the next message calls every 300 ms, unless the machine holds him up too.
+    assert 0.22 < median(gaps_s) < 0.29 + recording.taken_s(asked[0], asked[-1])

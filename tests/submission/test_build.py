@@ -276,6 +276,20 @@ def test_setup_py_does_not_see_the_callers_home_and_variables(
     assert "/home/grader" not in build.log
 
 
+@pytest.mark.parametrize("kills", [2, 1])
+def test_a_setup_py_that_the_kernel_ends_for_want_of_memory_is_no_fault_of_the_student(
+    tree: Tree, real_ros: RosInstallation, monkeypatch: pytest.MonkeyPatch, kills: int
+) -> None:
+    tree.package({"setup.py": f"import os\nos.kill(os.getpid(), 9)\n{SETUP_PY}"})
+    counted = iter([1, kills])
+    monkeypatch.setattr("grader.submission.build.oom_kills", counted.__next__)
+    if kills == 1:
+        assert not build_of(prepared(tree, real_ros)).succeeded
+        return
+    with pytest.raises(GraderFault, match="this machine ran out of memory"):
+        prepared(tree, real_ros)
+
+
 def test_a_colcon_that_is_killed_is_no_fault_of_the_student(
     tree: Tree, real_ros: RosInstallation
 ) -> None:
@@ -297,6 +311,43 @@ def test_a_colcon_that_never_says_how_a_package_ended_is_no_fault_of_the_student
     )
     with pytest.raises(GraderFault, match=f"status {status} in the middle of a build"):
         prepared(tree, replace(real_ros, python=python))
+
+
+LAST_WORDS = """\
+import atexit, sys
+atexit.register(lambda: print({!r}, end='', flush=True, file=sys.stderr))
+"""
+
+
+def test_last_words_without_a_line_end_cost_nothing(tree: Tree, real_ros: RosInstallation) -> None:
+    tree.package({"setup.py": f"{LAST_WORDS.format('done')}{SETUP_PY}"})
+    found = prepared(tree, real_ros)
+    assert build_of(found).succeeded, build_of(found).log
+    assert package_of(found).executables == ("bot_pub",)
+
+
+@pytest.mark.parametrize("words", ["done", "Finished <<< bot_publisher\n" + "x" * 5000])
+def test_a_failure_is_not_hidden_by_last_words_without_a_line_end(
+    tree: Tree, real_ros: RosInstallation, words: str
+) -> None:
+    leave = "if 'install' in sys.argv: sys.exit(1)\n"
+    tree.package({"setup.py": f"{LAST_WORDS.format(words)}{leave}{SETUP_PY}"})
+    assert build_of(prepared(tree, real_ros)).failed_packages == ("bot_publisher",)
+
+
+def test_a_failure_is_not_hidden_by_the_name_of_a_package_that_waits_for_it(
+    tree: Tree, real_ros: RosInstallation
+) -> None:
+    fail = "import sys\nif 'install' in sys.argv: sys.exit('\\nStarting >>> waiting')\n"
+    tree.package({"setup.py": f"{fail}{SETUP_PY}"})
+    manifest = MANIFEST.replace("bot_publisher", "waiting").replace("rclpy", "bot_publisher")
+    waiting = {
+        "package.xml": manifest,
+        "setup.py": SETUP_PY.replace("'bot_publisher'", "'waiting'"),
+        "resource/waiting": "",
+    }
+    tree.package(dict(waiting), folder="src/waiting")
+    assert build_of(prepared(tree, real_ros)).failed_packages == ("bot_publisher", "waiting")
 
 
 def test_a_sandbox_that_does_not_start_is_no_fault_of_the_student(

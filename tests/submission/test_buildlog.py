@@ -1,4 +1,4 @@
-from grader.submission.buildlog import MAX_BYTES, clean, ending, missing_cmake_packages
+from grader.submission.buildlog import MAX_BYTES, clean, ending, missing_cmake_packages, own_lines
 
 
 def test_colours_and_control_characters_are_gone() -> None:
@@ -31,6 +31,14 @@ def test_of_a_long_log_the_end_is_kept_in_whole_lines() -> None:
     assert kept.startswith("line ")
     assert log.endswith(kept)
     assert ending("short\n") == "short\n"
+
+
+def test_what_colcon_says_begins_a_line_of_its_own() -> None:
+    log = "Starting >>> a\ndoneFinished <<< a [0.1s]\nFailed   <<< Failed   <<< b [0.2s, exited\n"
+    assert own_lines(log) == (
+        "Starting >>> a\ndone\nFinished <<< a [0.1s]\nFailed   <<< \nFailed   <<< b [0.2s, exited\n"
+    )
+    assert own_lines(own_lines(log)) == own_lines(log)
 
 
 def test_packages_that_cmake_did_not_find_are_listed() -> None:

@@ -41,6 +41,16 @@ def install(tree: Tree) -> Path:
     return root
 
 
+def test_names_that_are_no_text_are_left_out(tree: Tree) -> None:
+    root = install(tree)
+    expected = inspect(root, ["bot_publisher"], {})
+    odd = os.fsdecode(b"\xff.py")
+    for folder in ("bin", "lib/bot_publisher", SITE, f"{SITE}/{odd}.d", "share/bot_publisher/msg"):
+        (root / folder).mkdir(parents=True, exist_ok=True)
+        (root / folder / odd).touch(0o755)
+    assert inspect(root, ["bot_publisher"], {}) == expected
+
+
 def test_what_ros2_run_and_python_find_is_told(tree: Tree) -> None:
     sources = {"src/bot/bot_publisher/node.py": hash_of(b"x = 1\n")}
     found = inspect(install(tree), ["bot_publisher", "other"], sources)

@@ -21,13 +21,24 @@ class ListingParameters(Playing):
         self._every_s = order.every_s
         self._stage = stage
         self._next = 0.0
+        self._due_s: float | None = None
+
+    @property
+    def due_s(self) -> float | None:
+        """When to call next; whoever waits for a message instead asks in the student's rhythm."""
+        return self._due_s
 
     def tick(self, elapsed_s: float | None) -> None:
         """Call when it is due; also before the first match, since a node may be blocked."""
         now = time.monotonic()
-        if now < self._next or not self._stage.is_set_up:
-            return
-        self._next = now + self._every_s
+        if now >= self._next and self._stage.is_set_up:
+            self._next = now + self._every_s
+            self._call()
+        self._due_s = None
+        if elapsed_s is not None and self._next > now:
+            self._due_s = elapsed_s + self._next - now
+
+    def _call(self) -> None:
         for node in self._stage.graph.nodes:
             if node.owner is Owner.STUDENT and node.vanished_ns is None:
                 self._stage.probe.call_executor(node.name, self._name(node.name))
