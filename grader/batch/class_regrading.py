@@ -9,7 +9,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.batch.batch import Done
 from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
-from grader.batch.regrading import compare, find, regrade
+from grader.batch.regrading import compare, find, refuse_other, regrade
 from grader.errors import RosgradeError
 from grader.report.facts import Clock
 from grader.report.result_model import Result
@@ -58,8 +58,12 @@ def regrade_class(loaded: LoadedAssignment, ledger: Ledger) -> Iterator[Regraded
 
     Yields:
         Every row.
+
+    Raises:
+        UsageError: The grades are of another assignment.
     """
-    _, entries = ledger.read()
+    name, entries = ledger.read()
+    refuse_other(ledger.out, name, loaded)
     for entry in entries:
         before = ledger.result(entry.key)
         if entry.fault:

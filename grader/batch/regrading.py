@@ -88,6 +88,21 @@ def find(path: Path) -> Found:
     return Found(report, recordings, files, submission, result)
 
 
+def refuse_other(folder: Path, name: str, loaded: LoadedAssignment) -> None:
+    """Let nobody lose all points because a recording is judged as of another assignment.
+
+    Args:
+        folder: With results.
+        name: Id of the assignment that they are of.
+        loaded: To judge with.
+
+    Raises:
+        UsageError: It is another one.
+    """
+    if name != loaded.assignment.id:
+        raise UsageError(f"{folder}: holds the grades of {name}, not of {loaded.assignment.id}")
+
+
 def regrade(loaded: LoadedAssignment, found: Found) -> Graded:
     """Judge what was recorded with an assignment as it is now.
 

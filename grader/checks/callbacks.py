@@ -362,4 +362,7 @@ def _work_hint(found_s: float, wanted_s: float) -> str:
             "Report the start, then work with time.sleep, then report the end. A start and an end "
             "that are published one right after the other show no work."
         )
-    return f"Work with time.sleep({wanted_s:g}) between the two reports. {SECONDS_HINT}"
+    hint = f"Work with time.sleep({wanted_s:g}) between the two reports. {SECONDS_HINT}"
+    if 1.5 * wanted_s < found_s < 10.0 * wanted_s:
+        hint += " If you do: something else waits between them, such as for a lock."
+    return hint

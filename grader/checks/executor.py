@@ -28,6 +28,8 @@ _FORGIVING_FROM = 3
 _MOST_MOMENTS = 5
 _LONG_NS = NS
 """In this time the graph tells which services a node has, several times over."""
+_MOST_HELD_NS = 3 * NS
+"""Longer than the tracer holds a publisher; a process could declare any time."""
 
 
 class Responsive(Parameters):
@@ -141,13 +143,23 @@ def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answer
 
 
 def _working_from(recording: Recording, node: str) -> int:
-    """When a node began to publish, or when it appeared if it publishes nothing."""
+    """When a node began to publish, or when it was left to itself if it publishes nothing."""
     topics = {
         item.topic for item in recording.student_endpoints(Kind.PUBLISHER) if item.node == node
     }
     stamps = [recording.on(topic)[0].received_ns for topic in topics if recording.on(topic)]
+    if stamps:
+        return min(stamps)
     appeared = [item.appeared_ns for item in recording.student_nodes if item.name == node]
-    return min(stamps or appeared or [recording.launched_ns])
+    begin_ns = min(appeared or [recording.launched_ns])
+    # Its first publisher was held by us until it had matched, in vain if its type is another one.
+    process = testimony.process_of(recording, node)
+    held = [
+        item.time_ns
+        for item in recording.declared("held")
+        if process is not None and item.process == process.name
+    ]
+    return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
 
 
 def _excused(recording: Recording, group: _Answers, parameters: Responsive) -> bool:

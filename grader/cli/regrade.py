@@ -44,13 +44,15 @@ def regrade(
 def _one(path: Path, assignment: str | None) -> None:
     from grader.assignment.load import load_assignment
     from grader.batch.files import write_graded
-    from grader.batch.regrading import compare, find
+    from grader.batch.regrading import compare, find, refuse_other
     from grader.batch.regrading import regrade as judge_again
     from grader.report.facts import Clock
     from grader.report.terminal import print_grade
 
     found = find(path)
     loaded = load_assignment(assignment or found.assignment)
+    if found.result is not None:
+        refuse_other(found.folder, found.result.assignment.id, loaded)
     clock = Clock()
     graded = judge_again(loaded, found)
     console = output_console()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 _PR_SET_CHILD_SUBREAPER = 36
 _PROC = Path("/proc")
+_LONGEST_COMMAND = 1000
 
 
 def become_subreaper() -> None:
@@ -86,9 +87,10 @@ def _living_parent(pid: str) -> int | None:
 
 
 def command_line(pid: int) -> str:
-    """Command line of a process, for people."""
+    """Command line of a process, for people: of a very long one the beginning."""
     try:
-        line = (_PROC / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").strip()
+        with (_PROC / str(pid) / "cmdline").open("rb") as file:
+            line = file.read(_LONGEST_COMMAND).replace(b"\0", b" ").strip()
         return (line or (_PROC / str(pid) / "comm").read_bytes().strip()).decode(errors="replace")
     except OSError:
         return f"process {pid}"

@@ -404,6 +404,22 @@ def test_what_cannot_be_read_again_keeps_its_grade_and_is_told(
     assert ledger.read()[1][0].problem == ""
 
 
+def test_a_class_is_not_judged_again_as_of_another_assignment(
+    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    first, _ = grade(recording())
+    with Ledger(tmp_path / "out").opened() as ledger:
+        partial = ledger.partial("ada")
+        (tmp_path / "recordings").rename(partial / "recordings")
+        write_graded(first, partial, Clock())
+        ledger.put("ada", partial)
+        ledger.write([Entry("ada")], "other", lesson.sha256)
+        with pytest.raises(UsageError, match="out: holds the grades of other, not of lesson"):
+            list(regrade_class(lesson, ledger))
+        assert ledger.result("ada") is not None
+        assert not (ledger.folder("ada") / "earlier").exists()
+
+
 def test_a_folder_without_recordings_is_a_wrong_use(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there are no recordings in it"):
         find(tmp_path)

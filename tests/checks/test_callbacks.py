@@ -319,6 +319,12 @@ class TestWork:
         words = failed("work", run(*serial()), ["timer_1"], duration="200 ms")
         assert "works 400 ms" in words
         assert "time.sleep(0.2)" in words
+        assert "such as for a lock" in words
+
+    def test_a_little_too_long_waits_for_nothing(self):
+        words = failed("work", run(*serial()), ["timer_1"], duration="300 ms")
+        assert "time.sleep(0.3)" in words
+        assert "lock" not in words
 
     def test_what_the_machine_took_is_our_fault(self):
         runs = [("timer_1", second, second + 0.6) for second in (1, 2, 3)]

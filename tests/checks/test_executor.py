@@ -10,6 +10,7 @@ from grader.recording.model import Ending
 from tests.checks.builder import (
     NODE,
     SOURCE,
+    at,
     call,
     calls,
     declarations,
@@ -96,6 +97,17 @@ class TestGood:
 class TestMostlyBusy:
     BUSY = tuple(call(0.6 + 0.5 * number, wait_s) for number, wait_s in
                  enumerate([0.25, 0.05, 0.15, 0.25, 0.05, 0.15]))  # fmt: skip
+
+    def test_a_publisher_that_was_held_in_vain_is_not_the_students_doing(self):
+        while_held = (call(0.9, 1.5), call(1.1, 1.3), call(1.3, 1.1))
+        silent_run = recording(messages={}, calls=(*while_held, *calls()))
+        assert responsive(silent_run).status is Status.FAILED
+        held = declared("held", 2.4, topic="/cmd_vel", waited_s=2.0, matched=False)
+        run = replace(silent_run, declarations=(*silent_run.declarations, held))
+        assert responsive(run).status is Status.PASSED
+        # Nobody is held for so long.
+        lying = replace(run, declarations=(*silent_run.declarations, replace(held, time_ns=at(4))))
+        assert responsive(lying).status is Status.FAILED
 
     def test_answers_in_time_that_are_mostly_late(self):
         run = recording(calls=self.BUSY)
