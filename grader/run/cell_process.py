@@ -79,10 +79,11 @@ class CellProcess:
                 kill_by_variable("HOME", str(self.folder / SCRATCH))
         if self._forked.returncode or not self._is_recorded():
             told = self._errors.read_text(encoding="utf-8", errors="replace")
-            raise GraderFault(
-                f"the cell of scenario {order.scenario!r} ended with status "
-                f"{self._forked.returncode}:\n{told[-_SHOWN_ERROR:].strip()}"
-            )
+            ended = f"the cell of scenario {order.scenario!r} ended with status "
+            ended += str(self._forked.returncode)
+            # Whoever is killed, perhaps because memory ran out, has no last words.
+            last_words = told[-_SHOWN_ERROR:].strip()
+            raise GraderFault(f"{ended}:\n{last_words}" if last_words else ended)
 
     def _is_recorded(self) -> bool:
         # Whoever takes over a cell must not make us read what it points to.

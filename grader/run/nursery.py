@@ -50,6 +50,8 @@ _TOLD = struct.Struct("=id")
 _FORK_LIMIT_S = 10.0
 _CLOSING_LIMIT_S = 20.0
 """More than a cell may take to end what it started."""
+_ORPHANED_LIMIT_S = 30.0
+"""More than whoever needs cells waits before it kills them itself."""
 _ALWAYS = (
     "grader.run.cell_main",
     "rcl_interfaces/msg/Log",
@@ -252,9 +254,15 @@ def _serve(requests: socket.socket) -> None:
     signal.set_wakeup_fd(ended_write, warn_on_full_buffer=False)
     signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
     sources = [requests.fileno(), ended_read]
-    # Without anybody to ask for more, the cells that run are still waited for.
+    # Without anybody to ask for more, the cells that run are still waited for, but not those
+    # that hang: whoever could kill them is gone.
+    limit_s: float | None = None
     while len(sources) > 1 or running:
-        readable, _, _ = select.select(sources, [], [])
+        readable, _, _ = select.select(sources, [], [], limit_s)
+        if not readable:
+            for pid in running:
+                kill_tree(pid)
+            limit_s = None
         if ended_read in readable:
             with contextlib.suppress(BlockingIOError):
                 os.read(ended_read, 4096)
@@ -268,6 +276,7 @@ def _serve(requests: socket.socket) -> None:
                 _fork(requests, request, descriptors, running)
             elif not text:
                 sources.remove(requests.fileno())
+                limit_s = _ORPHANED_LIMIT_S
 
 
 def _fork(
