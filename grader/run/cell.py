@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import time
+import traceback
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -153,13 +154,19 @@ class Cell:
         Args:
             breaches: What the student's processes were killed for.
         """
-        stop_ns = time.time_ns()
-        deadline_s = time.monotonic() + _END_LIMIT_S
-        while self._students.poll() and time.monotonic() < deadline_s:
-            time.sleep(_END_TICK_S)
-        self._students.clean_up()
-        self._keep(self._recording(Ending.EXITED, stop_ns, breaches))
-        os._exit(0)
+        status = 1
+        try:
+            stop_ns = time.time_ns()
+            deadline_s = time.monotonic() + _END_LIMIT_S
+            while self._students.poll() and time.monotonic() < deadline_s:
+                time.sleep(_END_TICK_S)
+            self._students.clean_up()
+            self._keep(self._recording(Ending.EXITED, stop_ns, breaches))
+            status = 0
+        except Exception:
+            traceback.print_exc()
+        finally:
+            os._exit(status)
 
     def _recording(self, ending: Ending, stop_ns: int, breaches: tuple[Breach, ...]) -> Recording:
         """What is known of the run; nothing of the student's runs any more."""
