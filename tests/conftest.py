@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 import pytest
 from hypothesis import settings
@@ -20,6 +21,14 @@ settings.load_profile("no_deadline")
 
 # What starts processes or waits runs in one worker, one after the other; the others take the rest.
 ALONE = ("ros", "slow")
+
+
+def pytest_configure() -> None:
+    """Let Ctrl-C reach what the tests start, also where they run as a job in the background.
+
+    A shell starts such jobs with it ignored, and every process that they start inherits that.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(tryfirst=True)

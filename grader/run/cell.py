@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 import select
 import time
-import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.recording.model import Breach, Call, Ending, Endpoint, Kind, Owner, Recording, Wait
+from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording, Wait
 from grader.run.descendants import Family
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.domain import joined_domains
@@ -21,7 +20,6 @@ from grader.run.order import CellOrder, Command
 from grader.run.output import OutputReader
 from grader.run.probe import Probe
 from grader.run.shortage import Shortage
-from grader.run.stall import Stall
 from grader.run.stimuli.player import Player
 from grader.run.stimuli.stage import Stage
 from grader.run.stopwatch import Stopwatch
@@ -42,9 +40,6 @@ _GRAPH_PERIOD_S = 0.1
 # Who comes and goes later than the first match matters to no wait.
 _SETTLED_GRAPH_PERIOD_S = 0.25
 _PIPES_LIMIT_S = 5.0
-_END_TICK_S = 0.01
-_END_LIMIT_S = 5.0
-"""More than those take that were killed."""
 
 
 class Abandoned(Exception):
@@ -55,24 +50,9 @@ class Cell:
     """Runs one scenario from launch to recording."""
 
     def __init__(
-        self,
-        order: CellOrder,
-        domain_id: int,
-        probe: Probe,
-        keep: Callable[[Recording], None],
-        wire: Wire | None = None,
+        self, order: CellOrder, domain_id: int, probe: Probe, wire: Wire | None = None
     ) -> None:
-        """Set the cell up; nothing of the student's runs yet.
-
-        Args:
-            order: What to run.
-            domain_id: Where.
-            probe: There already.
-            keep: Keeps the recording of a run that has to be given up.
-            wire: Of a sandbox's network.
-        """
-        self._keep = keep
-        self._stall = Stall()
+        """Set the cell up; nothing of the student's runs yet."""
         self._order = order
         self._domain_id = domain_id
         self._probe = probe
@@ -93,8 +73,6 @@ class Cell:
                 lambda: self._students.inits,
                 lambda: self._output.written_bytes,
                 Witnesses(self._students, self._output, self._graph, wire).deeds,
-                self._stall,
-                self._rescue,
             )
         self._meter = DisturbanceMeter(Family(os.getpid()).look)
         self._leave = Leave(self._output, self._graph, self._students)
@@ -117,9 +95,6 @@ class Cell:
         self._ending = EndingConditions(probe, self._output, self._robot, self._player)
         self._faults: list[str] = []
         self._next_graph = 0.0
-        self._clock = WallClock()
-        self._shortage = Shortage()
-        self._launched_ns = 0
         self._matched_ns: int | None = None
 
     def run(self) -> Recording:
@@ -128,10 +103,12 @@ class Cell:
         Raises:
             Abandoned: Nobody waits for the recording any more.
         """
-        self._launched_ns = time.time_ns()
         self._meter.start()
         if self._watchdog is not None:
             self._watchdog.start()
+        clock = WallClock()
+        shortage = Shortage()
+        launched_ns = time.time_ns()
         try:
             ending = self._observe()
             self._probe.recording = False
@@ -139,49 +116,24 @@ class Cell:
             self._player.finish()
             if self._robot is not None:
                 self._robot.stop()
-            self._stall.end()
             tell("stopping")
             self._students.stop(self._order.limits, self._meter)
         finally:
             self._students.clean_up()
             self._faults += self._students.faults()
             breaches = self._watchdog.stop() if self._watchdog is not None else ()
-        return self._recording(ending, stop_ns, breaches)
-
-    def _rescue(self, breaches: tuple[Breach, ...]) -> None:
-        """End the run without the thread that runs it, which may wait for ever.
-
-        Args:
-            breaches: What the student's processes were killed for.
-        """
-        status = 1
-        try:
-            stop_ns = time.time_ns()
-            deadline_s = time.monotonic() + _END_LIMIT_S
-            while self._students.poll() and time.monotonic() < deadline_s:
-                time.sleep(_END_TICK_S)
-            self._students.clean_up()
-            self._keep(self._recording(Ending.EXITED, stop_ns, breaches))
-            status = 0
-        except Exception:
-            traceback.print_exc()
-        finally:
-            os._exit(status)
-
-    def _recording(self, ending: Ending, stop_ns: int, breaches: tuple[Breach, ...]) -> Recording:
-        """What is known of the run; nothing of the student's runs any more."""
         written = self._output.close(_PIPES_LIMIT_S)
         log = sorted((*written, *self._probe.rosout.lines), key=lambda line: line.time_ns)
         disturbance = self._meter.stop()
         processes = self._students.records()
-        found = (self._clock.fault, self._shortage.fault(processes, breaches))
+        found = (clock.fault, shortage.fault(processes, breaches))
         self._faults += [fault for fault in found if fault is not None]
         others = ", ".join(map(str, self._other_domains))
         return Recording(
             scenario=self._order.scenario,
             seed=self._order.seed,
             ending=ending,
-            launched_ns=self._launched_ns,
+            launched_ns=launched_ns,
             matched_ns=self._matched_ns,
             stop_ns=stop_ns,
             end_ns=time.time_ns(),
@@ -382,7 +334,6 @@ class Cell:
                 _raise_if_abandoned()
             self._leave.give()
             self._player.tick()
-            self._stall.tick()
 
     def _find_foreign(self) -> None:
         names = sorted({n.name for n in self._graph.nodes if n.owner is Owner.FOREIGN})

@@ -82,16 +82,13 @@ def main(folder: Path, avoid_domains: tuple[int, ...], rights: Rights | None = N
             rights.mounter.mount(bounds.disk_bytes, bounds.files, bounds.shared_bytes)
         wire = rights.wire if rights is not None else None
         probe.listen(order.topics, order.limits)
-
-        def keep(recording: Recording) -> None:
-            _keep(recording, probe, order, folder)
-
         try:
-            keep(Cell(order, domain.domain_id, probe, keep, wire).run())
+            recording = Cell(order, domain.domain_id, probe, wire).run()
         except Abandoned:
             return 1
         finally:
             kill_descendants(os.getpid())
+        _keep(recording, probe, order, folder)
         # In a sandbox nothing of it is left, and it may wait for ever for what it was sent.
         if rights is None:
             probe.close()

@@ -16,6 +16,7 @@ from grader.errors import GraderFault
 from grader.run.descendants import kill_by_variable
 from grader.run.nursery import Nursery
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
+from grader.run.stall import ENDED_BY, Stalled
 
 _ENDING_LIMIT_S = 10.0
 # Beyond every bounded wait of a cell, even stretched by a busy host: something of ours hangs.
@@ -60,6 +61,7 @@ class CellProcess:
             Events of its progress.
 
         Raises:
+            Stalled: The student's processes kept its middleware busy.
             GraderFault: The cell failed, through no fault of the student's.
         """
         (self.folder / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
@@ -77,6 +79,8 @@ class CellProcess:
             if self._forked.returncode:
                 # Killed, perhaps by the student's process: nobody has cleaned up.
                 kill_by_variable("HOME", str(self.folder / SCRATCH))
+        if self._forked.returncode == -ENDED_BY:
+            raise Stalled
         if self._forked.returncode or not self._is_recorded():
             told = self._errors.read_text(encoding="utf-8", errors="replace")
             ended = f"the cell of scenario {order.scenario!r} ended with status "

@@ -7,6 +7,7 @@ import json
 import shutil
 import sys
 import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.recording.fact import to_json
+from grader.recording.mcap_writer import write_recording
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
 from grader.run.cell_process import SCRATCH, CellProcess
@@ -22,6 +24,7 @@ from grader.run.environment import RMW, student_environment
 from grader.run.load import cpu_count
 from grader.run.nursery import SIMULATOR_MODULE, Nursery
 from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
+from grader.run.stall import Stalled, stalled_recording
 from grader.run.stimuli.ordering import stimulus_orders
 from grader.sandbox.python_tree import unlisted
 from grader.submission.record import SubmissionRecord
@@ -244,12 +247,18 @@ class Runner:
                     seed,
                     worlds,
                 )
-                for event in cell.run(order):
-                    if event["event"] in _STARTED_EVENTS:
-                        ticket.started()
-                    self.progress(scenario.id, event)
                 recording.parent.mkdir(parents=True, exist_ok=True)
-                shutil.move(cell.recording, recording)
+                launched_ns = time.time_ns()
+                try:
+                    for event in cell.run(order):
+                        if event["event"] in _STARTED_EVENTS:
+                            ticket.started()
+                        self.progress(scenario.id, event)
+                except Stalled:
+                    stalled = stalled_recording(order, submission, launched_ns)
+                    write_recording(recording, stalled, (), {})
+                else:
+                    shutil.move(cell.recording, recording)
             finally:
                 self._give_back(cell)
 

@@ -1,67 +1,113 @@
-"""Whether the cell waits for its middleware, which is busy with what the student's processes send.
+"""Whether a cell waits for its middleware, which is busy with what the student's processes send.
 
 A single packet can keep the thread that receives it busy for hours: a heartbeat of RTPS that
-announces 2^40 samples. Meanwhile it holds a lock that every call of rclpy waits for.
+announces 2^40 samples. Meanwhile it holds a lock that calls of rclpy wait for, some of them
+without letting any other thread of Python run. So it can only be seen, and ended, from outside.
 """
 
 from __future__ import annotations
 
 import os
-import threading
+import signal
 import time
+from pathlib import Path
 
-_TASKS = "/proc/self/task"
+from grader.errors import GraderFault
+from grader.recording.model import Breach, Ending, Process, Recording
+from grader.run.order import CellOrder
+from grader.submission.record import SubmissionRecord
+
+ENDED_BY = signal.SIGALRM
+"""What a cell is ended with that stalls. Nobody else sends it, unlike SIGKILL."""
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
-# As Fast DDS calls its threads that receive.
-_RECEIVING = b"(dds.udp."
-_STILL_S = 1.0
+# As the names of Fast DDS' threads begin.
+_MIDDLEWARE = b"(dds."
 _BUSY_S = 5.0
 """CPU time that no run of good manners takes at a stretch."""
 
 
+class Stalled(GraderFault):
+    """The student's processes keep the cell's middleware busy, and it was ended for it."""
+
+
 class Stall:
-    """Told by the thread that runs the cell that it goes on, and asked by another one."""
+    """Looks at one cell, again and again."""
 
-    def __init__(self) -> None:
-        """It goes on."""
-        self._ticked_s = time.monotonic()
-        self._before_s: float | None = None
-        self._decided = threading.Lock()
-        self._over = False
+    def __init__(self, task: Path) -> None:
+        """Only prepare.
 
-    def tick(self) -> None:
-        """Tell that it goes on."""
-        self._ticked_s = time.monotonic()
-
-    def end(self) -> None:
-        """Tell that nothing is asked of the middleware any more.
-
-        Does not return where that comes too late, and the process is being ended.
+        Args:
+            task: Its folder in ``/proc``.
         """
-        self._decided.acquire()
+        self._task = task
+        self._waiting: tuple[bytes, ...] = ()
+        self._before_s = 0.0
 
-    def lasts(self) -> bool:
-        """Whether it waits, and will not be believed to go on any more."""
-        if self._over or time.monotonic() - self._ticked_s < _STILL_S:
-            self._before_s = None
-            return False
-        busy_s = _received_s()
-        if self._before_s is None:
-            self._before_s = busy_s
-        self._over = busy_s - self._before_s > _BUSY_S and self._decided.acquire(blocking=False)
-        return self._over
+    def sentence(self) -> signal.Signals | None:
+        """What it is to be ended with, or None."""
+        return ENDED_BY if self._lasts() else None
 
-
-def _received_s() -> float:
-    """CPU time that the middleware's receiving threads of this process took so far."""
-    total = 0
-    for task in os.listdir(_TASKS):  # noqa: PTH208  often
+    def _lasts(self) -> bool:
+        """Whether its first thread has been waiting all the time that another one was busy."""
         try:
-            with open(f"{_TASKS}/{task}/stat", "rb") as file:  # noqa: PTH123  often
-                stat = file.read()
+            waiting = _switches((self._task / "status").read_bytes())
+            if waiting and waiting == self._waiting:
+                return self._middleware_s() - self._before_s > _BUSY_S
+            self._waiting, self._before_s = waiting, self._middleware_s()
         except OSError:
-            continue
-        if _RECEIVING in stat:
-            # The numbers of the fields are those of proc(5), less three.
-            total += sum(map(int, stat.rpartition(b")")[2].split()[11:13]))
-    return total / _TICKS_PER_S
+            # It has ended.
+            return False
+        return False
+
+    def _middleware_s(self) -> float:
+        """CPU time that the threads of the middleware took so far."""
+        total = 0
+        for thread in (self._task / "task").iterdir():
+            stat = (thread / "stat").read_bytes()
+            if _MIDDLEWARE in stat:
+                # The numbers of the fields are those of proc(5), less three.
+                total += sum(map(int, stat.rpartition(b")")[2].split()[11:13]))
+        return total / _TICKS_PER_S
+
+
+def _switches(status: bytes) -> tuple[bytes, ...]:
+    """How often a thread was taken from a CPU so far; nothing while it is on one or wants one."""
+    lines = status.splitlines()
+    if any(line.startswith(b"State:\tR") for line in lines):
+        return ()
+    return tuple(line for line in lines if b"ctxt_switches:" in line)
+
+
+def stalled_recording(
+    order: CellOrder, submission: SubmissionRecord, launched_ns: int
+) -> Recording:
+    """What is known of a run whose cell was ended: nothing that was sent in it.
+
+    Args:
+        order: What was run.
+        submission: Whose.
+        launched_ns: When it began.
+    """
+    now_ns = time.time_ns()
+    breach = Breach(
+        now_ns,
+        "forbidden packets",
+        "sent what keeps the middleware of the node that watches the run busy without end",
+        "",
+    )
+    ended = [
+        Process(command.name, 0, launched_ns, now_ns, -signal.SIGKILL) for command in order.commands
+    ]
+    return Recording(
+        scenario=order.scenario,
+        seed=order.seed,
+        ending=Ending.EXITED,
+        launched_ns=launched_ns,
+        stop_ns=now_ns,
+        end_ns=now_ns,
+        submission=submission,
+        processes=tuple(ended),
+        breaches=(breach,),
+        values=order.values,
+        environment=order.facts,
+    )

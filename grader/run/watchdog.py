@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from grader.recording.model import Breach
-from grader.run.stall import Stall
 from grader.sandbox.limits import MIB, Limits, size_words
 from grader.sandbox.namespaces import STUDENT
 from grader.sandbox.usage import hidden_bytes, memory_bytes, open_files, own_bytes, usage_of
@@ -28,7 +27,6 @@ _OWN_BYTES = 2048 * MIB
 _FULL = 0.99
 # Some for subprocesses of good manners; every session gets a share of the CPU of its own.
 _MOST_SESSIONS = 16
-_ENDLESS = "sent what keeps the middleware of the node that watches the run busy without end"
 
 
 class Watchdog:
@@ -40,8 +38,6 @@ class Watchdog:
         inits: Callable[[], Sequence[int]],
         output_bytes: Callable[[], int],
         deeds: Callable[[], Iterable[tuple[str, str]]] = tuple,
-        stall: Stall | None = None,
-        rescue: Callable[[tuple[Breach, ...]], None] = lambda _: None,
     ) -> None:
         """Prepare.
 
@@ -51,15 +47,11 @@ class Watchdog:
             output_bytes: How much was written so far.
             deeds: What they did so far that is never allowed: its kind (see :class:`Breach`), and
                 the same in words.
-            stall: Of the cell, or None.
-            rescue: Ends the run and this process while a stall lasts, given what was passed.
         """
         self._limits = limits
         self._inits = inits
         self._output_bytes = output_bytes
         self._deeds = deeds
-        self._stall = stall
-        self._rescue = rescue
         self._breaches: dict[str, Breach] = {}
         self._looks = 0
         self._hidden_bytes = 0
@@ -80,10 +72,6 @@ class Watchdog:
     def _run(self) -> None:
         while not self._stop.wait(_POLL_S):
             self._look()
-            if self._stall is not None and self._stall.lasts():
-                self._note("forbidden packets", _ENDLESS, "")
-                self._end_all()
-                self._rescue(tuple(self._breaches.values()))
 
     def _look(self) -> None:
         limits = self._limits

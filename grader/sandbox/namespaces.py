@@ -14,6 +14,7 @@ import re
 import signal
 import socket
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,6 +44,7 @@ _LAST_CAPABILITY = 63
 _SIOCGIFFLAGS, _SIOCSIFFLAGS, _IFF_UP = 0x8913, 0x8914, 1
 _SIZES = struct.Struct("=QQQ")
 _SHARED_FILES = 1000
+_LOOK_S = 1.0
 _TMP = Path("/tmp")
 _ESCAPE = re.compile(r"\\([0-7]{3})")
 _INTERFACE = struct.Struct("16sh14x")
@@ -120,7 +122,7 @@ class Rights:
     wire: Wire | None
 
 
-def enter(folder: Path) -> Rights:
+def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
     """Go on as the first process of new namespaces; the caller becomes the one that waits.
 
     Returns only in the new process. It dies with the one that waits, and everything in its
@@ -128,6 +130,8 @@ def enter(folder: Path) -> Rights:
 
     Args:
         folder: The cell's own; its parent holds those of all cells.
+        sentence: Asked now and then by the one that waits: None to let the new process go on,
+            or the signal that it shall seem to have been ended by.
 
     Returns:
         What is left of the rights that the new process had.
@@ -150,7 +154,7 @@ def enter(folder: Path) -> Rights:
     Path("/proc/self/gid_map").write_text(f"{gid} {gid} 1")
     child = os.fork()
     if child:
-        _wait_for(child)
+        _wait_for(child, sentence)
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     _mount_own(folder)
     _bring_up_loopback()
@@ -162,10 +166,20 @@ def enter(folder: Path) -> Rights:
     return Rights(mounter, wire)
 
 
-def _wait_for(child: int) -> None:
+def _wait_for(child: int, sentence: Callable[[], int | None]) -> None:
     """End as the child does."""
     os.closerange(0, 256)
-    _, status = os.waitpid(child, 0)
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGCHLD,))
+    ended, status = os.waitpid(child, os.WNOHANG)
+    while not ended:
+        signal.sigtimedwait((signal.SIGCHLD,), _LOOK_S)
+        sentenced = sentence()
+        if sentenced is not None:
+            # To the first process of a namespace every other signal means nothing.
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            os.kill(os.getpid(), sentenced)
+        ended, status = os.waitpid(child, os.WNOHANG)
     if os.WIFSIGNALED(status):
         os.kill(os.getpid(), os.WTERMSIG(status))
     os._exit(os.waitstatus_to_exitcode(status) & 0xFF)

@@ -112,6 +112,17 @@ for port in (7400, 7401, 7410, 7411, 7412, 7413):
     for _ in range(200):
         udp.sendto(b'RTPS' + random.randbytes(200), ('127.0.0.1', port))
 """
+# One packet: the writer on /cmd_vel announces that it has 2^40 samples.
+HEARTBEAT = """\
+import socket, struct
+writer = bytes(node.get_publishers_info_by_topic('/cmd_vel')[0].endpoint_gid)
+udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+number = lambda n: struct.pack('<iI', n >> 32, n & 2**32 - 1)
+body = bytes(4) + writer[12:16] + number(2**39) + number(2**40) + struct.pack('<i', 2**30)
+packet = b'RTPS\\2\\3\\1\\x0f' + writer[:12] + struct.pack('<BBH', 7, 1, len(body)) + body
+for port in (7410, 7411):
+    udp.sendto(packet, ('127.0.0.1', port))
+"""
 HOGS = """\
 for number in range(8):
     if os.fork() == 0:
@@ -411,6 +422,11 @@ ATTACKS = {
         named=("messages were sent on `/cmd_vel` within 1 s",),
     ),
     "garbage_on_dds_ports": Attack(GARBAGE, lost=ALIVE, named=("sent garbage to the UDP ports",)),
+    "announces_endless_samples": Attack(
+        HEARTBEAT,
+        lost=frozenset({"starts"}),
+        named=("keeps the middleware of the node that watches the run busy",),
+    ),
     "burns_the_cpus": Attack(HOGS, lost=ALIVE, named=("s of CPU time, 3 s are allowed",)),
     "injection": Attack(INJECTION, lost=ALIVE, named=("RuntimeError",)),
     "shadows_modules": Attack(

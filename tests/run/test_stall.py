@@ -2,50 +2,103 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import pytest
 
-from grader.run import stall
-from grader.run.stall import Stall
+from grader.assignment.load import list_assignments, load_assignment
+from grader.assignment.model import Scenario
+from grader.checks.check import Subject
+from grader.checks.finding import Status
+from grader.grade.judge import grade
+from grader.run.order import CellOrder, Command, Limits, Until
+from grader.run.stall import ENDED_BY, Stall, stalled_recording
+from tests.checks.builder import submission
+
+
+@dataclass
+class Cell:
+    """What ``/proc`` tells of a process with a thread of its own and one that receives."""
+
+    folder: Path
+
+    def is_seen(self, *, state: str = "S", switches: int, received_s: float) -> None:
+        (self.folder / "task" / "2").mkdir(parents=True, exist_ok=True)
+        (self.folder / "status").write_text(
+            f"Name:\tpython\nState:\t{state} (...)\nvoluntary_ctxt_switches:\t{switches}\n"
+            "nonvoluntary_ctxt_switches:\t7\n"
+        )
+        fields = ["R", *["0"] * 10, str(int(received_s * 100)), "0", *["0"] * 30]
+        (self.folder / "task" / "2" / "stat").write_text(f"2 (dds.udp.7411) {' '.join(fields)}\n")
 
 
 @pytest.fixture
-def busy_s(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
-    """CPU times of the middleware, a second for each look, and a cell that never waits for long."""
-    monkeypatch.setattr(stall, "_STILL_S", 0.0)
-    seconds = [0.0]
-    monkeypatch.setattr(stall, "_received_s", lambda: seconds[0])
-    yield seconds
+def cell(tmp_path: Path) -> Cell:
+    return Cell(tmp_path)
 
 
-def test_a_middleware_that_works_without_end_is_noticed(busy_s: list[float]) -> None:
-    found = Stall()
-    assert not found.lasts()
-    busy_s[0] = 4.0
-    assert not found.lasts()
-    busy_s[0] = 6.0
-    assert found.lasts()
-    # It is rescued once.
-    assert not found.lasts()
+def test_a_middleware_that_works_without_end_is_noticed(cell: Cell) -> None:
+    stall = Stall(cell.folder)
+    cell.is_seen(switches=50, received_s=3.0)
+    assert stall.sentence() is None
+    cell.is_seen(switches=50, received_s=7.0)
+    assert stall.sentence() is None
+    cell.is_seen(switches=50, received_s=8.5)
+    assert stall.sentence() is ENDED_BY
 
 
-def test_whoever_goes_on_is_never_stalled(
-    busy_s: list[float], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = Stall()
-    assert not found.lasts()
-    busy_s[0] = 6.0
-    monkeypatch.setattr(stall, "_STILL_S", 1e9)
-    found.tick()
-    assert not found.lasts()
-    monkeypatch.setattr(stall, "_STILL_S", 0.0)
-    assert not found.lasts()
+def test_whoever_goes_on_is_never_stalled(cell: Cell) -> None:
+    stall = Stall(cell.folder)
+    for look in range(20):
+        cell.is_seen(switches=50 + look, received_s=4.0 * look)
+        assert stall.sentence() is None
 
 
-def test_a_run_that_is_over_needs_no_rescue(busy_s: list[float]) -> None:
-    found = Stall()
-    assert not found.lasts()
-    found.end()
-    busy_s[0] = 60.0
-    assert not found.lasts()
+def test_whoever_waits_for_a_cpu_is_never_stalled(cell: Cell) -> None:
+    stall = Stall(cell.folder)
+    for look in range(20):
+        cell.is_seen(state="R", switches=50, received_s=4.0 * look)
+        assert stall.sentence() is None
+
+
+def test_a_cell_that_has_ended_is_never_stalled(cell: Cell) -> None:
+    stall = Stall(cell.folder / "ended")
+    assert stall.sentence() is None
+    assert stall.sentence() is None
+
+
+def order(scenario: Scenario) -> CellOrder:
+    """One of which only matters what a recording takes over."""
+    return CellOrder(
+        scenario=scenario.id,
+        seed=0,
+        commands=tuple(Command(launch.program, ()) for launch in scenario.launch),
+        environment={},
+        prefixes=(),
+        topics=(),
+        stimuli=(),
+        until=Until(),
+        limits=Limits(1.0, 1.0, 1.0),
+        scratch="",
+        submission="",
+    )
+
+
+@pytest.mark.parametrize("name", list_assignments())
+def test_no_check_takes_a_stalled_run_for_a_fault_of_ours(name: str) -> None:
+    loaded = load_assignment(name)
+    # Each by itself, not skipped for what another one would say before it.
+    alone = [
+        replace(bound, spec=bound.spec.model_copy(update={"requires": ()}))
+        for bound in loaded.checks
+        if bound.check.subject is Subject.RECORDING
+    ]
+    recordings = {
+        scenario.id: stalled_recording(order(scenario), submission(), 0)
+        for scenario in loaded.assignment.scenarios
+    }
+    results = grade(replace(loaded, checks=tuple(alone)), submission(), recordings).results
+    assert {
+        result.id: result.status for result in results if result.status is not Status.FAILED
+    } == {}
