@@ -134,7 +134,7 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
         )
     aborted = {found[1] for found in _ABORTED.finditer(_clean(build))}
     others = [other for other in build.failed_packages if other not in {name, *aborted}]
-    lacking = _lacking(build, [name, *others] if name in aborted else [name])
+    lacking = _lacking(submission, build, [name, *others] if name in aborted else [name])
     if lacking:
         return Cause(
             f"it needs {codes(lacking)} to build, which ROS 2 Jazzy has, but which is not "
@@ -171,14 +171,23 @@ def _failed(build: BuildRecord, name: str) -> Cause:
     )
 
 
-def _lacking(build: BuildRecord, names: Iterable[str]) -> list[str]:
-    """What the builds of packages did not find because this machine does not have it."""
+def _lacking(submission: SubmissionRecord, build: BuildRecord, names: Iterable[str]) -> list[str]:
+    """What the builds of packages did not find because this machine does not have it.
+
+    Only CMake looks for any; what a setup.py prints may be put in the same words.
+    """
     found = {
         missing
         for name in names
+        if not _is_pure_python(submission, name)
         for missing in missing_cmake_packages("\n".join(_written(build, name)))
     }
     return sorted(found & set(build.lacking))
+
+
+def _is_pure_python(submission: SubmissionRecord, name: str) -> bool:
+    package = submission.package(name)
+    return package is not None and package.build_type == "ament_python"
 
 
 def _evidence(build: BuildRecord, name: str) -> Evidence:

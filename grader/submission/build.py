@@ -284,6 +284,9 @@ def _killed_from_within(outcome: Outcome) -> str | None:
     The kernel itself may end a process for want of memory: see to that before.
     """
     status = outcome.status
+    if _SUMMARY.search(outcome.output):
+        # It came to its end, and ends with the status of what failed, such as sys.exit(137).
+        return None
     # As a shell tells of a signal, and bubblewrap does.
     number = status - _SIGNALLED if status is not None and status > _SIGNALLED else None
     if number is None or number >= signal.NSIG:

@@ -182,11 +182,16 @@ class TestBuilds:
         build = failed_build(
             "bot_publisher", "other", log=f"{log}{ended} [1s]\n", lacking=("nav2_msgs",)
         )
-        finding = judge(
-            "package.builds", submission(package(), package("other"), build=build), package=NAME
-        )
+        packages = [package(name, build_type="ament_cmake") for name in (NAME, "other")]
+        finding = judge("package.builds", submission(*packages, build=build), package=NAME)
         assert finding.status is Status.ERROR
         assert "`nav2_msgs`" in finding.observed
+
+    def test_a_setup_py_that_speaks_as_cmake_is_not_excused(self):
+        log = f"{NEEDS_NAV2.format(NAME)}Failed   <<< bot_publisher [1s, exited with code 1]\n"
+        build = failed_build(NAME, log=log, lacking=("nav2_msgs",))
+        finding = judge("package.builds", submission(package(), build=build), package=NAME)
+        assert finding.status is Status.FAILED
 
     def test_what_another_package_lacks_excuses_nobody(self):
         log = f"{NEEDS_NAV2.format('other')}Failed   <<< other [1s]\n{LOG}"
