@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from grader.checks.finding import Span
 from grader.recording.model import NS, Message, Recording
 
-_REPORT = re.compile(r"\s*(\S.*?)\s+(start|end)\s*")
+_REPORT = re.compile(r"\s*(\S(?:.*\S)?)\s+(start|end)\s*")
 # Clocks of one machine may step by so much; what overlaps overlaps for much longer.
 _SLACK_NS = 1_000_000
 _MOST_SPANS = 400

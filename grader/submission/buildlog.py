@@ -10,11 +10,12 @@ MAX_BYTES = 64 * 1024
 _ANSI = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b[@-_]")
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 _NOISE = re.compile(
-    r"^WARNING:colcon\.colcon_ros\.prefix_path\.ament:The path .* doesn't contain any .*\n",
+    r"^WARNING:colcon\.colcon_ros\.prefix_path\.ament:The path .* doesn't contain any .*(?:\n|\Z)",
     re.MULTILINE,
 )
 # setup.py is run in the package's folder and names colcon's folders relative to it.
-_RELATIVE_SCRATCH = re.compile(r"(?:\.\./)+scratch/(?=build/)")
+# Of a long run of them only the first one is tried.
+_RELATIVE_SCRATCH = re.compile(r"(?<!\.\./)(?:\.\./)+scratch/(?=build/)")
 _ENDED = re.compile(r"(?<!^)(?=(?:Finished|Failed  |Aborted ) <<< \S+ \[)", re.MULTILINE)
 _MISSING_CMAKE_PACKAGE = re.compile(
     r"Could not find a package configuration file provided by\s+\"([\w-]+)\""

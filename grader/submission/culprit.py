@@ -30,9 +30,12 @@ _IDENTIFYING = re.compile(r"ERROR:.*Exception in package identification extensio
 _NO_CMAKELISTS = "does not appear to contain CMakeLists.txt"
 _ABSOLUTE_DATA = "os.path.isabs(dest)"
 _READ_OUTPUT = "ast.literal_eval(output)"
-_DIED = re.compile(r".*setup\.py.* died with <Signals\.(\w+): \d+>")
+_DIED = re.compile(r"(?=.*setup\.py).* died with <Signals\.(\w+): \d+>")
 _INTERFACES = (".msg", ".srv", ".action")
 _MAX_MESSAGE = 500
+_MOST_QUOTED = 10
+_MOST_LINES = 10_000
+"""Of a file, in which a quoted name is looked for."""
 
 
 @dataclass(frozen=True)
@@ -239,12 +242,12 @@ class _Place:
     def _quoted(self, message: str, endings: tuple[str, ...]) -> SourceError | None:
         """The first line of such a file of the package that has what the message quotes."""
         folder = self.sources.folders.get(self.package, ".")
-        for quoted in _QUOTED.findall(message):
+        for quoted in _QUOTED.findall(message)[:_MOST_QUOTED]:
             word = re.compile(rf"(?<![\w-]){re.escape(quoted)}(?![\w-])")
             for file, lines in sorted(self.sources.texts.items()):
                 if not (is_within(file, folder) and file.endswith(endings)):
                     continue
-                for number, line in enumerate(lines, start=1):
+                for number, line in enumerate(lines[:_MOST_LINES], start=1):
                     if word.search(line):
                         return SourceError(file, number, message)
         return None

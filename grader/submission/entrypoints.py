@@ -17,6 +17,9 @@ _SPEC = re.compile(
     r"\s*(?P<name>[^=\[\]]+?)\s*=\s*(?P<module>[\w.]+)\s*(:\s*(?P<function>[\w.]+))?"
     r"\s*(\[[^\]]*\])?\s*"
 )
+# Python before 3.13 raises an AttributeError where a name without a value is followed by an
+# indented line (python/cpython#107625).
+_UNREADABLE = (configparser.Error, AttributeError)
 
 
 @dataclass(frozen=True)
@@ -60,17 +63,23 @@ class Setup:
     package_dir: str = "."
 
 
-def read_setup(setup_py: bytes | None, setup_cfg: bytes | None, folder: str) -> Setup:
+def read_setup(
+    setup_py: bytes | None,
+    setup_cfg: bytes | None,
+    folder: str,
+    allowance: source.Allowance | None = None,
+) -> Setup:
     """Read the two files; what setup.py says wins, as for setuptools.
 
     Args:
         setup_py: Content of setup.py, or None where there is none.
         setup_cfg: Content of setup.cfg, or None.
         folder: The package's folder in the submission.
+        allowance: What the Python files of the submission may take together.
     """
     file = join(folder, "setup.py")
     keywords: dict[str, Value] = {}
-    tree = source.parse(setup_py or b"", file)
+    tree = source.parse(setup_py or b"", file, allowance)
     if not isinstance(tree, SourceError):
         keywords = setup_keywords(tree)
     scripts = _scripts(keywords.get("entry_points"))
@@ -112,7 +121,7 @@ def parse_installed(text: str, file: str) -> list[EntryPoint]:
     parser = _Parser()
     try:
         parser.read_string(text)
-    except configparser.Error:
+    except _UNREADABLE:
         return []
     found = []
     for name, value in parser.items(_GROUP) if parser.has_section(_GROUP) else []:
@@ -165,7 +174,7 @@ def _config(data: bytes | None) -> configparser.ConfigParser:
     parser = _Parser()
     try:
         parser.read_string((data or b"").decode("utf-8", "replace"))
-    except configparser.Error:
+    except _UNREADABLE:
         return _Parser()
     return parser
 

@@ -179,15 +179,31 @@ def match_files(python: Mapping[str, str], sources: Mapping[str, str]) -> dict[s
         Installed path -> student's path: of those with the same content the one whose path ends
         most alike. Files that the build changed or made are left out.
     """
-    by_hash: dict[str, list[str]] = {}
-    for path, digest in sources.items():
-        by_hash.setdefault(digest, []).append(path)
+    first: dict[str, str] = {}
+    ending: dict[tuple[str, int], str] = {}
+    for path, digest in sorted(sources.items()):
+        first.setdefault(digest, path)
+        for mark in _endings(path):
+            ending.setdefault((digest, mark), path)
     found = {}
     for installed, digest in python.items():
-        candidates = by_hash.get(digest)
-        if candidates:
-            found[installed] = max(sorted(candidates), key=lambda path: _likeness(path, installed))
+        if digest not in first:
+            continue
+        found[installed] = first[digest]
+        for mark in _endings(installed):
+            alike = ending.get((digest, mark))
+            if alike is None:
+                break
+            found[installed] = alike
     return found
+
+
+def _endings(path: str) -> Iterator[int]:
+    """A mark for each ending of a path, the shortest first: there may be thousands of copies."""
+    mark = 0
+    for part in reversed(path.split("/")):
+        mark = hash((part, mark))
+        yield mark
 
 
 def in_folder(files: Mapping[str, str], folder: str) -> tuple[tuple[str, str], ...]:
@@ -208,15 +224,6 @@ def _definitions(share: Path) -> Iterator[Definition]:
             if path.suffix == f".{kind}" and described and path.stat().st_size <= MOST_BYTES:
                 text = path.read_text(encoding="utf-8", errors="replace")
                 yield Definition(path.relative_to(share).as_posix(), text)
-
-
-def _likeness(path: str, installed: str) -> int:
-    count = 0
-    for left, right in zip(reversed(path.split("/")), reversed(installed.split("/")), strict=False):
-        if left != right:
-            break
-        count += 1
-    return count
 
 
 def _hash(path: Path) -> str:

@@ -29,6 +29,8 @@ CMAKE = "CMakeLists.txt"
 _INTERFACES = (".msg", ".srv", ".action")
 _MAX_INTERFACE_BYTES = 256 * 1024
 _MOST_DEFINITIONS = 200
+_MOST_LINES = 1000
+"""Of a definition, in which names that the build's log quotes are looked for."""
 _WORD = re.compile(r"\w+")
 _CONDITIONS = {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
 
@@ -43,7 +45,8 @@ class Package:
         manifest: What package.xml says.
         setup: What setup.py and setup.cfg say.
         cmake: Its CMakeLists.txt, or None where it has none.
-        texts: Lines of setup.py and of the interface files, by path in the submission.
+        texts: Lines of setup.py and the first ones of the interface files, by path in the
+            submission.
         definitions: Interface files, and what lies beside them.
         hashes: Hash of each Python file and script, by path in the submission.
         trees: Syntax tree of each, or what is wrong with it.
@@ -104,37 +107,48 @@ class Package:
         return Modules(trees, installed)
 
 
-def read_package(located: Located, folder: str, ros: RosInstallation) -> Package:
+def read_package(
+    located: Located,
+    folder: str,
+    ros: RosInstallation,
+    allowance: source.Allowance | None = None,
+) -> Package:
     """Read a package from the private copy of its submission.
 
     Args:
         located: The submission.
         folder: The package's folder in it.
         ros: For conditions in package.xml.
+        allowance: What all its packages together may take.
     """
+    allowance = allowance or source.Allowance()
     manifest = read_manifest(
         _bytes(located, join(folder, MANIFEST)) or b"",
         shown(join(folder, MANIFEST)),
         {**_CONDITIONS, "ROS_DISTRO": ros.distro},
     )
     setup_py = _bytes(located, join(folder, "setup.py"))
-    setup = read_setup(setup_py, _bytes(located, join(folder, "setup.cfg")), shown(folder))
+    setup_cfg = _bytes(located, join(folder, "setup.cfg"))
+    setup = read_setup(setup_py, setup_cfg, shown(folder), allowance)
     cmake = _bytes(located, join(folder, CMAKE))
     hashes: dict[str, str] = {}
     trees: dict[str, ast.Module | SourceError] = {}
     texts = {join(folder, "setup.py"): _lines(setup_py)} if setup_py is not None else {}
+    interfaces = 0
     for file in located.files:
         if not is_within(file.path, folder):
             continue
         if file.path.endswith(_INTERFACES) and file.size <= _MAX_INTERFACE_BYTES:
-            texts[file.path] = _lines(_bytes(located, file.path) or b"")
+            interfaces += 1
+            if interfaces <= _MOST_DEFINITIONS:
+                texts[file.path] = _lines(_bytes(located, file.path) or b"")[:_MOST_LINES]
         suffixed = file.path.endswith(".py")
         if not suffixed and "." in file.path.rpartition("/")[2]:
             continue
         data = _bytes(located, file.path)
         if data is not None and (suffixed or source.is_python_script(data)):
             hashes[file.path] = hash_of(data)
-            trees[file.path] = source.parse(data, shown(file.path))
+            trees[file.path] = source.parse(data, shown(file.path), allowance)
     folder_name = located.id if folder == "." else folder.rpartition("/")[2]
     package = Package(
         name=manifest.name or setup.name or shown(folder_name),

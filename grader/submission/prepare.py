@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from grader.errors import SubmissionError
 from grader.ros import RosInstallation
+from grader.submission import source
 from grader.submission.apart import built_apart
 from grader.submission.archive import SUFFIXES
 from grader.submission.build import build
@@ -164,7 +165,10 @@ def _prepare(
     stop: threading.Event | None,
     on_output: Callable[[str], None],
 ) -> Prepared:
-    packages = [read_package(located, folder, ros) for folder in located.packages[:_MAX_PACKAGES]]
+    allowance = source.Allowance()
+    packages = [
+        read_package(located, folder, ros, allowance) for folder in located.packages[:_MAX_PACKAGES]
+    ]
     problem = find_problem(located, packages)
     if problem is not None:
         records = record_packages(packages, ros, None)

@@ -6,7 +6,9 @@ import ast
 import subprocess
 import sys
 import threading
+import time
 import warnings
+from dataclasses import dataclass
 
 from grader.submission.record import SourceError
 
@@ -14,32 +16,66 @@ MAX_BYTES = 2 * 2**20
 """No student writes a longer file by hand."""
 
 _TRIED_APART_FROM_BYTES = 64 * 1024
-_TRY_S = 20
-_TRY = "import ast, sys; ast.parse(sys.stdin.buffer.read())"
-_TOO_COMPLEX = "Python cannot parse this file: it is nested too deeply"
+_TRY_S = 20.0
+_TRY = """
+import ast, gc, os, resource, sys
+resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
+gc.disable()
+try:
+    tree = ast.parse(sys.stdin.buffer.read())
+    ended = int(sum(1 for _ in ast.walk(tree)) > int(sys.argv[1]))
+except MemoryError:
+    ended = 1
+except Exception:
+    ended = 0
+# To take a large tree apart again would take as long as to make it.
+os._exit(ended)
+"""
+_TOO_COMPLEX = "Python cannot parse this file: it is nested too deeply or holds too much"
+_TOO_MUCH = "not read: the submission holds more Python than anybody writes"
 # Before 3.11.5 two threads of CPython that parse at the same time count their depths together, and
 # one ends with a SystemError (python/cpython#106905); to catch warnings is for one at a time too.
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def parse(data: bytes, file: str) -> ast.Module | SourceError:
+@dataclass
+class Allowance:
+    """What the Python files of one submission may take together to be read.
+
+    A tree takes up to a thousand times the memory of what it is made from, and all trees of a
+    submission are there at once.
+
+    Attributes:
+        nodes: Of all trees; what people write has one for eleven bytes.
+        seconds: For all files that are tried apart.
+    """
+
+    nodes: int = 1_000_000
+    seconds: float = 60.0
+
+
+def parse(data: bytes, file: str, allowance: Allowance | None = None) -> ast.Module | SourceError:
     """Parse a file as Python would: encoding cookie, byte order mark and all.
 
     Args:
         data: Its content.
         file: Its path in the submission, for the error.
+        allowance: Of its submission; what the file takes is taken from it.
 
     Returns:
         The tree, or what Python says is wrong.
     """
+    left = allowance or Allowance()
     if len(data) > MAX_BYTES:
         return SourceError(file, None, f"larger than {MAX_BYTES // 2**20} MiB; not read as Python")
-    if len(data) > _TRIED_APART_FROM_BYTES and not _survives(data):
-        return SourceError(file, None, _TOO_COMPLEX)
+    if left.nodes <= 0:
+        return SourceError(file, None, _TOO_MUCH)
+    if len(data) > _TRIED_APART_FROM_BYTES and not _survives(data, left):
+        return SourceError(file, None, _TOO_COMPLEX if left.seconds > 0 else _TOO_MUCH)
     try:
         with _ONE_AT_A_TIME, warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return ast.parse(data)
+            tree = ast.parse(data)
     except SyntaxError as error:
         return SourceError(file, error.lineno or None, f"{type(error).__name__}: {error.msg}")
     except (RecursionError, MemoryError):
@@ -47,26 +83,41 @@ def parse(data: bytes, file: str) -> ast.Module | SourceError:
     except ValueError as error:
         # Older Pythons say this of NUL bytes.
         return SourceError(file, None, f"SyntaxError: {error}")
+    for node in ast.walk(tree):
+        left.nodes -= 1
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            node.value = _as_text(node.value)
+    return tree
 
 
-def _survives(data: bytes) -> bool:
-    """Whether parsing ends well, tried in a process of its own.
+def _as_text(value: str) -> str:
+    """A string as it can be written down: half of a surrogate pair is no text."""
+    return value if value.isascii() else value.encode(errors="backslashreplace").decode()
+
+
+def _survives(data: bytes, left: Allowance) -> bool:
+    """Whether parsing ends well and makes no more than is allowed, tried in a process of its own.
 
     CPython 3.10 dies of a stack overflow on long chains such as ``a.b.b.b...``; it takes more
     than 64 KiB of them.
     """
+    if left.seconds <= 0:
+        return False
+    began_s = time.monotonic()
     try:
         done = subprocess.run(
-            [sys.executable, "-I", "-S", "-c", _TRY],
+            [sys.executable, "-I", "-S", "-c", _TRY, str(left.nodes)],
             input=data,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            timeout=_TRY_S,
+            timeout=min(_TRY_S, left.seconds),
             check=False,
         )
     except subprocess.TimeoutExpired:
         return False
-    return done.returncode >= 0
+    finally:
+        left.seconds -= time.monotonic() - began_s
+    return done.returncode == 0
 
 
 def is_python_script(data: bytes) -> bool:

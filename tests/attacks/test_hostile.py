@@ -241,6 +241,12 @@ if 'install' in sys.argv:
     print('Starting >>> ghost', 'Finished <<< bot_publisher', sep='\\n', flush=True)
     sys.exit(1)
 """
+SPEAK_AS_CMAKE = """\
+import sys
+if 'install' in sys.argv:
+    print('Could not find a package configuration file provided by "nav2_msgs" with')
+    sys.exit(1)
+"""
 # As if colcon had been cut off in the middle, which would be a fault of the machine.
 SPEAK_UNFINISHED = """\
 import sys
@@ -465,6 +471,17 @@ ATTACKS = {
         lost=frozenset({"builds"}),
         named=("colcon was ended by signal 40, which only a program of the build",),
     ),
+    # No signal, though a shell would tell of one so.
+    "build_ends_as_if_killed": Attack(
+        at_build="import sys\nif 'install' in sys.argv:\n    sys.exit(137)",
+        lost=frozenset({"builds"}),
+        named=("setup.py: colcon could not build this package",),
+    ),
+    "build_speaks_as_cmake": Attack(
+        at_build=SPEAK_AS_CMAKE,
+        lost=frozenset({"builds"}),
+        named=("setup.py: colcon could not build this package",),
+    ),
     "build_speaks_as_colcon": Attack(
         at_build=SPEAK_AS_COLCON,
         lost=frozenset({"builds"}),
@@ -503,6 +520,9 @@ HONEST = {
     "stops_too_early": Attack("node.timer.cancel()", lost=frozenset({"messages"})),
     "crashes": Attack("raise ValueError('a mistake')", lost=ALIVE),
     "uses_what_is_allowed": Attack(at_import="import scipy"),
+    "names_a_module_that_is_no_text": Attack(
+        files={"bot_publisher/other.py": "import importlib\nimportlib.import_module('\\ud800')"}
+    ),
     "does_unusual_things": Attack(UNUSUAL),
     "uses_what_is_not": Attack(
         at_import="import pydantic",

@@ -24,6 +24,13 @@ def test_a_warning_about_our_own_installation_is_left_out() -> None:
     assert clean(f"a\n{warning}b\n", {}) == "a\nb\n"
 
 
+def test_long_lines_that_nearly_match_are_read_at_once() -> None:
+    path = "../" * 40_000
+    assert clean(path, {}) == path
+    warning = "WARNING:colcon.colcon_ros.prefix_path.ament:The path x"
+    assert clean(warning + " doesn't contain any " * 6000, {}) == ""
+
+
 def test_of_a_long_log_the_end_is_kept_in_whole_lines() -> None:
     log = "".join(f"line {number} größer\n" for number in range(10_000))
     kept = ending(log)

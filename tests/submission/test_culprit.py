@@ -252,6 +252,17 @@ def test_a_message_is_printable_and_not_endless() -> None:
     assert len(found.message) == 500
 
 
+def test_a_log_that_quotes_thousands_of_names_is_read_at_once() -> None:
+    texts = {"src/bot/setup.py": ["x"] * 100_000}
+    quoted = " ".join(f"'a{number}'" for number in range(10_000))
+    found = find_culprit(
+        f"Starting >>> bot\nerror: {quoted}\n", ("bot",), Sources(FILES, SOURCES.folders, texts)
+    )
+    assert found is not None
+    assert (found.file, found.line) == ("src/bot/setup.py", None)
+    assert find_culprit(f"Starting >>> bot\n{'setup.py' * 16_000}\n", ("bot",), SOURCES) is None
+
+
 def test_where_nothing_is_said_the_package_that_was_being_built_is_named() -> None:
     log = "Starting >>> bot\nFinished <<< bot\nStarting >>> c\n"
     assert str(last_started(log, SOURCES, "too late")) == "src/c/CMakeLists.txt: too late"

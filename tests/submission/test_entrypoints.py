@@ -85,6 +85,11 @@ def test_a_setup_cfg_with_colons_is_read() -> None:
     assert targets("setup()", config) == [("p", "b.n:m")]
 
 
+def test_a_setup_cfg_that_nobody_can_read_says_nothing() -> None:
+    assert setup("setup(name='bot')", "[metadata]\nname\n  other\n").name == "bot"
+    assert parse_installed("[console_scripts]\npub\n  bot.node:main\n", "setup.py") == []
+
+
 def test_packages_below_src_are_said_to_be_there() -> None:
     assert setup("setup(package_dir={'': 'src'})").package_dir == "src"
 

@@ -155,6 +155,15 @@ def test_odd_names_are_written_so_that_json_can_hold_them(
     assert f"{FOLDER}/bot_publisher/new\\nline\\udce9.py" in files
 
 
+def test_of_thousands_of_long_definitions_the_first_lines_are_kept(
+    tree: Tree, named_ros: RosInstallation
+) -> None:
+    tree.package({f"msg/A{number}.msg": "ab\n" * 5000 for number in range(300)})
+    with opened(tree.root) as located:
+        texts = read_package(located, FOLDER, named_ros).texts
+    assert sum(map(len, texts.values())) < 250_000
+
+
 def test_what_was_built_wins_over_what_was_declared(
     tree: Tree, named_ros: RosInstallation, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.submission.record import SourceError
-from grader.submission.source import MAX_BYTES, is_python_script, parse
+from grader.submission.source import MAX_BYTES, Allowance, is_python_script, parse
 
 
 def error(data: bytes) -> SourceError:
@@ -78,6 +78,27 @@ def test_source_that_overflows_the_parser_is_an_error(data: bytes) -> None:
 
 def test_giant_source_is_not_even_read() -> None:
     assert "larger than 2 MiB" in error(b"#" * (MAX_BYTES + 1)).message
+
+
+def test_a_small_file_with_a_huge_tree_is_not_kept() -> None:
+    assert "holds too much" in error(b"a," * (MAX_BYTES // 2)).message
+
+
+def test_many_files_take_no_more_than_a_submission_may() -> None:
+    allowance = Allowance(nodes=10_000)
+    found = [parse(b"a," * 2000, f"{number}.py", allowance) for number in range(10)]
+    assert [isinstance(item, ast.Module) for item in found] == [True] * 3 + [False] * 7
+    assert "more Python than anybody writes" in str(found[-1])
+    slow = Allowance(seconds=0.0)
+    assert "more Python" in str(parse(b"#" * 100_000, "node.py", slow))
+    assert isinstance(parse(b"#" * 100, "node.py", slow), ast.Module)
+
+
+def test_a_string_that_is_no_text_can_be_written_down() -> None:
+    tree = parse(b"x = 'gr\\xf6\\udc80', f'{x}\\ud800'", "node.py")
+    assert isinstance(tree, ast.Module)
+    values = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
+    assert sorted(values) == ["\\ud800", "gr\xf6\\udc80"]
 
 
 @settings(deadline=None)
