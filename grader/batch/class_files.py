@@ -11,12 +11,14 @@ from pathlib import Path
 from grader.batch.batch import Done
 from grader.batch.files import REPORT_FILE
 from grader.batch.ledger import Ledger
+from grader.checks.wording import listing
 from grader.report.files import write_whole
 from grader.report.gradebook import cell, plain_csv
 from grader.report.overview import OverviewRow, render_overview
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
+_MOST_TWINS = 5
 
 
 def notes(done: Sequence[Done]) -> dict[str, str]:
@@ -28,18 +30,30 @@ def notes(done: Sequence[Done]) -> dict[str, str]:
     Returns:
         By key.
     """
-    twins: dict[str, list[str]] = {}
+    same: dict[str, list[str]] = {}
     for item in done:
         if item.entry.same_as:
-            twins.setdefault(item.entry.same_as, []).append(item.entry.key)
-            twins.setdefault(item.entry.key, []).append(item.entry.same_as)
-    return {item.entry.key: _note(item, twins.get(item.entry.key, ())) for item in done}
+            same.setdefault(item.entry.same_as, [item.entry.same_as]).append(item.entry.key)
+    return {
+        item.entry.key: _note(item, same.get(item.entry.same_as or item.entry.key, ()))
+        for item in done
+    }
 
 
-def _note(done: Done, twins: Sequence[str]) -> str:
+def _note(done: Done, same: Sequence[str]) -> str:
+    """What to say of a row.
+
+    Args:
+        done: The row.
+        same: Keys of all that have the same submission, itself among them; or none.
+    """
     parts = [done.entry.fault or done.entry.problem]
-    if twins:
-        parts.append(f"the same submission as {' and '.join(twins)}")
+    if same:
+        # A class of 500 that handed in the starter package needs no 500 names on each row.
+        twins = [key for key in same[: _MOST_TWINS + 1] if key != done.entry.key][:_MOST_TWINS]
+        left = len(same) - 1 - len(twins)
+        named = [*twins, f"{left} {'other' if left == 1 else 'others'}"] if left else twins
+        parts.append(f"the same submission as {listing(named)}")
     if done.result is not None and done.result.submission.problem:
         parts.append(done.result.submission.problem)
     if done.result is not None and not done.result.graded:

@@ -135,6 +135,11 @@ class Grading:
         return self.grade_prepared(prepared, folder)
 
     @property
+    def enclosure(self) -> str:
+        """The sandbox that is in force, in a few words."""
+        return self._runner.sandbox.description if self._runner.sandbox else "none"
+
+    @property
     def _sandbox(self) -> Sandbox | None:
         sandbox = self._runner.sandbox
         return sandbox and sandbox.allowing(self._loaded.assignment.libraries)

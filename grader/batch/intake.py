@@ -146,7 +146,7 @@ def _from_roster(student: Student, base: Path, staging: Path) -> HandedIn:
         fault = _BARE if _is_bare(path) else ""
     except (FileNotFoundError, ValueError):
         # A ValueError where no file can have that name: there is a NUL in it.
-        fault = f"{shown(student.submission)} does not exist"
+        fault = f"{shown(str(path))} does not exist"
     except OSError as error:
         fault = f"{shown(student.submission)} cannot be read: {error.strerror}"
     return replace(row, fault=fault) if fault else replace(row, path=path)
@@ -214,7 +214,7 @@ def _is_bare(path: Path) -> bool:
 
 def _opened(source: Path, staging: Path) -> Path:
     if source.is_dir():
-        return source
+        return _export_in(source) or source
     if not source.is_file():
         raise UsageError(f"{source}: does not exist")
     if not source.name.lower().endswith(SUFFIXES):
@@ -229,6 +229,14 @@ def _opened(source: Path, staging: Path) -> Path:
     inside = [item for item in target.iterdir() if not _is_ignored(item)]
     alone = len(inside) == 1 and inside[0].is_dir() and not _looks_like_one(inside[0])
     return inside[0] if alone else target
+
+
+def _export_in(folder: Path) -> Path | None:
+    """The folder of Gradescope's export where there is nothing else, as unpacking may leave it."""
+    inside = [item for item in folder.iterdir() if not _is_ignored(item)]
+    if len(inside) == 1 and (inside[0] / GRADESCOPE_METADATA).is_file():
+        return inside[0]
+    return None
 
 
 def _refuse_single(folder: Path, source: Path) -> None:
@@ -260,7 +268,7 @@ def _entries(
             continue
         match = _CANVAS.fullmatch(item.name) if item.is_file() else None
         if item.name in metadata:
-            yield _of_gradescope(item, metadata[item.name])
+            yield from _of_gradescope(item, metadata[item.name])
         elif match:
             canvas.setdefault(match["user"], []).append((item, match))
         elif item.is_dir() or item.name.lower().endswith((*SUFFIXES, *_FOREIGN)):
@@ -334,20 +342,15 @@ def _gradescope(file: Path) -> Mapping[str, Any]:
     return data if isinstance(data, dict) else {}
 
 
-def _of_gradescope(item: Path, about: Any) -> _Entry:
-    """An exported folder; Gradescope writes its keys as Ruby does, with a colon in front."""
+def _of_gradescope(item: Path, about: Any) -> Iterator[_Entry]:
+    """An exported folder, for each of its team; Gradescope writes keys with a colon in front."""
     submitters = about.get(":submitters") if isinstance(about, dict) else None
     listed = submitters if isinstance(submitters, list) else []
     people = [person for person in listed if isinstance(person, dict)]
-    names = tuple(
-        str(person[field])
-        for person in people
-        for field in (":sid", ":email", ":name")
-        if person.get(field)
-    )
-    name = ", ".join(str(person[":name"]) for person in people if person.get(":name"))
-    key = str(people[0].get(":sid") or people[0].get(":email")) if people else item.name
-    return _Entry(shown(key), item, names or (item.name,), shown(name))
+    for person in people or [{}]:
+        told = (person.get(field) for field in (":sid", ":email", ":name"))
+        names = tuple(str(value) for value in told if value) or (item.name,)
+        yield _Entry(shown(names[0]), item, names, shown(str(person.get(":name") or "")))
 
 
 def _row(entry: _Entry) -> HandedIn:
@@ -373,9 +376,14 @@ def _matched(entries: list[_Entry], roster: Roster) -> list[HandedIn]:
             named.setdefault(file, set()).add(student.key)
     rows: list[HandedIn] = []
     handed: dict[str, str] = {}
+    given: set[Path] = set()
     for entry in entries:
         # What the roster says itself needs no guess, and a team may have handed in one for all.
         told = named.get(entry.path.name, set()) | named.get(_stem(entry.path), set())
+        if told and entry.path in given:
+            # Gradescope's export names a team too; the roster has named all of it already.
+            continue
+        given.add(entry.path)
         keys = told or _owners(entry, known)
         if not told and len(keys) != 1:
             why = "not in the roster" if not keys else f"may be {' or '.join(sorted(keys))}"

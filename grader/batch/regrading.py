@@ -65,6 +65,8 @@ def find(path: Path) -> Found:
     Raises:
         UsageError: There is nothing to judge, or a file is damaged.
     """
+    if not path.exists():
+        raise UsageError(f"{path}: does not exist")
     if path.is_file():
         recording = read_recording(path)
         files = {recording.scenario: path}

@@ -34,6 +34,8 @@ def find_reports(out: Path) -> tuple[Path, ...]:
     Raises:
         UsageError: There is none, or the batch's list of its rows is damaged.
     """
+    if not out.exists():
+        raise UsageError(f"{out}: does not exist")
     if (out / RESULT_FILE).is_file():
         return (out,)
     if (out / BATCH_FILE).is_file():

@@ -83,6 +83,8 @@ def batch(
         Ledger(out).opened() as ledger,
         ClassProgress(quiet) as progress,
     ):
+        if grading is not None:
+            progress.say(f"sandbox: {grading.enclosure}")
         names, rows = _rows(submissions, roster, out, staging, progress)
         for problem in names.problems if names else ():
             progress.note(f"{roster or submissions}: {problem}")

@@ -92,8 +92,10 @@ def canvas(
 
     try:
         text = canvas.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{canvas} cannot be read: {error}") from error
+    except OSError as error:
+        raise UsageError(f"{canvas}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{canvas}: is not UTF-8: name the file as Canvas exports it") from error
     filled = canvas_csv(read_results(out), read_canvas(text, str(canvas)), column)
     write_whole(output, filled.text)
     _say(f"{output}: {filled.filled} scores")

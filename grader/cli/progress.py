@@ -86,6 +86,11 @@ class ClassProgress:
             pace = self.pace()
             print(f"rosgrade: {told}{f' ({pace})' if pace else ''}", file=sys.stderr, flush=True)
 
+    def say(self, text: str) -> None:
+        """Say something that is good to know."""
+        if not self._quiet:
+            self.note(text)
+
     def note(self, text: str) -> None:
         """Say something that must not be missed."""
         if self._bar is not None:

@@ -19,7 +19,7 @@ from grader.batch.crew import Crew, CrewLost, LocalCrew
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.intake import HandedIn, take_in
-from grader.batch.ledger import Ledger
+from grader.batch.ledger import Entry, Ledger
 from grader.batch.rendering import find_reports
 from grader.errors import GraderFault, UsageError
 from grader.run.runner import Runner
@@ -117,6 +117,27 @@ def test_two_who_handed_in_nothing_did_not_copy_from_each_other(course: Class) -
     assert [done[key].entry.same_as for key in ("cai", "dora", "emil")] == ["ana", "", ""]
     told = notes(list(done.values()))
     assert told["dora"] == told["emil"] == "the submission is empty"
+
+
+def test_each_of_those_who_handed_in_the_same_names_the_others(course: Class) -> None:
+    course.hand_in("dora", "first")
+    told = notes(list(course.grade(course.crew()).values()))
+    assert {key: note.partition(";")[0] for key, note in told.items() if key != "ben"} == {
+        "ana": "the same submission as cai and dora",
+        "cai": "the same submission as ana and dora",
+        "dora": "the same submission as ana and cai",
+    }
+    assert "same" not in told["ben"]
+
+
+def test_of_very_many_the_same_a_few_are_named() -> None:
+    first = Done(Entry("0"), None, fresh=False)
+    same = [Done(Entry(str(number), same_as="0"), None, fresh=False) for number in range(1, 500)]
+    told = notes([first, *same])
+    assert told["0"] == "the same submission as 1, 2, 3, 4, 5 and 494 others"
+    assert told["2"] == "the same submission as 0, 1, 3, 4, 5 and 494 others"
+    assert told["499"] == "the same submission as 0, 1, 2, 3, 4 and 494 others"
+    assert notes([first, *same[:6]])["6"] == "the same submission as 0, 1, 2, 3, 4 and 1 other"
 
 
 def test_what_could_not_be_graded_is_told_on_the_row_of_its_twin_too(course: Class) -> None:

@@ -22,7 +22,7 @@ from grader.batch.files import REPORT_FILE, RESULT_FILE, write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import compare, find, regrade
-from grader.batch.rendering import render_all
+from grader.batch.rendering import find_reports, render_all
 from grader.batch.selftest import Role, Trial, run_trial
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
@@ -423,6 +423,9 @@ def test_a_class_is_not_judged_again_as_of_another_assignment(
 def test_a_folder_without_recordings_is_a_wrong_use(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there are no recordings in it"):
         find(tmp_path)
+    for missing in (find, find_reports):
+        with pytest.raises(UsageError, match="nowhere: does not exist"):
+            missing(tmp_path / "nowhere")
 
 
 def test_the_reports_of_a_class_are_rendered_again_in_their_order(

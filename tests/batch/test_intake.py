@@ -99,6 +99,45 @@ def test_gradescope_s_export_is_read(course: Path, staging: Path) -> None:
     assert named == [("7", "Ana Lopez"), ("wei@example.edu", "Wei Ng")]
 
 
+TEAM = (
+    "submission_11:\n  :submitters:\n  - :name: Ana Lopez\n    :sid: '7'\n"
+    "    :email: ana@example.edu\n  - :name: Bo Du\n    :email: bo@example.edu\n  - :name: Cy\n"
+)
+
+
+def test_everybody_of_a_team_in_gradescope_s_export_has_a_row(course: Path, staging: Path) -> None:
+    folder(course / "submission_11")
+    (course / "submission_metadata.yml").write_text(TEAM)
+    assert [(row.key, row.name) for row in take_in(course, staging)] == [
+        ("7", "Ana Lopez"),
+        ("Cy", "Cy"),
+        ("bo@example.edu", "Bo Du"),
+    ]
+    roster = parse_roster("login,id,email,name\nal,7,,\nbd,8,bo@example.edu,\nc,9,,Cy\n", "r.csv")
+    rows = take_in(course, staging, roster)
+    assert [(row.key, row.problem) for row in rows] == [("al", ""), ("bd", ""), ("c", "")]
+    assert {row.path for row in rows} == {course / "submission_11"}
+
+
+def test_what_the_roster_says_of_a_team_is_not_said_again_by_gradescope(
+    course: Path, staging: Path
+) -> None:
+    folder(course / "submission_11")
+    (course / "submission_metadata.yml").write_text(TEAM)
+    roster = parse_roster("login,submission\nal,submission_11\nbd,submission_11\n", "r.csv")
+    rows = take_in(course, staging, roster)
+    assert [(row.key, row.problem) for row in rows] == [("al", ""), ("bd", "")]
+
+
+def test_gradescope_s_export_is_found_in_the_folder_that_it_was_unpacked_to(
+    course: Path, staging: Path
+) -> None:
+    folder(course / "assignment_1_export" / "submission_11")
+    (course / "assignment_1_export" / "submission_metadata.yml").write_text(TEAM)
+    (course / ".DS_Store").write_text("")
+    assert [row.key for row in take_in(course, staging)] == ["7", "Cy", "bo@example.edu"]
+
+
 def test_a_link_that_leads_to_itself_is_left_out(course: Path, staging: Path) -> None:
     folder(course / "ana")
     (course / "loop").symlink_to("loop")
@@ -298,7 +337,7 @@ def test_a_roster_may_name_paths_and_repositories(tmp_path: Path, staging: Path)
     assert rows["cai"].fault == (
         f"git clone failed: '{tmp_path}/no' does not appear to be a git repository"
     )
-    assert rows["dee"].path is None and rows["dee"].fault == "nowhere does not exist"
+    assert rows["dee"].path is None and rows["dee"].fault == f"{tmp_path}/nowhere does not exist"
     assert rows["eli"].problem == "handed in nothing"
 
 
@@ -351,7 +390,7 @@ def test_a_path_that_no_file_can_have_is_told_on_its_row(tmp_path: Path, staging
     ana, ben, cai = take_in_roster(roster, tmp_path, staging)
     assert ana.path == tmp_path / "here"
     assert ben.fault.endswith("cannot be read: File name too long")
-    assert cai.fault == "a\\x00b does not exist"
+    assert cai.fault == f"{tmp_path}/a\\x00b does not exist"
 
 
 def test_a_roster_may_have_tabs_between_its_cells() -> None:

@@ -69,6 +69,7 @@ def test_a_class_is_graded_and_nobody_is_forgotten(
         "--sandbox", "none",
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr
+    assert "rosgrade: sandbox: none\n" in ended.stderr
     rows = grades(out)
     assert rows["ana"]["score"] == "10"
     assert rows["ana"]["note"] == "the same submission as cai"
