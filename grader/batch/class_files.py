@@ -11,14 +11,18 @@ from pathlib import Path
 from grader.batch.batch import Done
 from grader.batch.files import REPORT_FILE
 from grader.batch.ledger import Ledger
+from grader.checks.finding import Status
 from grader.checks.wording import listing
+from grader.report.clean import one_line
 from grader.report.files import write_whole
 from grader.report.gradebook import cell, plain_csv
 from grader.report.overview import OverviewRow, render_overview
+from grader.report.result_model import Result
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
 _MOST_TWINS = 5
+_LONGEST_WHY = 200
 
 
 def notes(done: Sequence[Done]) -> dict[str, str]:
@@ -57,8 +61,14 @@ def _note(done: Done, same: Sequence[str]) -> str:
     if done.result is not None and done.result.submission.problem:
         parts.append(done.result.submission.problem)
     if done.result is not None and not done.result.graded:
-        parts.append("not graded: see the report")
+        parts.append(f"not graded: {_why_not_graded(done.result)}")
     return "; ".join(part for part in parts if part)
+
+
+def _why_not_graded(result: Result) -> str:
+    """What went wrong on our side, as much of it as a row can hold."""
+    why = next((one_line(c.observed) for c in result.checks if c.status is Status.ERROR), "")
+    return f"{why[: _LONGEST_WHY - 1]}…" if len(why) > _LONGEST_WHY else why
 
 
 def grades_csv(done: Sequence[Done]) -> str:

@@ -21,8 +21,11 @@ from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.intake import HandedIn, take_in
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.rendering import find_reports
+from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
+from grader.report.result import make_result
 from grader.run.runner import Runner
+from tests.report.sample import not_graded
 
 YAML = """\
 rosgrade: 1
@@ -138,6 +141,13 @@ def test_of_very_many_the_same_a_few_are_named() -> None:
     assert told["2"] == "the same submission as 0, 1, 3, 4, 5 and 494 others"
     assert told["499"] == "the same submission as 0, 1, 2, 3, 4 and 494 others"
     assert notes([first, *same[:6]])["6"] == "the same submission as 0, 1, 2, 3, 4 and 1 other"
+
+
+def test_the_row_of_what_was_not_graded_says_why() -> None:
+    sample = not_graded()
+    result = make_result(sample.grade, sample.recordings, sample.facts)
+    observed = next(c.observed for c in result.checks if c.status is Status.ERROR)
+    assert notes([Done(Entry("ana"), result, fresh=True)])["ana"] == f"not graded: {observed}"
 
 
 def test_what_could_not_be_graded_is_told_on_the_row_of_its_twin_too(course: Class) -> None:
