@@ -14,6 +14,7 @@ from grader.errors import UsageError
 from grader.report.files import write_folders
 from grader.report.handout import HANDOUT_FILE
 from grader.starter import package_files, programs, rendered
+from grader.submission.rosdistro import PACKAGES
 
 
 def write_assignment(name: str, folder: Path) -> Path:
@@ -37,6 +38,10 @@ def write_assignment(name: str, folder: Path) -> Path:
         raise UsageError(
             f"{name!r} is a name of Python's own, and the assignment's package could not be "
             "imported: take another one"
+        )
+    if name in PACKAGES:
+        raise UsageError(
+            f"{name!r} is a package of ROS, which the assignment's own would hide: take another id"
         )
     target = folder / name
     if target.exists():

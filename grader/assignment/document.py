@@ -182,10 +182,12 @@ _SCALAR_READERS: dict[str, Any] = {
 _EMPTY_CONTEXT = "while scanning for the next token"
 _ADVICE = {
     "found character '\\t'": "indent with spaces, not with tabs",
+    "that cannot start any token": "a text that begins with it needs quotes",
     "mapping values are not allowed here": "a text with ': ' in it needs quotes, and a key "
     "stands as far to the right as the keys beside it",
     "but found '<block mapping start>'": "is a line indented further than those around it?",
     "but found '-'": "is a list indented less than the list before?",
+    "but got '['": "does a text with brackets or commas need quotes around it?",
     "but found '<scalar>'": "does a text with quotes, brackets or commas need quotes around it?",
 }
 

@@ -9,7 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from grader import resources
-from grader.assignment import interfaces, rules, simulation, stimulation
+from grader.assignment import expected, interfaces, rules, simulation, stimulation
 from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.draft import Draft
 from grader.assignment.model import Assignment, Scenario
@@ -131,6 +131,7 @@ def load_assignment(
         known = interfaces.Interfaces.of(file.parent)
         found += interfaces.problems(source, assignment, checks, known)
         found += stimulation.problems(source, assignment, known)
+        found += expected.problems(source, assignment, checks, known)
     if assignment is None or found:
         raise AssignmentError(file, sorted(found, key=lambda problem: problem.line or 0))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)

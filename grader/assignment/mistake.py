@@ -110,10 +110,17 @@ def _text(kind: str, found: dict[str, Any]) -> str:
     value, context = found.get("input"), found.get("ctx", {})
     if kind in _EXPECTED:
         advice = ": write it in quotes" if kind == "string_type" and _is_scalar(value) else ""
+        if isinstance(value, str) and _EXPECTED[kind].endswith("number"):
+            advice = _number_advice(value)
         return f"expected {_EXPECTED[kind]}, not {_shown(value)}{advice}"
     if kind in ("literal_error", "enum"):
-        allowed = [part.strip("'") for part in _alternatives(context["expected"])]
-        advice = did_you_mean(value, allowed) if isinstance(value, str) else ""
+        parts = _alternatives(context["expected"])
+        advice = ""
+        if isinstance(value, str):
+            allowed = [part.strip("'") for part in parts]
+            advice = did_you_mean(value, allowed)
+            if value in parts:
+                return f"expected {value}, not the text {value!r}: write it without quotes"
         return f"expected {context['expected']}, not {_shown(value)}" + (advice and f".{advice}")
     if kind in _BOUNDS:
         word, key = _BOUNDS[kind]
@@ -132,6 +139,16 @@ def _text(kind: str, found: dict[str, Any]) -> str:
     if kind in ("value_error", "quantity"):
         return message.removeprefix("Value error, ")
     return message[0].lower() + message[1:]
+
+
+def _number_advice(text: str) -> str:
+    """What to write in place of a text that looks like a number."""
+    point = text.replace(",", ".")
+    try:
+        float(point)
+    except ValueError:
+        return ""
+    return f": write {point}" if point != text else ": write it without quotes"
 
 
 _EXPECTED = {

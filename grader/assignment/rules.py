@@ -66,6 +66,15 @@ def _scenario(draft: Draft, index: int, scenario: Scenario) -> Iterator[Problem]
         for key in ("messages", "quiet"):
             if getattr(until, key) is not None:
                 yield problem((*place, "until", key), "no topic is recorded: 'record' is missing")
+    if scenario.world is None:
+        for key in ("robot", "lidar", "odometry", "topics"):
+            if key in scenario.model_fields_set:
+                text = "there is a simulated robot only in a 'world', which is missing"
+                yield problem((*place, key), text)
+        for key in ("at_rest", "travelled"):
+            if any(getattr(one, key) is not None for one in (until, *until.any)):
+                text = f"{key!r} is about the simulated robot: 'world' is missing"
+                yield problem((*place, "until"), text)
     for key, limit in (("quiet", until.quiet), ("elapsed", until.elapsed)):
         if limit is not None and limit >= scenario.timeout:
             shown, timeout = format_duration(limit), format_duration(scenario.timeout)
@@ -98,7 +107,7 @@ def _package(draft: Draft, name: str) -> Package | None:
 
 
 def _no_package(name: str, names: Sequence[str]) -> str:
-    listed = f" The packages are: {', '.join(names)}."
+    listed = f" The packages are: {', '.join(names) or 'none'}."
     return f"{name!r} is not among 'packages'." + (did_you_mean(name, names) or listed)
 
 
@@ -200,10 +209,21 @@ def _check(draft: Draft, index: int, bound: BoundCheck) -> Iterator[Problem]:
                 text = f"there is no scenario {scenario!r}."
                 listed = f" The scenarios are: {', '.join(known)}."
                 yield problem((*place, "scenarios", number), text + (advice or listed))
+        yield from _robot(draft, place, bound)
         yield from _topic(draft, place, bound)
         yield from _stimulus(draft, place, bound)
     yield from asking_problems(draft, place, bound)
     yield from _package_of(draft, place, bound)
+
+
+def _robot(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
+    """A check of the robot's motion needs a robot in each of its scenarios."""
+    if not bound.check.name.startswith("motion."):
+        return
+    for scenario in draft.scenarios_of(bound.spec) or ():
+        if scenario.world is None:
+            text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
+            yield draft.source.problem((*place, "uses"), text)
 
 
 def _topic(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import stat
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +15,7 @@ from typing import Any
 import yaml
 
 from grader.batch.roster import Roster, Student, name_forms, normal
-from grader.errors import RosgradeError, UsageError
+from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
 from grader.submission.archive import SUFFIXES, unpack
 from grader.submission.manifest import MANIFEST
 from grader.submission.members import MIB, ArchiveLimits
@@ -25,6 +26,8 @@ GRADESCOPE_METADATA = "submission_metadata.yml"
 _CANVAS = re.compile(
     r"(?P<name>[^_]+)_(?P<late>LATE_)?(?P<user>\d+)_(?P<attachment>\d+)_(?P<file>.+)", re.DOTALL
 )
+# And Moodle, for a folder of each student or for a single file.
+_MOODLE = re.compile(r"(?P<name>[^_]+)_\d+_assignsubmission_file_.*", re.DOTALL)
 # What Canvas adds to the name of a file that was handed in again: ws-1.zip.
 _AGAIN = re.compile(r"-\d+(?=(\.tar)?\.[^.]+$)")
 _IGNORED = ("__MACOSX",)
@@ -273,7 +276,8 @@ def _entries(
             canvas.setdefault(match["user"], []).append((item, match))
         elif item.is_dir() or item.name.lower().endswith((*SUFFIXES, *_FOREIGN)):
             stem = _stem(item)
-            yield _Entry(shown(stem), item, (stem,))
+            moodle = _MOODLE.fullmatch(stem)
+            yield _Entry(shown(stem), item, (moodle["name"] if moodle else stem,))
         else:
             on_left_out(shown(item.name))
     for files in canvas.values():
@@ -288,12 +292,13 @@ def _stem(item: Path) -> str:
 
 def _of_canvas(files: list[tuple[Path, re.Match[str]]], staging: Path) -> _Entry:
     """One student's files: the only one, or all of them in a folder."""
-    first, match = files[0]
-    path, fault = first, ""
-    if len(files) > 1 or not first.name.lower().endswith(SUFFIXES):
+    match = files[0][1]
+    named = _names(files)
+    path, fault = _only_archive(named), ""
+    if path is None:
         path = staging / f"canvas-{match['user']}"
-        fault = _gather(_names(files), path)
-    late = any(named["late"] for _, named in files)
+        fault = _gather(named, path)
+    late = any(one["late"] for _, one in files)
     return _Entry(
         shown(f"{match['name']}_{match['user']}"),
         path,
@@ -314,18 +319,43 @@ def _names(files: list[tuple[Path, re.Match[str]]]) -> dict[str, Path]:
     return names if len(names) == len(files) else {file.name: file for file, _ in files}
 
 
+def _only_archive(files: Mapping[str, Path]) -> Path | None:
+    """The archive that somebody handed in, perhaps with a report beside it; else None."""
+    archives = [file for name, file in files.items() if name.lower().endswith(SUFFIXES)]
+    # A link may lead to somebody else's.
+    plain = all(stat.S_ISREG(file.lstat().st_mode) for file in files.values())
+    return archives[0] if len(archives) == 1 and plain and MANIFEST not in files else None
+
+
 def _gather(files: Mapping[str, Path], folder: Path) -> str:
-    """Copy files together into a new folder; says what went wrong, or nothing."""
+    """Copy files together into a new folder; says what went wrong, or nothing.
+
+    Several archives, such as one of each package, are unpacked side by side.
+    """
     most = ArchiveLimits().total_bytes
     try:
         if sum(file.lstat().st_size for file in files.values()) > most:
             return f"the files hold more than {most // MIB} MiB"
         folder.mkdir()
         for name, file in files.items():
-            shutil.copyfile(file, folder / name, follow_symlinks=False)
+            if not (name.lower().endswith(SUFFIXES) and _unpacked(file, folder / name)):
+                shutil.copyfile(file, folder / name, follow_symlinks=False)
+    except GraderFault as fault:
+        return str(fault)
     except OSError as error:
         return f"the files cannot be read: {error.strerror or error}"
     return ""
+
+
+def _unpacked(file: Path, folder: Path) -> bool:
+    """Unpack an archive into a new folder; whether it is one."""
+    folder.mkdir()
+    try:
+        unpack(file, folder)
+    except SubmissionError:
+        shutil.rmtree(folder)
+        return False
+    return True
 
 
 def _gradescope(file: Path) -> Mapping[str, Any]:
@@ -355,8 +385,21 @@ def _of_gradescope(item: Path, about: Any) -> Iterator[_Entry]:
 
 def _row(entry: _Entry) -> HandedIn:
     fault = entry.fault or (_BARE if _is_bare(entry.path) else "")
-    path = None if fault else entry.path
+    path = None if fault else _archive_in(entry.path) or entry.path
     return HandedIn(entry.key, path, entry.name, entry.late, fault=fault)
+
+
+def _archive_in(folder: Path) -> Path | None:
+    """What was handed in where a platform has made a folder for it, as Moodle does, or None."""
+    try:
+        inside = list(folder.iterdir()) if folder.is_dir() else []
+        # What a student has in a repository is as they meant it.
+        if any(item.name == ".git" for item in inside):
+            return None
+        return _only_archive({item.name: item for item in inside if not _is_ignored(item)})
+    except OSError:
+        # Why it cannot be read is told by whoever reads it.
+        return None
 
 
 def _with_problem(row: HandedIn, problem: str) -> HandedIn:

@@ -171,4 +171,6 @@ def _kind(value: Any) -> str:
     # A bool counts as a number, for a decoder may give 1 for true.
     if isinstance(value, int | float):
         return "a number"
+    if value is None:
+        return "nothing"
     return "a text" if isinstance(value, str) else type(value).__name__

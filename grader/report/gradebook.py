@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 from grader.checks.finding import Status
 from grader.errors import UsageError
+from grader.nearest import did_you_mean
 from grader.report import words
 from grader.report.clean import one_line
 from grader.report.result_model import Result
@@ -170,6 +171,14 @@ def canvas_csv(
         doubts = (
             f"{title} has {points} points in Canvas and {words.number(ours)} here; the scores are "
             "filled in as they are",
+        )
+    if title not in export.columns:
+        others = [other for other in export.columns if not _DROPPED.search(other)]
+        known = [_CANVAS_ID.sub("", other).strip() for other in others]
+        listed = f" There are: {', '.join(known) or 'none'}."
+        doubts += (
+            f"the gradebook has no column {title!r}: Canvas will offer to make a new assignment of "
+            f"it.{did_you_mean(title, known) or listed}",
         )
     problems: list[str] = []
     taken: dict[int, str] = {}

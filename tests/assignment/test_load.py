@@ -268,6 +268,29 @@ def test_an_end_that_never_comes_is_a_mistake(mistakes: Mistakes, until: str, sa
     assert mistakes(text) == [f"12: scenarios[0].{said}"]
 
 
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("robot: {pose: [0, 0, 0 deg]}", "robot: there is a simulated robot only in a 'world'"),
+        ("lidar: {enabled: false}", "lidar: there is a simulated robot only in a 'world'"),
+        ("until: {at_rest: 1 s}", "until: 'at_rest' is about the simulated robot: 'world' is"),
+        ("until: {any: [{travelled: 1 m}]}", "until: 'travelled' is about the simulated robot:"),
+    ],
+)
+def test_what_is_about_the_robot_needs_a_world(mistakes: Mistakes, key: str, said: str) -> None:
+    (told,) = mistakes(GOOD.replace("timeout: 5 s", f"timeout: 5 s\n    {key}"))
+    assert told.startswith(f"12: scenarios[0].{said}")
+
+
+def test_a_check_of_the_motion_needs_a_world_in_each_of_its_scenarios(write: Write) -> None:
+    folder = write(HEAD + "  - {id: touches, uses: motion.no_contact, points: 1}\n")
+    with pytest.raises(AssignmentError) as caught:
+        load_assignment(folder)
+    (problem,) = caught.value.problems
+    assert (problem.line, problem.where) == (13, "checks[0].uses")
+    assert problem.message == "the scenario 'run' has no 'world', and so no simulated robot"
+
+
 def test_waiting_for_messages_that_are_not_recorded_is_a_mistake(mistakes: Mistakes) -> None:
     text = GOOD.replace(
         "record: [{topic: /cmd_vel, type: geometry_msgs/msg/Twist}]", "until: {messages: 3}"

@@ -49,7 +49,14 @@ def test_a_good_assignment_is_read() -> None:
         ("{id: a, uses: b}", "checks[0]: the key 'points' is missing"),
         ("{id: a, uses: b, points: -1}", "checks[0].points: must be at least 0, not -1"),
         ("{id: a, uses: b, points: x}", "checks[0].points: expected a number, not 'x'"),
-        ("{id: a, uses: b, points: '3'}", "checks[0].points: expected a number, not '3'"),
+        (
+            "{id: a, uses: b, points: '3'}",
+            "checks[0].points: expected a number, not '3': write it without quotes",
+        ),
+        (
+            "{id: a, uses: b, points: '0,5'}",
+            "checks[0].points: expected a number, not '0,5': write 0.5",
+        ),
         ("{id: a, uses: b, points: true}", "checks[0].points: expected a number, not true"),
         ("{id: a, uses: b, points: .inf}", "checks[0].points: expected a finite number, not inf"),
         ("{id: a, uses: b, points: .nan}", "checks[0].points: expected a finite number, not nan"),

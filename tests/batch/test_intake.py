@@ -12,6 +12,7 @@ import pytest
 from grader.batch.intake import take_in, take_in_roster
 from grader.batch.roster import Roster, Student, parse_roster, read_roster
 from grader.errors import UsageError
+from grader.submission.manifest import MANIFEST
 
 
 def folder(path: Path) -> Path:
@@ -97,6 +98,66 @@ def test_gradescope_s_export_is_read(course: Path, staging: Path) -> None:
     rows = take_in(course, staging)
     named = [(row.key, row.name) for row in rows]
     assert named == [("7", "Ana Lopez"), ("wei@example.edu", "Wei Ng")]
+
+
+def canvas_files(course: Path, *names: str) -> None:
+    """Files of one student; an archive holds a package of the same name."""
+    for number, name in enumerate(names):
+        file = course / f"lopezana_90211_{number}_{name}"
+        if name.endswith(".zip"):
+            with zipfile.ZipFile(file, "w") as made:
+                made.writestr(f"{name.removesuffix('.zip')}/{MANIFEST}", "<package/>")
+        else:
+            file.write_text("text")
+
+
+def test_a_report_beside_the_archive_in_canvas_takes_no_points(course: Path, staging: Path) -> None:
+    canvas_files(course, "report.pdf", "ws-1.zip", "Comment.TXT")
+    (row,) = take_in(course, staging)
+    assert (row.path, row.fault) == (course / "lopezana_90211_1_ws-1.zip", "")
+
+
+def test_several_archives_in_canvas_are_unpacked_side_by_side(course: Path, staging: Path) -> None:
+    canvas_files(course, "bot.zip", "bot_msgs.zip", "report.pdf")
+    (course / "lopezana_90211_9_broken.zip").write_text("no archive")
+    (row,) = take_in(course, staging)
+    assert row.path is not None
+    files = sorted(str(f.relative_to(row.path)) for f in row.path.rglob("*") if f.is_file())
+    assert files == [
+        "bot.zip/bot/package.xml",
+        "bot_msgs.zip/bot_msgs/package.xml",
+        "broken.zip",
+        "report.pdf",
+    ]
+
+
+def test_moodle_s_folders_and_files_are_read(course: Path, staging: Path) -> None:
+    ana = course / "Ana Lopez_4711_assignsubmission_file_"
+    archive(ana / "my_ws.zip")
+    (ana / "report.pdf").write_text("text")
+    archive(course / "Wei Ng_4712_assignsubmission_file_ws.zip")
+    roster = parse_roster('login,name\nana,"Lopez, Ana"\nwei,Wei Ng\n', "r.csv")
+    rows = take_in(course, staging, roster)
+    assert [(row.key, row.path) for row in rows] == [
+        ("ana", ana / "my_ws.zip"),
+        ("wei", course / "Wei Ng_4712_assignsubmission_file_ws.zip"),
+    ]
+
+
+@pytest.mark.parametrize("beside", [".git/HEAD", "package.xml", "src/node.py", "b.zip", None])
+def test_an_archive_within_a_submission_is_not_taken_for_it(
+    course: Path, staging: Path, tmp_path: Path, beside: str | None
+) -> None:
+    other = archive(tmp_path / "elsewhere.zip")
+    if beside is None:
+        (course / "ana").mkdir()
+        (course / "ana" / "ws.zip").symlink_to(other)
+    else:
+        archive(course / "ana" / "ws.zip")
+        (course / "ana" / beside).parent.mkdir(exist_ok=True)
+        (course / "ana" / beside).write_text("")
+    (row,) = take_in(course, staging)
+    assert row.path == course / "ana"
 
 
 TEAM = (

@@ -107,6 +107,16 @@ def test_the_points_of_canvas_are_kept_and_others_are_told():
     assert fill([result("90212")], EXPORT.replace(",10,", ',"3,00",')).doubts == ()
 
 
+def test_a_column_that_is_new_to_canvas_is_told():
+    filled = fill([result("90212")], column="ROS2 Publisher")
+    assert filled.doubts == (
+        "the gradebook has no column 'ROS2 Publisher': Canvas will offer to make a new assignment "
+        "of it. Did you mean 'ROS 2 Publisher'?",
+    )
+    (told,) = fill([result("90212")], EXPORT.replace("ROS 2 Publisher (48211)", "Essay")).doubts
+    assert told.endswith("a new assignment of it. There are: Essay.")
+
+
 def test_a_column_that_canvas_would_skip_is_refused():
     locked = EXPORT.replace(",10,", ",(read only),")
     with pytest.raises(UsageError, match=r"Canvas skips the column 'ROS 2 Publisher \(48211\)'"):

@@ -1,0 +1,132 @@
+"""Fields that checks name: those that a message cannot have are told with their line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.load import load_assignment
+from grader.errors import AssignmentError
+
+LESSON = """\
+rosgrade: 1
+id: lesson
+title: A lesson
+packages:
+  - {name: bot, executables: [echo], depends: [rclpy, lab_msgs]}
+scenarios:
+  - id: run
+    launch: [{executable: echo}]
+    record:
+      - {topic: /twist, type: geometry_msgs/msg/Twist}
+      - {topic: /path, type: geometry_msgs/msg/Path}
+      - {topic: /lab, type: lab_msgs/msg/Any}
+    stimuli:
+      - {publish: /text, type: std_msgs/msg/String, message: {data: a}}
+    timeout: 5 s
+checks:
+  - id: fields
+    uses: USES
+    with: {WITH}
+    points: 1
+"""
+DEFINITIONS = {
+    "std_msgs/msg/String": "string data\n",
+    "geometry_msgs/msg/Twist": "Vector3 linear\nVector3 angular\n",
+    "geometry_msgs/msg/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/msg/Path": "Vector3[] points\nfloat32[3] sizes\nint8 KIND=1\n",
+}
+TWIST, PATH = "/twist (geometry_msgs/msg/Twist): ", "/path (geometry_msgs/msg/Path): "
+
+Mistakes = Callable[[str, str], list[str]]
+
+
+@pytest.fixture
+def mistakes(write: Callable[..., Path], ros_with: Callable[..., None]) -> Mistakes:
+    """Load the lesson with a check; each mistake as ``line: place: text``."""
+    ros_with(DEFINITIONS)
+
+    def load(uses: str, parameters: str) -> list[str]:
+        folder = write(LESSON.replace("USES", uses).replace("WITH", parameters))
+        try:
+            load_assignment(folder)
+        except AssignmentError as error:
+            return [f"{one.line}: {one.where}: {one.message}" for one in error.problems]
+        return []
+
+    return load
+
+
+@pytest.mark.parametrize(
+    ("uses", "parameters", "said"),
+    [
+        (
+            "messages.equal",
+            "topic: /twist, value: {linaer: {x: 1.0}}",
+            f"value: {TWIST}the message has no field 'linaer'; it has angular, linear. Did you "
+            "mean 'linear'?",
+        ),
+        (
+            "messages.equal",
+            "topic: /twist, value: {linear.w: 1.0}",
+            f"value: {TWIST}linear has no field 'w'; it has x, y, z.",
+        ),
+        (
+            "messages.equal",
+            "topic: /twist, value: {linear: 1.0}",
+            f"value: {TWIST}linear is a message: name its fields (x, y, z)",
+        ),
+        (
+            "messages.equal",
+            "topic: /twist, value: {linear.x: 1 m}",
+            f"value: {TWIST}linear.x is a number, but a text is expected of it",
+        ),
+        (
+            "messages.equal",
+            "topic: /twist, value: {linear: {x: }}",
+            f"value: {TWIST}linear.x is a number, but nothing is expected of it",
+        ),
+        (
+            "messages.equal",
+            "topic: /path, value: {KIND: 1}",
+            f"value: {PATH}the message has no field 'KIND'; it has points, sizes.",
+        ),
+        (
+            "messages.follows",
+            "topic: /twist, source: /path, tolerance: 1, fields: {linear.a: 'sizes[0]'}",
+            f"fields.linear.a: {TWIST}linear has no field 'a'; it has x, y, z.",
+        ),
+        (
+            "log.follows",
+            "topic: /text, fields: [data, dat]",
+            "fields[1]: /text (std_msgs/msg/String): the message has no field 'dat'; it has data. "
+            "Did you mean 'data'?",
+        ),
+    ],
+)
+def test_a_field_that_a_message_does_not_have_is_told_with_its_line(
+    mistakes: Mistakes, uses: str, parameters: str, said: str
+) -> None:
+    assert mistakes(uses, parameters) == [f"19: checks[0].with.{said}"]
+
+
+@pytest.mark.parametrize(
+    ("uses", "parameters"),
+    [
+        ("messages.equal", "topic: /twist, value: {linear: {x: 1}, angular.z: 0.5}"),
+        ("messages.equal", "topic: /path, value: {sizes: [1, 2, 3], points: [{x: 1}]}"),
+        ("messages.equal", "topic: /lab, value: {whatever: 1}"),
+        (
+            "messages.follows",
+            "topic: /path, source: /twist, tolerance: 1, fields: {'points[7].x': linear.x}",
+        ),
+        ("log.follows", "topic: /text, fields: [data]"),
+    ],
+    ids=["nested and by path", "arrays", "not at hand here", "an item of an array", "sent"],
+)
+def test_what_a_message_has_or_may_have_is_accepted(
+    mistakes: Mistakes, uses: str, parameters: str
+) -> None:
+    assert mistakes(uses, parameters) == []
