@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.recording.model import NS
+from grader.sandbox.unwaited import Process, Taken, Unwaited
 
 _STAT = Path("/proc/stat")
 _TICK_NS = NS // os.sysconf("SC_CLK_TCK")
@@ -71,12 +72,15 @@ class CpuTimes:
         student_ns: Of the student's processes, with those that they have waited for.
         idle_ns: Of nobody, on the CPUs that may be used; 0 where it is not known.
         own_ns: Of this process, the cell.
+        unwaited: How many processes of the student's have ended since the reading before, if
+            anything of what they took was lost.
     """
 
     time_ns: int
     student_ns: int
     idle_ns: int
     own_ns: int = 0
+    unwaited: int = 0
 
 
 def interval(before: CpuTimes, after: CpuTimes, cpus: int) -> Interval:
@@ -88,11 +92,14 @@ def interval(before: CpuTimes, after: CpuTimes, cpus: int) -> Interval:
         cpus: Number of CPUs.
     """
     all_ns = cpus * (after.time_ns - before.time_ns)
-    # A process that nobody waited for takes its time with it when it ends.
+    # A process that has just ended takes its time with it until its parent is looked at.
     student_ns = max(0, after.student_ns - before.student_ns)
     own_ns = after.own_ns - before.own_ns
     if own_ns > _FLOODED * (after.time_ns - before.time_ns):
         student_ns += own_ns
+    # What they took since they were seen last nobody knows; whoever sees to it that nobody does
+    # cannot have it counted as the machine's.
+    student_ns += after.unwaited * (after.time_ns - before.time_ns)
     idle_ns = max(0, after.idle_ns - before.idle_ns)
     return Interval(before.time_ns, after.time_ns, max(0, all_ns - student_ns - idle_ns))
 
@@ -105,6 +112,7 @@ class CpuMeter:
         self._cpus = os.sched_getaffinity(0)
         # A container's stand-in (lxcfs) calls a CPU idle that another container uses.
         self._knows_idle = not os.path.ismount(_STAT)
+        self._unwaited = Unwaited()
 
     @property
     def cpus(self) -> int:
@@ -115,11 +123,25 @@ class CpuMeter:
         """Read them now.
 
         Args:
-            pids: The student's processes; those that have ended count nothing.
+            pids: The student's processes. Of those that have ended counts what nobody waited
+                for.
         """
-        student_ns = sum(map(_process_ns, pids))
-        own_ns = time.process_time_ns()
-        return CpuTimes(time.monotonic_ns(), student_ns, self._idle_ns(), own_ns)
+        there: dict[Process, Taken] = {}
+        student_ns = 0
+        complete = True
+        for pid in pids:
+            found = _process(pid)
+            complete = complete and found is not None
+            if found is not None:
+                process, taken, own_ns = found
+                there[process] = taken
+                student_ns += own_ns
+        there[Process(os.getpid(), 0)] = _waited_here()
+        self._unwaited.look(there, complete=complete)
+        ticks = sum(taken.waited for taken in there.values()) + self._unwaited.ticks
+        student_ns += ticks * _TICK_NS
+        times = (time.monotonic_ns(), student_ns, self._idle_ns(), time.process_time_ns())
+        return CpuTimes(*times, self._unwaited.ended)
 
     def _idle_ns(self) -> int:
         if not self._knows_idle:
@@ -142,13 +164,22 @@ def idle_ticks(stat: str, cpus: Iterable[int]) -> int:
     return sum(int(row[4]) + int(row[5]) for row in rows if row and row[0] in wanted)
 
 
-def _process_ns(pid: int) -> int:
-    """CPU time of a process with all its threads and all children that it has waited for."""
+def _waited_here() -> Taken:
+    """Of the student's processes that this one, the cell, has waited for."""
+    waited = os.times()
+    return Taken(0, round((waited.children_user + waited.children_system) * NS / _TICK_NS))
+
+
+def _process(pid: int) -> tuple[Process, Taken, int] | None:
+    """A process with all its threads, what it took, and the same of itself in nanoseconds."""
     try:
         own_ns = time.clock_gettime_ns(~pid << 3 | _PROCESS_CLOCK)
         with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  often
             # The command's name may contain anything, but the last ")" ends it.
             fields = file.read().rpartition(b")")[2].split()
-        return own_ns + _TICK_NS * (int(fields[13]) + int(fields[14]))
+        # The numbers of the fields are those of proc(5), less three.
+        user, system, waited_user, waited_system = map(int, fields[11:15])
+        taken = Taken(user + system, waited_user + waited_system)
+        return Process(pid, int(fields[19])), taken, own_ns
     except (OSError, IndexError, ValueError):
-        return 0
+        return None

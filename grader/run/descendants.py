@@ -33,7 +33,7 @@ def descendants(of: int) -> dict[int, str]:
     children: dict[int, list[int]] = {}
     for entry in os.listdir("/proc"):  # noqa: PTH208  names only, and often
         if entry.isdigit():
-            parent = _living_parent(entry)
+            parent = _parent(entry, of_zombie=False)
             if parent is not None:
                 children.setdefault(parent, []).append(int(entry))
     found: dict[int, str] = {}
@@ -59,11 +59,11 @@ class Family:
         self._others: set[int] = set()
 
     def look(self) -> frozenset[int]:
-        """Ids of those that live now."""
+        """Ids of those that are there now; of zombies too, which nobody has waited for yet."""
         present = {int(name) for name in os.listdir("/proc") if name.isdigit()}  # noqa: PTH208
         self._members &= present
         self._others &= present
-        parents = {pid: _living_parent(str(pid)) for pid in present - self._members - self._others}
+        parents = {pid: _parent(str(pid)) for pid in present - self._members - self._others}
         while new := {pid for pid, parent in parents.items() if self._is_member(parent)}:
             self._members |= new
             parents = {pid: parent for pid, parent in parents.items() if pid not in new}
@@ -74,8 +74,8 @@ class Family:
         return pid == self._of or pid in self._members
 
 
-def _living_parent(pid: str) -> int | None:
-    """Parent of a process, or None for one that has ended or is a zombie."""
+def _parent(pid: str, *, of_zombie: bool = True) -> int | None:
+    """Parent of a process, or None for one that has ended."""
     try:
         with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  a scan of all processes
             stat = file.read()
@@ -83,7 +83,7 @@ def _living_parent(pid: str) -> int | None:
         return None
     # The command stands in parentheses and may contain anything; the rest is plain words.
     state, parent = stat[stat.rindex(b")") + 2 :].split(b" ", 2)[:2]
-    return None if state in (b"Z", b"X") else int(parent)
+    return int(parent) if of_zombie or state not in (b"Z", b"X") else None
 
 
 def command_line(pid: int) -> str:

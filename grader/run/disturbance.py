@@ -23,7 +23,8 @@ _TICK_S = 0.02
 _TICKS_PER_SAMPLE = 5
 _STARTING = 3
 _SAMPLES_PER_LOOK = 10
-"""Processes are looked for in the first samples, and in one of so many of the others."""
+"""Processes are looked for in the first samples, in one of so many of the others, and where one
+of those that are known had to wait."""
 _TRIFLE_NS = 2_000_000
 """A wait in one sample that nobody has to explain."""
 _KEPT = 100
@@ -97,8 +98,7 @@ class DisturbanceMeter:
         looks = self._number < _STARTING or self._number % _SAMPLES_PER_LOOK == 0
         self._number += 1
         if looks:
-            self._known = tuple(self._pids())
-            self._run_delays.forget(but=self._known)
+            self._look()
         waited_ns = 0
         for pid in self._known:
             for thread, delay_ns in self._run_delays.read(pid).items():
@@ -106,11 +106,17 @@ class DisturbanceMeter:
                 self._delays[thread] = delay_ns
                 waited_ns = max(waited_ns, delay_ns - before_ns)
         if looks or waited_ns + late_ns > _TRIFLE_NS:
+            if not looks:
+                self._look()
             self._read_cpu_times()
             waited_ns = others_share(waited_ns, self._intervals)
             late_ns = others_share(late_ns, self._intervals)
         self._taken_ns += waited_ns + late_ns
         self._samples.append(Disturbance(time.time_ns(), late_ns, waited_ns))
+
+    def _look(self) -> None:
+        self._known = tuple(self._pids())
+        self._run_delays.forget(but=self._known)
 
     def _read_cpu_times(self) -> None:
         times = self._cpu.read(self._known)

@@ -17,7 +17,14 @@ from pathlib import Path
 from grader.recording.model import Breach
 from grader.sandbox.limits import MIB, Limits, size_words
 from grader.sandbox.namespaces import STUDENT
-from grader.sandbox.usage import hidden_bytes, memory_bytes, open_files, own_bytes, usage_of
+from grader.sandbox.usage import (
+    CpuAccount,
+    hidden_bytes,
+    memory_bytes,
+    open_files,
+    own_bytes,
+    usage_of,
+)
 
 _POLL_S = 0.1
 _LOOKS_PER_SEARCH = 5
@@ -55,6 +62,7 @@ class Watchdog:
         self._breaches: dict[str, Breach] = {}
         self._looks = 0
         self._hidden_bytes = 0
+        self._cpu = CpuAccount()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
 
@@ -89,7 +97,7 @@ class Watchdog:
             words = f"{size_words(own)} of memory where messages wait"
             self._note("memory", words, size_words(_OWN_BYTES))
             self._end_all()
-        if sum(usage.cpu_s for usage in usages) > limits.cpu_s:
+        if self._cpu.taken_s(usages) > limits.cpu_s:
             self._note("cpu time", f"more than {limits.cpu_s} s of CPU time", f"{limits.cpu_s} s")
             self._end_all()
         threads = sum(usage.threads for usage in usages)

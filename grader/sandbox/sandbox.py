@@ -23,6 +23,7 @@ from grader.sandbox.namespaces import MOUNT_POINTS
 from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
 from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
 from grader.sandbox.usage import (
+    CpuAccount,
     folder_usage,
     hidden_bytes,
     memory_bytes,
@@ -221,6 +222,7 @@ class BuildRoom:
     environment: Mapping[str, str] = field(
         default_factory=lambda: dict(bubblewrap.PLAIN_ENVIRONMENT)
     )
+    _cpu: CpuAccount = field(default_factory=CpuAccount, repr=False)
 
     def command(self, command: Sequence[str], environment: Mapping[str, str]) -> list[str]:
         """The command line that runs a command in it.
@@ -257,7 +259,7 @@ class BuildRoom:
         taken = memory_bytes(usages, limits.memory_bytes, hidden_bytes(usages, room))
         if taken > limits.memory_bytes:
             return f"it took more than {size_words(limits.memory_bytes)} of memory"
-        if sum(usage.cpu_s for usage in usages) > limits.cpu_s:
+        if self._cpu.taken_s(usages) > limits.cpu_s:
             return f"it took more than {limits.cpu_s} s of CPU time"
         if sum(usage.threads for usage in usages) >= _NEARLY_ALL * limits.processes:
             return f"it started {limits.processes} processes"

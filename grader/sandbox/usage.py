@@ -9,6 +9,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from grader.sandbox.unwaited import Process, Taken, Unwaited
+
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PROC = "/proc"
@@ -22,7 +24,8 @@ class Usage(NamedTuple):
         pid: Its id.
         parent: Of its parent.
         session: Of its session.
-        cpu_s: CPU time of it, and of its children that have ended and were waited for.
+        started: When it started, in ticks since the machine did.
+        taken: CPU time of it, and of its children that have ended and were waited for.
         threads: How many it has.
         resident_bytes: Its resident set, pages that it shares with others among them.
     """
@@ -30,9 +33,28 @@ class Usage(NamedTuple):
     pid: int
     parent: int
     session: int
-    cpu_s: float
+    started: int
+    taken: Taken
     threads: int
     resident_bytes: int
+
+
+class CpuAccount:
+    """CPU time of processes that are looked at again and again, of those that have ended too."""
+
+    def __init__(self) -> None:
+        """Nothing was seen yet."""
+        self._unwaited = Unwaited()
+
+    def taken_s(self, usages: Iterable[Usage]) -> float:
+        """What was taken so far, at least.
+
+        Args:
+            usages: Of all processes that there are now.
+        """
+        there = {Process(one.pid, one.started): one.taken for one in usages}
+        self._unwaited.look(there)
+        return (sum(map(sum, there.values())) + self._unwaited.ticks) / _TICKS_PER_S
 
 
 def usage_of(roots: Iterable[int]) -> list[Usage]:
@@ -135,7 +157,8 @@ def _usage(pid: int) -> Usage | None:
             pid=pid,
             parent=int(fields[1]),
             session=int(fields[3]),
-            cpu_s=sum(map(int, fields[11:15])) / _TICKS_PER_S,
+            started=int(fields[19]),
+            taken=Taken(int(fields[11]) + int(fields[12]), int(fields[13]) + int(fields[14])),
             threads=int(fields[17]),
             resident_bytes=int(fields[21]) * _PAGE,
         )

@@ -130,6 +130,20 @@ for number in range(8):
 while True:
     pass
 """
+# Nobody waits for them, so what they take is added to nobody's time.
+RELAY = """\
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+while True:
+    for number in range(8):
+        if os.fork() == 0:
+            while time.process_time() < .3:
+                pass
+            os._exit(0)
+    try:
+        os.wait()
+    except ChildProcessError:
+        pass
+"""
 CALL = """\
 import ctypes, platform
 numbers = {{'x86_64': {x86_64}, 'aarch64': {aarch64}}}
@@ -434,6 +448,9 @@ ATTACKS = {
         named=("keeps the middleware of the node that watches the run busy",),
     ),
     "burns_the_cpus": Attack(HOGS, lost=ALIVE, named=("s of CPU time, 3 s are allowed",)),
+    "burns_the_cpus_in_turns": Attack(
+        RELAY, lost=ALIVE, named=("s of CPU time, 3 s are allowed",)
+    ),
     "injection": Attack(INJECTION, lost=ALIVE, named=("RuntimeError",)),
     "shadows_modules": Attack(
         files={

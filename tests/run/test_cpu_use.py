@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterable
 from itertools import count
 
@@ -133,6 +134,45 @@ def test_a_process_that_takes_its_time_with_it_makes_nobody_owe_anything() -> No
     assert ended.others_ns == 200 * MS
 
 
+@pytest.mark.parametrize("cpus", [2, 4])
+def test_what_is_hidden_is_not_taken_for_the_machine_s(cpus: int) -> None:
+    """Two processes were there, and ended with nobody to wait for them."""
+    after = CpuTimes(100 * MS, 40 * MS, 0, unwaited=2)
+    others_ms = interval(CpuTimes(0, 0, 0), after, cpus).others_ns / MS
+    assert others_ms == max(0, cpus * 100 - 40 - 2 * 100)
+
+
+def test_a_relay_of_processes_that_nobody_waits_for_is_no_disturbance() -> None:
+    script = """
+import os, signal, time
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+while True:
+    for _ in range(2):
+        if os.fork() == 0:
+            while time.process_time() < .05:
+                pass
+            os._exit(0)
+    try:
+        # Both are gone then.
+        os.wait()
+    except ChildProcessError:
+        pass
+"""
+    meter, family = CpuMeter(), Family(os.getpid())
+    with subprocess.Popen([sys.executable, "-S", "-c", script]) as relay:
+        try:
+            first, hidden = meter.read(family.look()), 0
+            until_s = time.monotonic() + 30
+            while hidden < 10 and time.monotonic() < until_s:
+                time.sleep(0.1)
+                hidden += meter.read(family.look()).unwaited
+        finally:
+            relay.kill()
+    # Some of what each took is known, and that each has ended.
+    assert hidden >= 10
+    assert meter.read(family.look()).student_ns - first.student_ns > 100 * MS
+
+
 def test_idle_time_is_read_of_the_cpus_that_may_be_used() -> None:
     stat = (
         "cpu  10 0 10 300 30 0 0 0 0 0\n"
@@ -147,15 +187,19 @@ def test_idle_time_is_read_of_the_cpus_that_may_be_used() -> None:
         idle_ticks("cpu0 5\n", {0})
 
 
-def test_a_process_s_time_holds_that_of_the_children_that_it_waited_for() -> None:
-    burn = "import time\nwhile time.process_time() < 0.3: pass"
+def test_a_process_s_time_counts_when_it_has_ended_as_well() -> None:
+    burn = "import time\nwhile time.process_time() < 0.3: pass\ninput()"
+    command = [sys.executable, "-S", "-c", burn]
     meter = CpuMeter()
-    before = meter.read([os.getpid()])
-    subprocess.run([sys.executable, "-S", "-c", burn], check=True)
-    after = meter.read([os.getpid()])
+    before = meter.read([])
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as child:
+        while meter.read([child.pid]).student_ns - before.student_ns < 250 * MS:
+            time.sleep(0.01)
+        child.communicate(b"\n")
+    after = meter.read([])
     assert after.student_ns - before.student_ns >= 250 * MS
     assert after.time_ns > before.time_ns
-    assert meter.read([]).student_ns == 0
+    assert after.unwaited == meter.read([]).unwaited == 0
     assert meter.cpus == len(os.sched_getaffinity(0))
 
 

@@ -146,7 +146,7 @@ def test_usage_counts_a_process_and_what_it_started() -> None:
         assert own.parent == os.getppid()
         assert own.session == os.getsid(0)
         assert own.threads == len(os.listdir("/proc/self/task"))  # noqa: PTH208
-        assert own.cpu_s > 0
+        assert own.taken.own > 0
         assert below[child.pid].parent == os.getpid()
         assert below[child.pid].session == child.pid
         quick, shared_once = memory_bytes([own], 2**60), memory_bytes([own], 0)
