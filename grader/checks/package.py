@@ -93,9 +93,12 @@ def _why_unreadable(package: PackageRecord) -> Cause | None:
         errors.append(error)
     if not errors:
         return None
+    mend = "Mend this line or the one before it"
+    if "null bytes" in errors[0].message:
+        mend = "Save this file as plain text in UTF-8, not in UTF-16"
     return Cause(
         f"Python cannot read {errors[0]}",
-        "Mend this line or the one before it; `colcon build` prints the error too, but goes on.",
+        f"{mend}; `colcon build` prints the error too, but goes on.",
         Evidence(places=tuple(dict.fromkeys(errors))),
     )
 
@@ -157,10 +160,18 @@ def _why_no_executable(package: PackageRecord, name: str) -> Cause | None:
     if target is not None:
         points_to = dict(package.entry_points).get(name, "")
         entry = f" = {points_to}" if points_to else ""
+        hint = (
+            "An entry of console_scripts is `name = module:function`: the module with its "
+            "package in front, the function as it is called there."
+        )
+        if target.message.endswith("/__init__.py"):
+            hint = (
+                "find_packages() in setup.py leaves out a folder without __init__.py, which may be "
+                "empty: create it there."
+            )
         return Cause(
             f"the entry point {code(name + entry)} leads nowhere: {target}",
-            "An entry of console_scripts is `name = module:function`: the module with its "
-            "package in front, the function as it is called there.",
+            hint,
             Evidence(places=(target,)),
         )
     if name in package.executables:

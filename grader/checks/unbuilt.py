@@ -22,6 +22,8 @@ _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 # What colcon says of its own doings around the tool's output.
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
 _ABORTED = re.compile(r"^Aborted +<<< (\S+)", re.MULTILINE)
+# What setuptools says of data_files, as `ros2 pkg create` writes them.
+_NO_MARKER = re.compile(r"can't copy 'resource/([\w-]+)': doesn't exist")
 _CMAKE = ("ament_cmake", "cmake")
 # What the build adds at the end when it ended colcon itself.
 _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
@@ -163,11 +165,27 @@ def _own(submission: SubmissionRecord, build: BuildRecord, name: str) -> BuildRe
 def _failed(build: BuildRecord, name: str) -> Cause:
     ended = _OURS.search(build.log)
     why = str(build.culprit) if build.culprit else ended[1] if ended else ""
+    marker = _NO_MARKER.search(why)
     return Cause(
         f"`colcon build` failed: {why}" if why else "`colcon build` failed",
-        f"Run `colcon build --packages-select {name}` in the workspace and mend the first error "
-        "that it prints.",
+        _mend_marker(marker[1], name)
+        if marker
+        else f"Run `colcon build --packages-select {name}` in the workspace and mend the first "
+        "error that it prints.",
         _evidence(build, name),
+    )
+
+
+def _mend_marker(named: str, name: str) -> str:
+    """What to do about a file in resource/ that setup.py installs and that is not there."""
+    if named == name:
+        return (
+            f"Create resource/{name}: an empty file with the name of the package, by which ROS "
+            "finds it."
+        )
+    return (
+        f"setup.py calls the package {code(named)} and package.xml {code(name)}: write one name in "
+        "both, in setup.cfg, for the file in resource/ and for the folder of the Python module."
     )
 
 

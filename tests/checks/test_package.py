@@ -220,6 +220,29 @@ class TestBuilds:
         assert f"Python cannot read {error}" in finding.observed
         assert finding.evidence.places == (error,)
 
+    def test_a_module_in_utf_16_has_no_line_to_mend(self):
+        error = SourceError(
+            "src/bot_publisher/bot_publisher/node.py",
+            None,
+            "SyntaxError: source code string cannot contain null bytes",
+        )
+        finding = judge("package.builds", submission(package(syntax_errors=(error,))), package=NAME)
+        assert finding.hint.startswith("Save this file as plain text in UTF-8, not in UTF-16;")
+
+    @pytest.mark.parametrize(
+        ("marker", "hint"),
+        [
+            (NAME, f"Create resource/{NAME}: an empty file"),
+            ("bot_pub", f"setup.py calls the package `bot_pub` and package.xml `{NAME}`: write"),
+        ],
+    )
+    def test_the_file_in_resource_is_not_there(self, marker, hint):
+        said = f"can't copy 'resource/{marker}': doesn't exist or not a regular file"
+        error = SourceError("src/bot_publisher/setup.py", None, said)
+        subject = submission(package(), build=failed_build(NAME, culprit=error))
+        finding = judge("package.builds", subject, package=NAME)
+        assert finding.hint.startswith(hint)
+
     def test_a_syntax_error_in_a_file_that_is_not_needed(self):
         unused = SourceError("src/bot_publisher/bot_publisher/old.py", 9, "SyntaxError: ':'")
         subject = submission(package(syntax_errors=(unused,)))
@@ -304,6 +327,12 @@ class TestExecutable:
         assert "`bot_pub = bot_publisher.node:main` leads nowhere" in finding.observed
         assert "no function `main` in node.py" in finding.observed
         assert finding.evidence.places == (target,)
+
+    def test_a_folder_of_modules_without_an_init(self):
+        why = "bot_publisher/node.py is not installed: there is no bot_publisher/__init__.py"
+        target = SourceError("src/bot_publisher/setup.py", 22, why)
+        finding = self.judge(missing_targets=(("bot_pub", target),))
+        assert finding.hint.startswith("find_packages() in setup.py leaves out a folder without")
 
     def test_the_missing_target_of_another_executable_does_not_count(self):
         target = SourceError("src/bot_publisher/setup.py", 22, "no module `x`")
