@@ -6,8 +6,10 @@ a path may be too long for the system. So what lies too deep is taken away befor
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
+import stat
 import subprocess
 from pathlib import Path
 
@@ -26,31 +28,49 @@ def remove_tree(path: Path) -> None:
 
 
 def cut_deep(folder: Path) -> bool:
-    """Remove what lies too deep in a folder.
+    """Remove what lies too deep in a folder, and let its owner read all else.
+
+    Whoever filled it may have taken the right to do so from himself, and so from us.
 
     Args:
         folder: Nobody writes to it any more.
 
     Returns:
-        Whether there was anything.
+        Whether anything was too deep.
     """
     found = False
     ahead = [(os.fsencode(folder), 0)]
     while ahead:
         path, depth = ahead.pop()
         try:
-            entries = [entry for entry in os.scandir(path) if entry.is_dir(follow_symlinks=False)]
+            _grant(path, os.lstat(path).st_mode)
+            entries = [
+                (entry.path, entry.stat(follow_symlinks=False).st_mode)
+                for entry in os.scandir(path)
+            ]
         except OSError:
             continue
-        for entry in entries:
-            if depth < MOST_DEEP and len(entry.path) <= _LONGEST_PATH:
-                ahead.append((entry.path, depth + 1))
+        for inside, mode in entries:
+            if not stat.S_ISDIR(mode):
+                _grant(inside, mode)
+            elif depth < MOST_DEEP and len(inside) <= _LONGEST_PATH:
+                ahead.append((inside, depth + 1))
             else:
                 found = True
-                _remove_deep(Path(os.fsdecode(entry.path)))
+                _remove_deep(Path(os.fsdecode(inside)))
     return found
 
 
+def _grant(path: bytes, mode: int) -> None:
+    """Give the owner of a file or folder what it takes to read it, and to remove what is in it."""
+    wanted = stat.S_IRWXU if stat.S_ISDIR(mode) else stat.S_IRUSR if stat.S_ISREG(mode) else 0
+    if mode & wanted != wanted:
+        # What is somebody else's stays as it is.
+        with contextlib.suppress(OSError):
+            os.chmod(path, stat.S_IMODE(mode) | wanted)  # noqa: PTH101  bytes
+
+
 def _remove_deep(path: Path) -> None:
-    # It goes from folder to folder, with neither recursion nor the whole path.
-    subprocess.run(["rm", "-rf", "--", path], stderr=subprocess.DEVNULL, check=False)
+    # They go from folder to folder, with neither recursion nor the whole path.
+    for command in (["chmod", "-R", "u+rwX"], ["rm", "-rf"]):
+        subprocess.run([*command, "--", path], stderr=subprocess.DEVNULL, check=False)

@@ -54,6 +54,23 @@ def test_what_lies_too_deep_is_cut_off_and_all_else_stays(name: str, tmp_path: P
     assert not cut_deep(tmp_path)
 
 
+def test_nobody_keeps_its_owner_from_reading_a_tree(tmp_path: Path) -> None:
+    file, locked, link = tmp_path / "a" / "b" / "file", tmp_path / "a", tmp_path / "link"
+    file.parent.mkdir(parents=True)
+    file.touch()
+    link.symlink_to(tmp_path.parent)
+    before = tmp_path.parent.stat().st_mode
+    for path in (file, file.parent, locked):
+        path.chmod(0o010)
+    assert not cut_deep(tmp_path)
+    assert [path.stat().st_mode & 0o777 for path in (locked, file.parent, file)] == [
+        0o710,
+        0o710,
+        0o410,
+    ]
+    assert tmp_path.parent.stat().st_mode == before
+
+
 def test_a_scratch_folder_is_gone_however_deep_it_is() -> None:
     with Scratch("test") as scratch:
         dig(scratch / "deep", MORE_THAN_PYTHON_RECURS)
