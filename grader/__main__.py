@@ -1,5 +1,18 @@
-"""``python -m grader`` is the command ``rosgrade``."""
+"""The command ``rosgrade``, also as ``python -m grader``."""
 
-from grader.cli.app import main
+import sys
 
-main()
+_INTERRUPTED = 130
+
+
+def main() -> None:
+    """Run it; Ctrl-C while it is still being imported ends it as at any other time."""
+    try:
+        from grader.cli.app import main as run
+    except KeyboardInterrupt:
+        sys.exit(_INTERRUPTED)
+    run()
+
+
+if __name__ == "__main__":
+    main()

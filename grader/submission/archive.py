@@ -145,6 +145,8 @@ def _plain_tar(
         for mark, what in _FOREIGN.items():
             if start.startswith(mark):
                 raise Refused(f"is {what}; hand in a .zip or .tar.gz")
+        if not start:
+            raise Refused("is empty: it holds 0 bytes")
         raise Refused("is neither a folder nor a .zip or .tar.gz archive")
     # A tar has up to two blocks of 512 bytes beside each member, and what is left out of it
     # counts here as well.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -128,3 +130,22 @@ def test_a_number_of_jobs_that_is_none_is_told(
     ended = rosgrade("batch", place, tmp_path, "--out", tmp_path / "out", f"--jobs={jobs}")
     assert ended.returncode == 2
     assert "must be auto or a number from 1 on" in ended.stderr and "Traceback" not in ended.stderr
+
+
+PRESSED = """
+import sys
+from grader.__main__ import main
+class Pressed:
+    def find_spec(name, *_):
+        if name == "grader.cli.app":
+            raise KeyboardInterrupt
+sys.meta_path.insert(0, Pressed)
+main()
+"""
+
+
+def test_ctrl_c_at_the_very_start_ends_it_without_a_traceback() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", PRESSED], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")

@@ -226,7 +226,7 @@ def test_garbage_between_two_members_is_not_taken_for_the_end(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        (b"", "neither"),
+        (b"", "is empty"),
         (b"import rclpy\n", "neither a folder nor a .zip"),
         (b"Rar!\x1a\x07\x00", "a RAR archive"),
         (b"7z\xbc\xaf\x27\x1c", "a 7z archive"),
