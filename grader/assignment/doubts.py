@@ -8,6 +8,9 @@ from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Scenario, Visibility
 from grader.assignment.mutant import Mutant
 from grader.assignment.stimulus import Join, Publish
+from grader.assignment.unit import format_duration
+from grader.checks.messages import Count
+from grader.checks.timing import Period
 from grader.nearest import did_you_mean
 
 
@@ -20,6 +23,7 @@ def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterat
     """
     yield from _unknown_topics(loaded)
     yield from _shown_runs(loaded)
+    yield from _short_runs(loaded)
     if mutants is None:
         yield "there is no mutants.yaml: nothing shows that the checks notice mistakes"
         return
@@ -45,6 +49,31 @@ def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
                         f"the check {bound.spec.id!r} is about {topic!r}, which the scenario "
                         f"{scenario.id!r} neither records nor sends.{did_you_mean(topic, known)}"
                     )
+
+
+def _short_runs(loaded: LoadedAssignment) -> Iterator[str]:
+    """Runs that end before there can be as many messages as a check needs."""
+    for bound in loaded.checks:
+        period_s = 0.0
+        if isinstance(bound.parameters, Period):
+            period_s, needed = bound.parameters.period, bound.parameters.at_least + 1
+        elif isinstance(bound.parameters, Count):
+            needed = bound.parameters.exactly or bound.parameters.at_least or 0
+        else:
+            continue
+        for scenario in loaded.scenarios_of(bound):
+            ends = ""
+            if scenario.until.model_fields_set == {"messages"} and len(scenario.record) == 1:
+                most = scenario.until.messages or needed
+                ends = f"{most} messages" if most < needed else ""
+            if needed * period_s > scenario.timeout:
+                ends = format_duration(scenario.timeout)
+            if ends:
+                every = f", one every {format_duration(period_s)}" if period_s else ""
+                yield (
+                    f"the check {bound.spec.id!r} needs {needed} messages{every}, but the scenario "
+                    f"{scenario.id!r} ends after {ends}"
+                )
 
 
 def _shown_runs(loaded: LoadedAssignment) -> Iterator[str]:
