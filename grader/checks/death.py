@@ -78,8 +78,8 @@ _HINTS = {
     "InvalidTopicNameException": "A topic name has letters, digits, `_` and `/` only. No part of "
     "it begins with a digit, and it does not end with `/`.",
     "InvalidNodeNameException": "A node name has letters, digits and `_` only.",
-    "EOFError": "A launched node has no keyboard, so input() cannot read: take the value from a "
-    "ROS parameter.",
+    "EOFError": "A launched node has no keyboard, so input() cannot read: take a value from a ROS "
+    "parameter, and keep the node alive with rclpy.spin(node).",
     "RecursionError": "A function calls itself without end.",
     "MemoryError": "Look for a list or an image that grows without end.",
 }

@@ -88,6 +88,8 @@ def why_not_logged(
     near = _near(recording, wanted, within_ns)
     return (
         _behind(recording, topic, wanted, near, decimals, within_ns)
+        # What a late line shows may look like something else of the message that came before it.
+        or why_slow(recording, topic, _seen(topic, found))
         or _elsewhere(recording, topic, wanted, near, decimals)
         or _other_values(recording, topic, wanted, near, decimals)
         or _silent(recording, topic)

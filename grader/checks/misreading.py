@@ -32,7 +32,7 @@ def explain(printed: Sequence[float], wanted: Wanted, missing: Sequence[str], de
     for path in missing:
         value = wanted.values[path]
         for number in printed:
-            relation = _relation(number, value)
+            relation = _relation(number, value, decimals)
             if relation:
                 return f"shows {relation.format(path=code(path))}"
     others = [name for number in printed for name in _names(number, wanted, decimals)]
@@ -40,15 +40,17 @@ def explain(printed: Sequence[float], wanted: Wanted, missing: Sequence[str], de
     return f"shows {listing(map(code, named), last='or')}" if named else ""
 
 
-def _relation(number: float, value: float) -> str:
+def _relation(number: float, value: float, decimals: int) -> str:
     """How a number is made of a value."""
     if not (math.isfinite(number) and math.isfinite(value)) or not value:
         return ""
-    for decimals in (1, 0):
-        if number and math.isclose(number, round(value, decimals), abs_tol=1e-9):
-            words = "1 decimal" if decimals else "no decimals"
+    for kept in (1, 0):
+        if number and math.isclose(number, round(value, kept), abs_tol=1e-9):
+            words = "1 decimal" if kept else "no decimals"
             return f"{{path}} rounded to {words}"
-    if math.isclose(number, -value, rel_tol=0.005):
+    if number and number == math.trunc(value):
+        return "{path} cut off at the decimal point"
+    if number * value < 0.0 and shows(number, -value, decimals):
         return "{path} with the opposite sign"
     if value.is_integer() and abs(number - value) == 1.0:
         return "{path} plus 1" if number > value else "{path} minus 1"

@@ -380,7 +380,9 @@ class TestOtherValues:
         [
             ("1.8", "`ranges[0]` rounded to 1 decimal"),
             ("2", "`ranges[0]` rounded to no decimals"),
+            ("1", "`ranges[0]` cut off at the decimal point"),
             ("-1.834", "`ranges[0]` with the opposite sign"),
+            ("-1.83", "`ranges[0]` with the opposite sign"),
             ("183.4", "100 times the value, as in centimetres, of `ranges[0]`"),
             ("1834 mm", "1000 times the value, as in millimetres, of `ranges[0]`"),
         ],
