@@ -89,7 +89,7 @@ def why_not_logged(
     return (
         _behind(recording, topic, wanted, near, decimals, within_ns)
         # What a late line shows may look like something else of the message that came before it.
-        or why_slow(recording, topic, _seen(topic, found))
+        or why_slow(recording, topic, _late(topic, within_ns))
         or _elsewhere(recording, topic, wanted, near, decimals)
         or _other_values(recording, topic, wanted, near, decimals)
         or _silent(recording, topic)
@@ -100,6 +100,11 @@ def _seen(topic: str, found: Sequence[Echo]) -> str:
     if found:
         return f"log lines follow {counted(len(found), 'message')} on {code(topic)}"
     return f"no log line shows a message on {code(topic)}"
+
+
+def _late(topic: str, within_ns: int) -> str:
+    limit = format_duration(within_ns / NS)
+    return f"no log line shows a message on {code(topic)} within {limit} of it"
 
 
 def _disturbed(

@@ -188,13 +188,14 @@ def test_idle_time_is_read_of_the_cpus_that_may_be_used() -> None:
 
 
 def test_a_process_s_time_counts_when_it_has_ended_as_well() -> None:
-    burn = "import time\nwhile time.process_time() < 0.3: pass\ninput()"
+    burn = "import time\nwhile time.process_time() < 0.3: pass\nprint(flush=True)\ninput()"
     command = [sys.executable, "-S", "-c", burn]
     meter = CpuMeter()
     before = meter.read([])
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as child:
-        while meter.read([child.pid]).student_ns - before.student_ns < 250 * MS:
-            time.sleep(0.01)
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        assert meter.read([child.pid]).student_ns - before.student_ns >= 250 * MS
         child.communicate(b"\n")
     after = meter.read([])
     assert after.student_ns - before.student_ns >= 250 * MS

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import random
+import select
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -28,7 +28,8 @@ for _ in range(5):
         os.wait(), os.wait()
     except ChildProcessError:
         pass
-time.sleep(.3)
+print(flush=True)
+input()
 """
 
 
@@ -110,9 +111,13 @@ def test_nothing_is_lost_of_a_tree_in_which_all_are_waited_for(seed: int) -> Non
 def test_the_time_of_children_counts_whether_they_are_waited_for_or_not(action: str) -> None:
     account = CpuAccount()
     script = RELAY.format(action=action)
-    with subprocess.Popen([sys.executable, "-S", "-c", script]) as parent:
-        taken_s = 0.0
-        while parent.poll() is None:
-            taken_s = max(taken_s, account.taken_s(usage_of([parent.pid])))
-            time.sleep(0.02)
+    command = [sys.executable, "-S", "-c", script]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:
+        # The time between two looks; all have ended when it writes a line.
+        while not select.select([parent.stdout], [], [], 0.02)[0]:
+            account.taken_s(usage_of([parent.pid]))
+        # Who is missing twice has ended for certain.
+        account.taken_s(usage_of([parent.pid]))
+        taken_s = account.taken_s(usage_of([parent.pid]))
+        parent.communicate(b"\n")
     assert 0.3 < taken_s < 1.3
