@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import select
 import time
-from collections.abc import Iterable, Iterator
+import types
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +51,12 @@ class Cell:
     """Runs one scenario from launch to recording."""
 
     def __init__(
-        self, order: CellOrder, domain_id: int, probe: Probe, wire: Wire | None = None
+        self,
+        order: CellOrder,
+        domain_id: int,
+        probe: Probe,
+        wire: Wire | None = None,
+        zygotes: Mapping[str, int] = types.MappingProxyType({}),
     ) -> None:
         """Set the cell up; nothing of the student's runs yet."""
         self._order = order
@@ -58,7 +64,7 @@ class Cell:
         self._probe = probe
         on_line = tell_line if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
-        self._students = StudentProcesses(self._output, order.enclosure)
+        self._students = StudentProcesses(self._output, order.enclosure, zygotes)
         self._other_domains: tuple[int, ...] = ()
         self._graph = GraphObserver(
             probe.node,
@@ -202,10 +208,13 @@ class Cell:
         Raises:
             OSError: It cannot be executed.
         """
-        environment = dict(self._order.environment)
-        environment["ROS_DOMAIN_ID"] = str(self._domain_id)
-        environment["ROSGRADE_HOLD"] = ":".join(topic.name for topic in self._order.topics)
-        self._students.launch(command.name, command.argv, environment, Path(self._order.scratch))
+        of_run = {
+            "ROS_DOMAIN_ID": str(self._domain_id),
+            "ROSGRADE_HOLD": ":".join(topic.name for topic in self._order.topics),
+        }
+        self._students.launch(
+            command.name, command.argv, self._order.environment, of_run, Path(self._order.scratch)
+        )
 
     def _await_node(self) -> Ending | None:
         def seen() -> bool:

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import gc
 import os
-import signal
+import types
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,17 +31,6 @@ if TYPE_CHECKING:
     from grader.sandbox.namespaces import Rights
 
 
-def _reset_signals() -> None:
-    """Let the student's processes inherit the signals that a terminal gives.
-
-    A shell starts background jobs, and `nohup` its command, with some of them ignored; a program
-    that inherits that never sees the Ctrl-C that ends it.
-    """
-    for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_SETMASK, ())
-
-
 def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
     find = definition_finder(Path(prefix) for prefix in order.prefixes)
     return {name: concatenated_definition(name, find) for name in types}
@@ -57,18 +47,23 @@ def _keep(recording: Recording, probe: Probe, order: CellOrder, folder: Path) ->
     tell("recorded")
 
 
-def main(folder: Path, avoid_domains: tuple[int, ...], rights: Rights | None = None) -> int:
+def main(
+    folder: Path,
+    avoid_domains: tuple[int, ...],
+    rights: Rights | None = None,
+    zygotes: Mapping[str, int] = types.MappingProxyType({}),
+) -> int:
     """Get ready, wait for the word, run the order in the folder.
 
     Args:
         folder: The cell's own.
         avoid_domains: Domains not to use.
         rights: In a sandbox: what the cell got hold of before it gave up its rights.
+        zygotes: Descriptors of those that fork, by :func:`grader.run.zygote.key_of`.
     """
     # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
     gc.disable()
     become_subreaper()
-    _reset_signals()
     keep_apart()
     with DomainLock(0) if rights else lock_domain(avoid_domains) as domain:
         probe = Probe(domain.domain_id)
@@ -83,7 +78,7 @@ def main(folder: Path, avoid_domains: tuple[int, ...], rights: Rights | None = N
         wire = rights.wire if rights is not None else None
         probe.listen(order.topics, order.limits)
         try:
-            recording = Cell(order, domain.domain_id, probe, wire).run()
+            recording = Cell(order, domain.domain_id, probe, wire, zygotes).run()
         except Abandoned:
             return 1
         finally:

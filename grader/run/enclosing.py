@@ -14,7 +14,7 @@ from pathlib import Path
 
 from grader.ros import RosInstallation
 from grader.run.enclosure import HOME, WORKSPACE, Enclosure
-from grader.run.environment import TRACER, enclosed_environment
+from grader.run.environment import TRACER, TRACER_IN_SANDBOX, enclosed_environment
 from grader.run.order import CellOrder
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
@@ -23,7 +23,6 @@ from grader.sandbox.namespaces import CELL, STUDENT
 from grader.sandbox.sandbox import TREES, Sandbox, hide
 
 _UID = 1000
-_TRACER = Path("/opt/tracer")
 _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
 _FILTER, _GUARD, _WORLD, _PASSWD_FILE = "student.bpf", "guard.bpf", "world.yaml", "passwd"
 _SYSTEM = "system"
@@ -60,7 +59,7 @@ def enclose(
     seen = {str(path): f"{WORKSPACE}/{place}" for path, place in for_student.items()}
     binds = [
         *(Bind(CELL / place, Path(WORKSPACE, place)) for place in for_student.values()),
-        Bind(TRACER, _TRACER),
+        Bind.same(TRACER_IN_SANDBOX),
     ]
     simulator = order.simulator
     if simulator is not None:
@@ -71,7 +70,9 @@ def enclose(
         commands=tuple(
             replace(command, argv=_moved(command.argv, seen)) for command in order.commands
         ),
-        environment=enclosed_environment(order.environment, {**seen, str(TRACER): str(_TRACER)}),
+        environment=enclosed_environment(
+            order.environment, {**seen, str(TRACER): str(TRACER_IN_SANDBOX)}
+        ),
         prefixes=_moved(order.prefixes, in_cell),
         type_support=_moved(order.type_support, in_cell),
         scratch=str(CELL),
@@ -83,6 +84,7 @@ def enclose(
             calls=sandbox.guarded_calls,
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},
+            may_fork=not (sandbox.libraries or ros.underlays or _has_libraries(install)),
         ),
         facts={
             **order.facts,
@@ -110,6 +112,11 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
         *hide(python),
         *("--remount-ro", "/", "--remount-ro", "/dev"),
     ]
+
+
+def _has_libraries(install: Path) -> bool:
+    """Whether there is a library to load: the linker looks for its folder at the start only."""
+    return any(".so" in file.suffixes for file in install.rglob("*.so*"))
 
 
 def _copy(folders: Iterable[Path], into: Path) -> dict[Path, str]:

@@ -42,6 +42,8 @@ class Enclosure:
         calls: Numbers of the calls that it asks about.
         limits: What its processes may take.
         folders: Folder inside -> where the cell finds it.
+        may_fork: Whether a zygote's process can be what an interpreter would be that is started
+            in it.
     """
 
     arguments: tuple[str, ...]
@@ -50,6 +52,7 @@ class Enclosure:
     calls: dict[str, int]
     limits: Limits
     folders: dict[str, str]
+    may_fork: bool = False
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Enclosure:
@@ -74,6 +77,8 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         argv: Sequence[str],
         environment: Mapping[str, str],
         pass_fds: Sequence[int],
+        *,
+        held: bool = False,
     ) -> None:
         """Start it.
 
@@ -82,6 +87,7 @@ class EnclosedProcess(subprocess.Popen[bytes]):
             argv: What to execute.
             environment: Its variables.
             pass_fds: Descriptors that it inherits.
+            held: Whether its standard input is a pipe of ours.
 
         Raises:
             OSError: It cannot be executed.
@@ -91,7 +97,7 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         self._status, status = os.pipe()
         os.set_blocking(self._status, False)
         self._told = b""
-        self._group: int | None = None
+        self._init: int | None = None
         arguments = [*enclosure.arguments, "--clearenv"]
         for name, value in environment.items():
             arguments += ["--setenv", name, value]
@@ -106,7 +112,7 @@ class EnclosedProcess(subprocess.Popen[bytes]):
                 ],
                 cwd="/",
                 env={"PATH": "/usr/bin:/bin"},
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE if held else subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 pass_fds=(*pass_fds, given, rules, status),
@@ -117,12 +123,17 @@ class EnclosedProcess(subprocess.Popen[bytes]):
                 os.close(descriptor)
 
     @property
-    def group(self) -> int | None:
-        """Process group of the student's process and id of its init; None before there is one."""
-        if self._group is None:
+    def init(self) -> int | None:
+        """First process of the sandbox; None before there is one."""
+        if self._init is None:
             told = self._read_status().get("child-pid")
-            self._group = told if isinstance(told, int) else None
-        return self._group
+            self._init = told if isinstance(told, int) else None
+        return self._init
+
+    @property
+    def group(self) -> int | None:
+        """Process group of the student's process; None before there is one."""
+        return self.init
 
     @property
     def was_set_up(self) -> bool:
@@ -132,7 +143,10 @@ class EnclosedProcess(subprocess.Popen[bytes]):
     @property
     def exit_code(self) -> int | None:
         """As in :mod:`subprocess`: negative for the signal that ended it."""
-        code = self.returncode
+        return self._as_signal(self.returncode)
+
+    @staticmethod
+    def _as_signal(code: int | None) -> int | None:
         if code is not None and code > _SIGNALLED and code - _SIGNALLED in _signal_numbers():
             return _SIGNALLED - code
         return code
@@ -143,16 +157,16 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         Raises:
             ProcessLookupError: It is not there.
         """
-        init = self.group
-        if init is None and number is not signal.SIGKILL:
+        init, group = self.init, self.group
+        if group is None and number is not signal.SIGKILL:
             raise ProcessLookupError
-        if init is None or number is not signal.SIGKILL:
-            os.killpg(init or self.pid, number)
+        if init is None or group is None or number is not signal.SIGKILL:
+            os.killpg(group or self.pid, number)
             return
         # Without its init everything would be gone, and nobody could say what was left behind.
         for pid in descendants(init):
             with contextlib.suppress(ProcessLookupError):
-                if os.getpgid(pid) == init:
+                if os.getpgid(pid) == group:
                     os.kill(pid, number)
 
     def _read_status(self) -> dict[str, Any]:

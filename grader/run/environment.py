@@ -12,6 +12,7 @@ from grader.run.enclosure import HOME
 
 _HERE = Path(__file__).resolve().parent
 TRACER = _HERE / "tracer"
+TRACER_IN_SANDBOX = Path("/opt/tracer")
 PROFILE = _HERE / "fast_discovery.xml"
 RMW = "rmw_fastrtps_cpp"
 

@@ -28,6 +28,7 @@ _NOTIF_RECV, _NOTIF_SEND = 0xC050_2100, 0xC018_2101
 # linux/prctl.h
 _PR_SET_NO_NEW_PRIVS = 38
 _INSTRUCTION_BYTES = 8
+_MORE, _END = b"+", b"."
 # id, process, flags, number, architecture, instruction, six arguments
 _ASKED = struct.Struct("=QIIiIQ6Q")
 # id, value, negative error, flags
@@ -51,7 +52,8 @@ class Guard:
         """
         self._names = {number: name for name, number in calls.items()}
         self._starter = ThreadPoolExecutor(1, "starter")
-        self._listener = self._starter.submit(_install, program, calls["seccomp"]).result()
+        listener = self._starter.submit(_install, program, calls["seccomp"]).result()
+        self._listeners = [] if listener is None else [listener]
         self._deeds: list[str] = []
         self._wake_read, self._wake_write = os.pipe()
         self._thread = threading.Thread(target=self._listen, name="guard", daemon=True)
@@ -70,6 +72,15 @@ class Guard:
         """
         return self._starter.submit(start).result()
 
+    def watch(self, listener: int) -> None:
+        """Answer as well what is asked through another filter.
+
+        Args:
+            listener: Descriptor; closed with the guard.
+        """
+        self._listeners.append(listener)
+        os.write(self._wake_write, _MORE)
+
     @property
     def deeds(self) -> tuple[str, ...]:
         """What the student's processes did so far that nobody may, in words."""
@@ -77,27 +88,32 @@ class Guard:
 
     def close(self) -> None:
         """End; call it when nothing that was started lives any more."""
-        os.write(self._wake_write, b".")
+        os.write(self._wake_write, _END)
         self._thread.join()
         self._starter.shutdown()
-        for descriptor in (self._wake_read, self._wake_write, self._listener):
-            if descriptor is not None:
-                os.close(descriptor)
+        for descriptor in (self._wake_read, self._wake_write, *self._listeners):
+            os.close(descriptor)
 
     def _listen(self) -> None:
-        if self._listener is None:
-            return
         poll = select.poll()
-        poll.register(self._listener, select.POLLIN)
         poll.register(self._wake_read, select.POLLIN)
+        watched = 0
         while True:
-            ready = dict(poll.poll())
-            if self._wake_read in ready:
-                return
-            if ready.get(self._listener, 0) & select.POLLIN:
-                # Whoever asked may have been killed meanwhile.
-                with contextlib.suppress(OSError):
-                    self._answer(self._listener)
+            new = self._listeners[watched:]
+            for descriptor in new:
+                poll.register(descriptor, select.POLLIN)
+            watched += len(new)
+            for descriptor, events in poll.poll():
+                if descriptor == self._wake_read:
+                    if os.read(descriptor, 1) == _END:
+                        return
+                elif events & select.POLLIN:
+                    # Whoever asked may have been killed meanwhile.
+                    with contextlib.suppress(OSError):
+                        self._answer(descriptor)
+                else:
+                    # Nobody is left who could ask.
+                    poll.unregister(descriptor)
 
     def _answer(self, listener: int) -> None:
         asked = bytearray(_ASKED.size)

@@ -6,9 +6,8 @@ costs; here they are paid once for all cells of a batch. Nothing of a student's 
 by it, and it has neither a node nor a thread of its own, so that a fork of it is a whole
 process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without them.)
 
-Students' programs are not forked from it. A sandbox begins with an exec, which drops all that was
-imported; and a program that is forked after the imports does not import in the order of its own
-PYTHONPATH, where a package of the student's may well come before one of ROS.
+Students' programs are not forked from it but from interpreters of their own, which it keeps; see
+:mod:`grader.run.zygote`.
 """
 
 from __future__ import annotations
@@ -26,18 +25,21 @@ import struct
 import subprocess
 import sys
 import threading
+import time
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.run.descendants import kill_tree
-from grader.run.environment import RMW, cell_environment
+from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
 from grader.run.stall import Stall
+from grader.run.zygote import Zygotes
 from grader.sandbox import bubblewrap
+from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.namespaces import CELL, enter
 from grader.sandbox.python_tree import trees_folder
 from grader.scratch import Scratch
@@ -69,7 +71,8 @@ class ForkedCell:
         stdin: It goes on while this is open.
         stdout: Its progress.
         returncode: As in :mod:`subprocess`, or None while it runs.
-        cpu_s: CPU time of it and of all processes of the student, known at its end.
+        cpu_s: CPU time of it and of all processes of the student, and what the nursery and its
+            zygotes took since another one ended; known at its end.
     """
 
     def __init__(
@@ -149,7 +152,13 @@ class Nursery:
         environment = cell_environment(ros, sandboxed=sandbox is not None)
         if sandbox is not None:
             bubblewrap.give(self._cells.path)
-            command = sandbox.nursery_command(command, ros, self._cells.path, environment)
+            command = sandbox.nursery_command(
+                command,
+                ros,
+                self._cells.path,
+                environment,
+                [Bind(TRACER, TRACER_IN_SANDBOX)],
+            )
             environment = bubblewrap.PLAIN_ENVIRONMENT
         with theirs:
             self._popen = subprocess.Popen(
@@ -210,6 +219,18 @@ class Nursery:
                 os.close(descriptor)
         return ForkedCell(open(in_write, "w"), open(out_read), status_read, self._kill)  # noqa: PTH123
 
+    def expect(self, argv: Sequence[str], environment: Mapping[str, str]) -> None:
+        """Say that a cell is about to start a program of a student's in its sandbox.
+
+        Args:
+            argv: Python and the program.
+            environment: Its variables, without those of one run.
+        """
+        asked = {"program": {"argv": list(argv), "environment": dict(environment)}}
+        # Whoever starts the next cell finds out whether it has ended.
+        with contextlib.suppress(OSError):
+            self._socket.send(json.dumps(asked).encode())
+
     def give(self, folder: Path) -> None:
         """Let a cell read and write all that is in its folder."""
         if self._sandbox is not None:
@@ -255,11 +276,16 @@ def _serve(requests: socket.socket) -> None:
     signal.set_wakeup_fd(ended_write, warn_on_full_buffer=False)
     signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
     sources = [requests.fileno(), ended_read]
+    zygotes = Zygotes()
+    told_s = 0.0
     # Without anybody to ask for more, the cells that run are still waited for, but not those
     # that hang: whoever could kill them is gone.
     limit_s: float | None = None
     while len(sources) > 1 or running:
-        readable, _, _ = select.select(sources, [], [], limit_s)
+        heard = zygotes.sockets()
+        readable, _, _ = select.select([*sources, *heard], [], [], limit_s)
+        for descriptor in set(readable) & set(heard):
+            zygotes.hear(descriptor)
         if not readable:
             for pid in running:
                 kill_tree(pid)
@@ -267,15 +293,20 @@ def _serve(requests: socket.socket) -> None:
         if ended_read in readable:
             with contextlib.suppress(BlockingIOError):
                 os.read(ended_read, 4096)
-            _tell_ended(running)
+            own_s = time.process_time() + zygotes.cpu_s
+            if _tell_ended(running, own_s - told_s):
+                told_s = own_s
         if requests.fileno() in readable:
             text, descriptors, _, _ = socket.recv_fds(requests, _REQUEST_BYTES, 4)
             request = json.loads(text) if text else {}
             if request.get("kill") in running:
                 os.kill(request["kill"], signal.SIGKILL)
+            elif "program" in request:
+                zygotes.ask(**request["program"])
             elif "arguments" in request:
-                _fork(requests, request, descriptors, running)
+                _fork(requests, request, descriptors, running, zygotes.ready())
             elif not text:
+                zygotes.close()
                 sources.remove(requests.fileno())
                 limit_s = _ORPHANED_LIMIT_S
 
@@ -285,13 +316,14 @@ def _fork(
     request: dict[str, Any],
     descriptors: list[int],
     running: dict[int, int],
+    zygotes: dict[str, int],
 ) -> None:
     _import(request["imports"])
     *standard, status = descriptors
     pid = os.fork()
     if pid == 0:
         requests.close()
-        _become_cell(request["arguments"], standard, private=request["private"])
+        _become_cell(request["arguments"], standard, zygotes, private=request["private"])
     for descriptor in standard:
         os.close(descriptor)
     running[pid] = status
@@ -300,20 +332,40 @@ def _fork(
         os.write(status, _TOLD.pack(pid, 0.0))
 
 
-def _tell_ended(running: dict[int, int]) -> None:
-    while running:
-        pid, status, usage = os.wait4(-1, os.WNOHANG)
+def _tell_ended(running: dict[int, int], own_s: float) -> bool:
+    """Tell of each cell that has ended.
+
+    Args:
+        running: The cells.
+        own_s: CPU time that nobody was told of yet; it is added to that of the first one.
+
+    Returns:
+        Whether there was one.
+    """
+    has_told = False
+    while True:
+        try:
+            pid, status, usage = os.wait4(-1, os.WNOHANG)
+        except ChildProcessError:
+            return has_told
         if not pid:
-            return
-        descriptor = running.pop(pid)
-        told = _TOLD.pack(os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime)
+            return has_told
+        descriptor = running.pop(pid, None)
+        if descriptor is None:
+            # A zygote.
+            continue
+        cpu_s = usage.ru_utime + usage.ru_stime + (0.0 if has_told else own_s)
+        has_told = True
+        told = _TOLD.pack(os.waitstatus_to_exitcode(status), cpu_s)
         # Whoever asked may be gone.
         with contextlib.suppress(BrokenPipeError):
             os.write(descriptor, told)
         os.close(descriptor)
 
 
-def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool) -> None:
+def _become_cell(
+    arguments: list[str], descriptors: list[int], zygotes: dict[str, int], *, private: bool
+) -> None:
     """Run a cell in this process, which was just forked, and end it."""
     status = 1
     try:
@@ -324,14 +376,16 @@ def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         for target, descriptor in enumerate(descriptors):
             os.dup2(descriptor, target)
-        os.closerange(3, 256)
+        for descriptor in set(range(3, 256)).difference(zygotes.values()):
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
         folder, rights = Path(arguments[0]), None
         if private:
             # As the one that waits for it sees it: nothing of this process can while it stalls.
             stall = Stall(Path("/proc/1"))
             rights = enter(folder, stall.sentence)
             folder = CELL
-        status = main(folder, tuple(map(int, arguments[1:])), rights)
+        status = main(folder, tuple(map(int, arguments[1:])), rights, zygotes)
         sys.stdout.flush()
     except BaseException:
         traceback.print_exc()
@@ -351,8 +405,20 @@ def _import(names: Sequence[str]) -> None:
                 getattr(module, path[-1]).__import_type_support__()
 
 
+def _reset_signals() -> None:
+    """Let students' processes inherit the signals that a terminal gives.
+
+    A shell starts background jobs, and `nohup` its command, with some of them ignored; a program
+    that inherits that never sees the Ctrl-C that ends it.
+    """
+    for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+
+
 def main(descriptor: int) -> int:
     """Import, then serve."""
+    _reset_signals()
     # Python 3.12 warns of every fork beside other threads. These two are LTTng-UST's, which come
     # with rclpy's tracetools, only wait, and belong to none of the locks that a cell takes.
     warnings.filterwarnings("ignore", ".*use of fork", DeprecationWarning)

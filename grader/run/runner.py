@@ -247,6 +247,8 @@ class Runner:
                     seed,
                     worlds,
                 )
+                if order.enclosure is not None and order.enclosure.may_fork:
+                    self._expect(order)
                 recording.parent.mkdir(parents=True, exist_ok=True)
                 launched_ns = time.time_ns()
                 try:
@@ -317,6 +319,13 @@ class Runner:
         if self._nursery is None:
             self._nursery = Nursery(self.ros, self.sandbox)
         return CellProcess(self._nursery, imports)
+
+    def _expect(self, order: CellOrder) -> None:
+        for command in order.commands:
+            if command.argv[0] == str(self.ros.python):
+                with self._lock:
+                    if self._nursery is not None:
+                        self._nursery.expect(command.argv, order.environment)
 
     def _give_back(self, cell: CellProcess) -> None:
         cell.close()

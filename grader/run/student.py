@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import time
+import types
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -16,11 +17,13 @@ from grader.recording.model import NS, Process
 from grader.run.descendants import descendants, is_init, kill_descendants, reap
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.enclosure import EnclosedProcess, Enclosure
+from grader.run.forked import ForkedProcess, NotForked
 from grader.run.guard import Guard
 from grader.run.order import Limits
 from grader.run.output import OutputReader
 from grader.run.shared_memory import remove_orphaned_segments
 from grader.run.stopwatch import Stopwatch
+from grader.run.zygote import key_of
 
 _AFTERMATH_S = 0.5
 _STOP_TICK_S = 0.005
@@ -56,18 +59,25 @@ class _Running:
 class StudentProcesses:
     """All processes that a scenario launches."""
 
-    def __init__(self, output: OutputReader, enclosure: Enclosure | None = None) -> None:
+    def __init__(
+        self,
+        output: OutputReader,
+        enclosure: Enclosure | None = None,
+        zygotes: Mapping[str, int] = types.MappingProxyType({}),
+    ) -> None:
         """Prepare; nothing is started yet.
 
         Args:
             output: Reads what they write.
             enclosure: The sandbox that each of them gets, or None.
+            zygotes: Descriptors of those that fork, by :func:`grader.run.zygote.key_of`.
 
         Raises:
             OSError: Nobody can watch over a sandbox here.
         """
         self._output = output
         self._enclosure = enclosure
+        self._zygotes = zygotes
         self._guard: Guard | None = None
         if enclosure is not None:
             self._guard = Guard.from_file(Path(enclosure.guard), enclosure.calls)
@@ -76,14 +86,20 @@ class StudentProcesses:
         self._survivors: tuple[str, ...] = ()
 
     def launch(
-        self, name: str, argv: tuple[str, ...], environment: Mapping[str, str], folder: Path
+        self,
+        name: str,
+        argv: tuple[str, ...],
+        environment: Mapping[str, str],
+        of_run: Mapping[str, str],
+        folder: Path,
     ) -> None:
         """Start a process in a session of its own.
 
         Args:
             name: ``package/executable``.
             argv: What to execute.
-            environment: Its variables; the tracer's pipe is added.
+            environment: Its variables.
+            of_run: Further variables, of this run; the tracer's pipe is added.
             folder: Working directory.
 
         Raises:
@@ -93,12 +109,12 @@ class StudentProcesses:
         seen_read, seen_write = os.pipe()
         try:
             variables = {
-                **environment,
+                **of_run,
                 "ROSGRADE_TRACER_FD": str(tracer_write),
                 "ROSGRADE_TRACER_PIPE": str(os.fstat(tracer_write).st_ino),
                 "ROSGRADE_SEEN_FD": str(seen_read),
             }
-            popen = self._popen(argv, variables, folder, (tracer_write, seen_read))
+            popen = self._popen(argv, environment, variables, folder, (tracer_write, seen_read))
         except OSError:
             os.close(tracer_read)
             os.close(seen_write)
@@ -117,11 +133,19 @@ class StudentProcesses:
     def _popen(
         self,
         argv: tuple[str, ...],
-        variables: Mapping[str, str],
+        environment: Mapping[str, str],
+        of_run: Mapping[str, str],
         folder: Path,
-        pass_fds: tuple[int, ...],
+        pass_fds: tuple[int, int],
     ) -> subprocess.Popen[bytes]:
+        variables = {**environment, **of_run}
         if self._enclosure is not None and self._guard is not None:
+            zygote = self._zygotes.get(key_of(argv, environment))
+            if zygote is not None and self._enclosure.may_fork:
+                with contextlib.suppress(NotForked):
+                    return ForkedProcess(
+                        self._enclosure, zygote, variables, pass_fds, self._guard.watch
+                    )
             return self._guard.start(
                 partial(EnclosedProcess, self._enclosure, argv, variables, pass_fds)
             )
@@ -139,12 +163,12 @@ class StudentProcesses:
     @property
     def inits(self) -> tuple[int, ...]:
         """The first process of each sandbox that still stands."""
-        groups = [
-            process.popen.group
+        inits = [
+            process.popen.init
             for process in self._running
             if isinstance(process.popen, EnclosedProcess) and process.exited_ns is None
         ]
-        return tuple(group for group in groups if group is not None)
+        return tuple(init for init in inits if init is not None)
 
     @property
     def deeds(self) -> tuple[str, ...]:

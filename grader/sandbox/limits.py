@@ -12,6 +12,18 @@ _CPU_GRACE_S = 10
 """Whoever counts all processes together comes first, and can say what happened."""
 
 
+_OPTIONS = {
+    "as": resource.RLIMIT_AS,
+    "data": resource.RLIMIT_DATA,
+    "nproc": resource.RLIMIT_NPROC,
+    "nofile": resource.RLIMIT_NOFILE,
+    "fsize": resource.RLIMIT_FSIZE,
+    "cpu": resource.RLIMIT_CPU,
+    "core": resource.RLIMIT_CORE,
+}
+"""Of prlimit(1)."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """Bounds of one sandbox.
@@ -64,22 +76,26 @@ class Limits:
                     "with --sandbox none"
                 )
 
+    def rlimits(self) -> dict[int, int]:
+        """What :meth:`prlimit` sets: resource -> bound, soft and hard."""
+        return {
+            resource.RLIMIT_AS: self.address_bytes,
+            resource.RLIMIT_DATA: self.memory_bytes,
+            resource.RLIMIT_NPROC: self.processes,
+            resource.RLIMIT_NOFILE: self.open_files,
+            resource.RLIMIT_FSIZE: self.file_bytes,
+            resource.RLIMIT_CPU: self.cpu_s + _CPU_GRACE_S,
+            resource.RLIMIT_CORE: 0,
+        }
+
     def prlimit(self) -> list[str]:
         """The command in front of what is to be bounded.
 
         The number of processes counts per user and user namespace where it is set inside, and
         over everything of the user where it is set outside.
         """
-        return [
-            "prlimit",
-            f"--as={self.address_bytes}",
-            f"--data={self.memory_bytes}",
-            f"--nproc={self.processes}",
-            f"--nofile={self.open_files}",
-            f"--fsize={self.file_bytes}",
-            f"--cpu={self.cpu_s + _CPU_GRACE_S}",
-            "--core=0",
-        ]
+        bounds = self.rlimits()
+        return ["prlimit", *(f"--{name}={bounds[what]}" for name, what in _OPTIONS.items())]
 
 
 BUILD_OUTPUT_BYTES = 64 * MIB

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import re
 import sys
 import tempfile
 import threading
@@ -35,6 +37,8 @@ LAYERS = ("userns", "netns", "seccomp", "rlimits", "watchdog")
 
 TREES = Path("/run/python")
 """Where a cell finds the Python environments of students."""
+ENVIRONMENT = Path("/run/environment")
+"""Where a cell finds the Python environment of ours."""
 CODE = (Path(grader.__file__).resolve().parent, Path(sim.__file__).resolve().parent)
 
 _CELL_UID, _BUILD_UID = 2000, 1000
@@ -44,6 +48,7 @@ _OPEN_FILES = 4096
 """Of all processes of a build: a compiler and all that drives it have some each."""
 _DATA = CODE[0] / "_data"
 _USR = Path("/usr")
+_SITE = "lib/python3*/site-packages"
 
 
 @dataclass
@@ -163,6 +168,7 @@ class Sandbox:
         ros: RosInstallation,
         cells: Path,
         environment: Mapping[str, str],
+        shown: Sequence[Bind] = (),
     ) -> list[str]:
         """The command line of a nursery whose cells can go into namespaces of their own.
 
@@ -171,10 +177,16 @@ class Sandbox:
             ros: What it runs with.
             cells: Holds the folders of the cells.
             environment: Its variables.
+            shown: What it sees besides.
         """
-        binds = [Bind.same(path) for path in _python_and_ros(ros)]
+        # Students' interpreters start there as well, so Python is what they see of it; what runs
+        # for us finds ours beside.
+        binds = self.student_view(ros)
+        if _in_environment():
+            binds.append(Bind(Path(sys.prefix), ENVIRONMENT))
+            environment = _beside(environment)
         binds += [Bind.same(path) for path in CODE if not _is_within(path, binds)]
-        binds += [Bind(trees_folder(self.cache), TREES), Bind.same(cells, writable=True)]
+        binds += [*shown, Bind(trees_folder(self.cache), TREES), Bind.same(cells, writable=True)]
         arguments = [*bubblewrap.namespaces(_CELL_UID), *bubblewrap.system(), "--tmpfs", "/tmp"]
         for place in MOUNT_POINTS:
             arguments += ["--dir", str(place)]
@@ -287,6 +299,19 @@ def hide(binds: Sequence[Bind]) -> list[str]:
     ]
 
 
+def _beside(environment: Mapping[str, str]) -> dict[str, str]:
+    """Variables of a process of ours where another environment stands in the place of ours."""
+    moved = {
+        name: re.sub(rf"(^|:){re.escape(sys.prefix)}(?=/|:|$)", rf"\1{ENVIRONMENT}", value)
+        for name, value in environment.items()
+        if name != "PATH"
+    }
+    own = Path(sys.prefix)
+    sites = [str(ENVIRONMENT / path.relative_to(own)) for path in own.glob(_SITE)]
+    paths = [path for path in (moved.get("PYTHONPATH"), *sites) if path]
+    return {**environment, **moved, "PYTHONPATH": os.pathsep.join(paths)}
+
+
 def _is_within(path: Path, binds: Iterable[Bind]) -> bool:
     return any(path.is_relative_to(folder) for folder in (Path("/usr"), *(b.target for b in binds)))
 
@@ -298,7 +323,7 @@ def _in_environment() -> bool:
 def _libraries_beside() -> list[Path]:
     base = Path(sys.base_prefix).resolve()
     own = [Path(path).resolve() for path in sys.path]
-    found = base.glob("lib/python3*/site-packages")
+    found = base.glob(_SITE)
     return [path for path in found if _in_environment() and base != _USR and path not in own]
 
 
