@@ -84,9 +84,13 @@ class Batch:
             raise UsageError(f"--retry: there is no submission called {', '.join(sorted(unknown))}")
         paths: dict[str, Path] = {}
         first: dict[str, str] = {}
+        teams = _teams(rows)
         for row in rows:
             on_read(row.key)
-            entry = Entry(row.key, row.name, row.late, problem=row.problem, fault=row.fault)
+            team = teams.get(row.key, "")
+            entry = Entry(
+                row.key, row.name, row.late, problem=row.problem, fault=row.fault, team=team
+            )
             if row.path is not None:
                 entry = self._identified(entry, row.path)
                 distinct = entry.sha256 in ("", NO_FILES)
@@ -250,6 +254,15 @@ class Batch:
     def _write(self) -> None:
         assignment = self.loaded.assignment.id
         self.ledger.write(self._entries.values(), assignment, self.loaded.sha256)
+
+
+def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:
+    """For each of a team, who share what was handed in: the key of the first of them."""
+    shared: dict[Path, list[str]] = {}
+    for row in rows:
+        if row.path is not None:
+            shared.setdefault(row.path, []).append(row.key)
+    return {key: keys[0] for keys in shared.values() if len(keys) > 1 for key in keys}
 
 
 def _link(file: Path, target: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from grader.batch.batch import Done
 from grader.batch.files import REPORT_FILE
-from grader.batch.ledger import Ledger
+from grader.batch.ledger import Entry, Ledger
 from grader.checks.finding import Status
 from grader.checks.wording import listing
 from grader.report.clean import one_line
@@ -34,28 +34,51 @@ def notes(done: Sequence[Done]) -> dict[str, str]:
     Returns:
         By key.
     """
-    same: dict[str, list[str]] = {}
+    same = _same(done)
+    return {item.entry.key: _note(item, same.get(_original(item.entry), ())) for item in done}
+
+
+def copies(done: Sequence[Done]) -> int:
+    """How many submissions are the same as another one; what a team shares is one.
+
+    Args:
+        done: Every row.
+    """
+    return sum(len({_hand(entry) for entry in same}) - 1 for same in _same(done).values())
+
+
+def _same(done: Sequence[Done]) -> dict[str, list[Entry]]:
+    """Rows with the same submission, by the key of the one that was graded for all of them."""
+    originals = {item.entry.same_as for item in done}
+    same: dict[str, list[Entry]] = {key: [] for key in originals if key}
     for item in done:
-        if item.entry.same_as:
-            same.setdefault(item.entry.same_as, [item.entry.same_as]).append(item.entry.key)
-    return {
-        item.entry.key: _note(item, same.get(item.entry.same_as or item.entry.key, ()))
-        for item in done
-    }
+        if _original(item.entry) in same:
+            same[_original(item.entry)].append(item.entry)
+    return same
 
 
-def _note(done: Done, same: Sequence[str]) -> str:
+def _original(entry: Entry) -> str:
+    return entry.same_as or entry.key
+
+
+def _hand(entry: Entry) -> str:
+    """Who handed it in: a team did so once."""
+    return entry.team or entry.key
+
+
+def _note(done: Done, same: Sequence[Entry]) -> str:
     """What to say of a row.
 
     Args:
         done: The row.
-        same: Keys of all that have the same submission, itself among them; or none.
+        same: All rows that have the same submission, itself and its team among them; or none.
     """
     parts = [done.entry.fault or done.entry.problem]
-    if same:
+    others = [entry.key for entry in same if _hand(entry) != _hand(done.entry)]
+    if others:
         # A class of 500 that handed in the starter package needs no 500 names on each row.
-        twins = [key for key in same[: _MOST_TWINS + 1] if key != done.entry.key][:_MOST_TWINS]
-        left = len(same) - 1 - len(twins)
+        twins = others[:_MOST_TWINS]
+        left = len(others) - len(twins)
         named = [*twins, f"{left} {'other' if left == 1 else 'others'}"] if left else twins
         parts.append(f"the same submission as {listing(named)}")
     if done.result is not None and done.result.submission.problem:

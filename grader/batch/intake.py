@@ -46,7 +46,7 @@ class HandedIn:
 
     Attributes:
         key: What the student is called in results; unique.
-        path: What was handed in, or None for nothing.
+        path: What was handed in, or None for nothing; those of a team have the same.
         name: The student's, as people write it, or empty.
         late: Whether the learning platform says so.
         problem: Why there is nothing to grade, or what the instructor should look at.
@@ -129,16 +129,23 @@ def take_in_roster(
             "or name the folder of submissions"
         )
     rows = []
+    # What a team names is fetched once.
+    cloned: dict[str, HandedIn] = {}
     for student in roster.students:
-        rows.append(_from_roster(student, base, staging))
+        row = _from_roster(student, base, staging, cloned.get(student.submission))
+        rows.append(row)
+        if _REPOSITORY.match(student.submission):
+            cloned.setdefault(student.submission, row)
         on_taken(student.key)
     return _unique(rows)
 
 
-def _from_roster(student: Student, base: Path, staging: Path) -> HandedIn:
+def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn | None) -> HandedIn:
     row = HandedIn(student.key, None, student.name, problem=student.problem)
     if not student.submission:
         return _with_problem(row, "handed in nothing")
+    if cloned is not None:
+        return replace(row, path=cloned.path, fault=cloned.fault)
     if _REPOSITORY.match(student.submission):
         target = staging / f"clone-{student.row}"
         problem = _clone(student.submission, target)

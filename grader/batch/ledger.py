@@ -46,6 +46,7 @@ class Entry:
         problem: What the instructor should look at, or why there is nothing to grade.
         same_as: Key of the row with the same submission that was graded for both, or empty.
         fault: Why it could not be graded, where not even a result could be written.
+        team: Key of the first of those who handed it in together, or empty for one alone.
     """
 
     key: str
@@ -55,6 +56,7 @@ class Entry:
     problem: str = ""
     same_as: str = ""
     fault: str = ""
+    team: str = ""
 
 
 class Ledger:

@@ -179,6 +179,8 @@ def _said(done: Done) -> str:
 
 def _summary(done: Sequence[Done], wall_s: float) -> str:
     """The class in one line."""
+    from grader.batch.class_files import copies
+
     results = [item.result for item in done if item.result is not None]
     scores = [result.score for result in results if result.score is not None]
     fresh = sum(item.fresh for item in done)
@@ -186,7 +188,7 @@ def _summary(done: Sequence[Done], wall_s: float) -> str:
     if scores:
         parts.append(f"median {median(scores):g} of {results[0].max_score:g} points")
         parts.append(f"{sum(r.score == r.max_score for r in results)} with full points")
-    same = sum(bool(item.entry.same_as) for item in done)
+    same = copies(done)
     if same:
         parts.append(f"{same} the same as another")
     errors = len(results) - len(scores) + sum(bool(item.entry.fault) for item in done)

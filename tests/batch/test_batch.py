@@ -14,7 +14,7 @@ import pytest
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import NOT_YET, Batch, Done
-from grader.batch.class_files import notes
+from grader.batch.class_files import copies, notes
 from grader.batch.crew import Crew, CrewLost, LocalCrew
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
@@ -131,6 +131,29 @@ def test_each_of_those_who_handed_in_the_same_names_the_others(course: Class) ->
         "dora": "the same submission as ana and cai",
     }
     assert "same" not in told["ben"]
+
+
+def test_a_team_did_not_copy_from_itself_but_may_have_been_copied_from(course: Class) -> None:
+    course.hand_in("dora", "third")
+    (course.folder / "class" / "submission_metadata.yml").write_text(
+        "ana:\n  :submitters:\n  - :name: Ana\n  - :name: Abe\n"
+        "dora:\n  :submitters:\n  - :name: Dora\n  - :name: Dan\n"
+    )
+    done = list(course.grade(course.crew()).values())
+    assert {key: "same submission" in note for key, note in notes(done).items()} == {
+        **dict.fromkeys(("Ana", "Abe", "cai"), True),
+        **dict.fromkeys(("Dora", "Dan", "ben"), False),
+    }
+    told = {key: note.partition(";")[0] for key, note in notes(done).items()}
+    assert told["Ana"] == told["Abe"] == "the same submission as cai"
+    assert told["cai"] == "the same submission as Abe and Ana"
+    assert copies(done) == 1
+    # What is judged again later knows of the teams too.
+    assert {entry.key: entry.team for entry in course.ledger.read()[1]} == {
+        **dict.fromkeys(("Ana", "Abe"), "Abe"),
+        **dict.fromkeys(("Dora", "Dan"), "Dan"),
+        **dict.fromkeys(("ben", "cai"), ""),
+    }
 
 
 def test_of_very_many_the_same_a_few_are_named() -> None:

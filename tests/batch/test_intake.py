@@ -433,6 +433,14 @@ def test_a_repository_whose_head_names_no_branch_is_not_taken_for_empty(
     assert cai.path is not None and not cai.fault
 
 
+def test_a_team_s_repository_is_fetched_once(tmp_path: Path, staging: Path) -> None:
+    url = f"file://{repository(tmp_path / 'one.git', 'refs/heads/main')}"
+    roster = parse_roster(f"login,submission\nana,{url}\nben,{url}\ncai,\n", "roster.csv")
+    ana, ben, cai = take_in_roster(roster, tmp_path, staging)
+    assert ana.path is not None and ana.path == ben.path
+    assert [row.problem for row in (ana, ben, cai)] == ["", "", "handed in nothing"]
+
+
 def test_a_bare_repository_is_told_and_not_graded_as_a_folder(
     course: Path, tmp_path: Path, staging: Path
 ) -> None:
