@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from pydantic import BaseModel
+
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Scenario, Visibility
+from grader.assignment.model import Assignment, Scenario, Visibility
 from grader.assignment.mutant import Mutant
+from grader.assignment.quantity import QuantityOf
 from grader.assignment.stimulus import Join, Publish
-from grader.assignment.unit import format_duration
+from grader.assignment.unit import Dimension, format_duration
+from grader.checks.drive import Drives
 from grader.checks.messages import Count
 from grader.checks.timing import Period
+from grader.checks.tolerance import TimeTolerance
+from grader.checks.wording import percent
 from grader.nearest import did_you_mean
+from grader.submission.dependencies import is_known, meant
 
 
 def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterator[str]:
@@ -24,6 +31,8 @@ def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterat
     yield from _unknown_topics(loaded)
     yield from _shown_runs(loaded)
     yield from _short_runs(loaded)
+    yield from _tolerances(loaded)
+    yield from _dependencies(loaded.assignment)
     if mutants is None:
         yield "there is no mutants.yaml: nothing shows that the checks notice mistakes"
         return
@@ -73,6 +82,48 @@ def _short_runs(loaded: LoadedAssignment) -> Iterator[str]:
                 yield (
                     f"the check {bound.spec.id!r} needs {needed} messages{every}, but the scenario "
                     f"{scenario.id!r} ends after {ends}"
+                )
+
+
+def _tolerances(loaded: LoadedAssignment) -> Iterator[str]:
+    """Tolerances that nothing meets, or that nothing misses."""
+    for bound in loaded.checks:
+        # What a tolerance means in a check of the author's own is theirs to know.
+        if bound.spec.python is not None:
+            continue
+        for key in sorted(bound.parameters.model_fields_set):
+            share = _share(bound.parameters, key)
+            told = f"the check {bound.spec.id!r} has {key!r} {percent(share or 0.0)}"
+            if share == 0.0 and not isinstance(bound.parameters, Drives):
+                yield f"{told}: what is measured is never exact, so right programs fail it"
+            elif share is not None and share >= 1.0:
+                yield f"{told}: so wide that even next to 0 is near enough"
+
+
+def _share(parameters: BaseModel, key: str) -> float | None:
+    """A tolerance as a share of what is expected; None for what is none, or cannot be one."""
+    value = getattr(parameters, key)
+    if isinstance(value, TimeTolerance):
+        expected_s = getattr(parameters, "period", None) or getattr(parameters, "duration", None)
+        if value.relative or value.amount == 0.0:
+            return value.amount
+        return value.amount / expected_s if expected_s else None
+    form = type(parameters).model_fields[key].metadata
+    is_ratio = any(isinstance(o, QuantityOf) and o.dimension is Dimension.RATIO for o in form)
+    return value if is_ratio and key.endswith("tolerance") else None
+
+
+def _dependencies(assignment: Assignment) -> Iterator[str]:
+    """What a solution is said to need, and that seems not to exist."""
+    own = {package.name for package in assignment.packages}
+    for package in assignment.packages:
+        for name in package.depends:
+            if is_known(name, installed=(), submitted=own) is False:
+                near = meant(name, own)
+                advice = f" Did you mean {near!r}?" if near else ""
+                yield (
+                    f"the package {package.name!r} depends on {name!r}, which is not known as a "
+                    f"package of ROS 2 Jazzy or a rosdep key.{advice}"
                 )
 
 

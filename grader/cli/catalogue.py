@@ -33,6 +33,7 @@ def validate(
     from grader.assignment.doubts import doubts
     from grader.assignment.load import load_assignment
     from grader.assignment.mutation import MUTANTS_FILE, load_mutants
+    from grader.sandbox.python_tree import not_installed
 
     broken = 0
     for name in files:
@@ -44,7 +45,9 @@ def validate(
             print_error(str(error))
             broken += 1
             continue
-        for doubt in doubts(loaded, mutants.mutants if mutants else None):
+        told = [*doubts(loaded, mutants.mutants if mutants else None)]
+        told += not_installed(loaded.assignment.libraries)
+        for doubt in told:
             print_warning(f"{loaded.file}: {doubt}")
         tested = f", {counted(len(mutants.mutants), 'mutant')}" if mutants else ""
         typer.echo(

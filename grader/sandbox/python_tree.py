@@ -130,16 +130,29 @@ def check_installed(libraries: Collection[str]) -> None:
     Raises:
         GraderFault: It is not.
     """
+    for lack in not_installed(libraries):
+        raise GraderFault(lack)
+
+
+def not_installed(libraries: Collection[str]) -> list[str]:
+    """Say of each library that is not there what it is, and how it gets there.
+
+    Args:
+        libraries: Distributions that the assignment allows.
+    """
     if not libraries:
-        return
+        return []
     installed = set(_installed())
-    for name in libraries:
-        if _normal(name) not in installed:
-            raise GraderFault(
-                f"the assignment allows the library {name!r}, which is not installed here."
-                f"{did_you_mean(name, sorted(installed))} To install it: "
-                f"{sys.executable} -m pip install {name}"
-            )
+    return [_lack(name, installed) for name in libraries if _normal(name) not in installed]
+
+
+def _lack(name: str, installed: Collection[str]) -> str:
+    near = did_you_mean(name, installed)
+    return (
+        f"the assignment allows the library {name!r}, which is not installed here.{near} "
+        f"{'Otherwise install it' if near else 'To install it'}: "
+        f"{sys.executable} -m pip install {name}"
+    )
 
 
 def unlisted(modules: Collection[str], libraries: Collection[str]) -> tuple[str, ...]:

@@ -61,3 +61,50 @@ def test_a_run_that_may_go_on_is_not_doubted(tmp_path: Path, run: str, uses: str
 @pytest.mark.parametrize("name", list_assignments())
 def test_what_is_shipped_leaves_no_doubt(name: str) -> None:
     assert [one for one in doubts(load_assignment(name), None) if "mutants" not in one] == []
+
+
+def all_told(folder: Path, checks: str, depends: str = "") -> list[str]:
+    (folder / "lesson").mkdir()
+    text = HEAD.replace("executables:", f"depends: [{depends}]\n    executables:") + checks
+    (folder / "lesson" / "assignment.yaml").write_text(text, encoding="utf-8")
+    loaded = load_assignment(folder / "lesson")
+    return [one for one in doubts(loaded, []) if not one.startswith("no mutant")]
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "doubt"),
+    [
+        ("tolerance: 0 %", "'tolerance' 0 %: what is measured is never exact"),
+        ("tolerance: 0 ms", "'tolerance' 0 %: what is measured is never exact"),
+        ("tolerance: 200 %", "'tolerance' 200 %: so wide that even next to 0 is near enough"),
+        ("tolerance: 300 ms", "'tolerance' 100 %: so wide that even next to 0 is near enough"),
+        ("spread: 100 %", "'spread' 100 %: so wide"),
+    ],
+)
+def test_a_tolerance_that_nothing_or_everything_meets_is_told(
+    tmp_path: Path, tolerance: str, doubt: str
+) -> None:
+    parameters = f"{{topic: /cmd_vel, period: 300 ms, {tolerance}}}"
+    check = f"  - {{id: some, uses: timing.period, with: {parameters}, points: 1}}\n"
+    (told_,) = all_told(tmp_path, check)
+    assert told_.startswith(f"the check 'some' has {doubt}")
+
+
+@pytest.mark.parametrize("tolerance", ["1 %", "99 %", "15 ms", "0.5"])
+def test_a_tolerance_that_some_meet_is_not_doubted(tmp_path: Path, tolerance: str) -> None:
+    parameters = f"{{topic: /cmd_vel, period: 300 ms, tolerance: {tolerance}, outliers: 0 %}}"
+    check = f"  - {{id: some, uses: timing.period, with: {parameters}, points: 1}}\n"
+    assert all_told(tmp_path, check) == []
+
+
+def test_a_dependency_that_is_a_slip_is_told_and_one_that_is_merely_unknown_is_not(
+    tmp_path: Path,
+) -> None:
+    check = "  - {id: some, uses: node.alive, points: 1}\n"
+    known = "rclpy, geometry_msgs, python3-numpy, bot, our_own_drivers_of_2024"
+    assert all_told(tmp_path, check, f"{known}, geometry_msg, rospy") == [
+        "the package 'bot' depends on 'geometry_msg', which is not known as a package of "
+        "ROS 2 Jazzy or a rosdep key. Did you mean 'geometry_msgs'?",
+        "the package 'bot' depends on 'rospy', which is not known as a package of "
+        "ROS 2 Jazzy or a rosdep key.",
+    ]

@@ -97,6 +97,13 @@ def test_another_distribution_in_the_shell_is_not_the_student_s_fault(
     assert "ROS 2 humble is sourced" in ended.stderr
 
 
+def test_a_library_that_is_not_there_is_a_doubt(rosgrade: Rosgrade, tmp_path: Path) -> None:
+    ended = rosgrade("validate", lesson(tmp_path, "title: Test", "title: Test\nlibraries: [scypi]"))
+    assert ended.returncode == 0
+    assert "warning" in ended.stderr
+    assert "'scypi', which is not installed here. Did you mean 'scipy'?" in ended.stderr
+
+
 def test_every_assignment_of_ours_is_valid(rosgrade: Rosgrade) -> None:
     names = [folder.name for folder in sorted((ROOT / "assignments").iterdir())]
     ended = rosgrade("validate", *names, columns=300)
