@@ -81,15 +81,23 @@ def _lacks(
             yield ("fields", inside), str(error)
 
 
-def _sample(interface: str, find: Find) -> dict[str, Any]:
+def _sample(interface: str, find: Find, around: tuple[str, ...] = ()) -> dict[str, Any]:
     """A message of a type, with one value in each of its arrays.
 
+    Args:
+        interface: The type.
+        find: Finds definitions.
+        around: Types that it stands in.
+
     Raises:
-        KeyError: A definition is missing.
+        KeyError: A definition is missing, or is of a message that holds itself, of which
+            :mod:`grader.assignment.interfaces` tells.
     """
+    if interface in around:
+        raise KeyError(interface)
     found: dict[str, Any] = {}
     for name, field in fields_of(interface, find(interface)).items():
         plain: Any = "" if field.type in TEXTS else 0
-        value = _sample(field.type, find) if field.is_message else plain
+        value = _sample(field.type, find, (*around, interface)) if field.is_message else plain
         found[name] = [value] if field.is_array else value
     return found

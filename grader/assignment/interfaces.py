@@ -16,6 +16,7 @@ from grader.assignment.name import INTERFACE
 from grader.assignment.source import Source
 from grader.errors import GraderFault, Problem
 from grader.nearest import did_you_mean
+from grader.recording.interface import DefinitionError, sections_of
 from grader.submission.rosdistro import PACKAGES
 
 FOLDER = "interfaces"
@@ -129,6 +130,10 @@ def _unknown(
     source: Source, place: Place, interface: str, elsewhere: set[str], known: Interfaces
 ) -> Iterator[Problem]:
     if known.has(interface):
+        circle = _circle((interface,), known, set())
+        if circle:
+            text = f"no message can hold itself: {' -> '.join(circle)}"
+            yield source.problem(place, text)
         return
     package, kind, name = interface.split("/")
     if package in known.packages:
@@ -143,6 +148,31 @@ def _unknown(
             "not among 'packages' nor what they have in 'depends'."
         )
         yield source.problem(place, text + did_you_mean(package, known.packages))
+
+
+def _circle(way: tuple[str, ...], known: Interfaces, seen: set[str]) -> tuple[str, ...]:
+    """The way from an interface through its fields until one comes again; nothing if none does.
+
+    Args:
+        way: Interfaces, of which each has a field of the next.
+        known: Definitions at hand.
+        seen: Those that lead to no circle; more are added.
+    """
+    try:
+        sections = sections_of(way[-1], known.find(way[-1]))
+    except (KeyError, DefinitionError):
+        # What is missing or broken here may be there and right where it is built.
+        sections = ()
+    types = (field.type for part in sections for field in part.fields if field.is_message)
+    for inner in dict.fromkeys(types):
+        if inner in way:
+            return (*way[way.index(inner) :], inner)
+        if inner not in seen:
+            circle = _circle((*way, inner), known, seen)
+            if circle:
+                return circle
+    seen.add(way[-1])
+    return ()
 
 
 def _played(assignment: Assignment) -> Iterator[tuple[Place, str]]:

@@ -44,7 +44,7 @@ def value_at(message: Mapping[str, Any], path: str) -> Any:
         if isinstance(here, Mapping):
             if step not in here:
                 raise NoSuchField(
-                    f"{done} has no field {step!r}; it has {', '.join(sorted(here))}."
+                    f"{done} has no field {step!r}; it has {', '.join(sorted(here)) or 'none'}."
                     + did_you_mean(step, here)
                 )
             here = here[step]

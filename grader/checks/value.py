@@ -74,7 +74,7 @@ def _expect(names: list[str], item: Any, message: Any, path: str, found: dict[st
             raise NoSuchField(f"{here} has no field {name!r}: it is a plain value")
         if name not in message:
             raise NoSuchField(
-                f"{here} has no field {name!r}; it has {', '.join(sorted(message))}."
+                f"{here} has no field {name!r}; it has {', '.join(sorted(message)) or 'none'}."
                 + did_you_mean(name, message)
             )
         _expect(names[1:], item, message[name], f"{path}.{name}" if path else name, found)

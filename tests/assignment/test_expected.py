@@ -130,3 +130,18 @@ def test_what_a_message_has_or_may_have_is_accepted(
     mistakes: Mistakes, uses: str, parameters: str
 ) -> None:
     assert mistakes(uses, parameters) == []
+
+
+def test_of_a_message_that_holds_itself_no_field_is_looked_for(
+    write: Callable[..., Path], ros_with: Callable[..., None]
+) -> None:
+    ros_with({**DEFINITIONS, "geometry_msgs/msg/Vector3": "Twist[] inner\n"})
+    folder = write(
+        LESSON.replace("USES", "messages.equal").replace("WITH", "topic: /twist, value: {a: 1}")
+    )
+    with pytest.raises(AssignmentError) as caught:
+        load_assignment(folder)
+    assert [(one.line, one.message.partition(":")[0]) for one in caught.value.problems] == [
+        (10, "no message can hold itself"),
+        (11, "no message can hold itself"),
+    ]
