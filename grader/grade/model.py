@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 from grader.assignment.model import Assignment, Visibility
 from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
 from grader.checks.finding import Finding, Status
+from grader.grade.first import first_to_fix, reason
 from grader.grade.points import total
 from grader.submission.record import SubmissionRecord
 
@@ -66,6 +68,12 @@ class CheckResult:
             key=lambda item: (SEVERITY.index(item.finding.status), item.finding.credit),
         )
 
+    @property
+    def reason(self) -> Hashable:
+        """Why it did not pass: equal for checks that name the same mistake."""
+        finding = self.decisive.finding
+        return reason(self.id, self.decisive.scenario, finding.observed, finding.evidence)
+
 
 @dataclass(frozen=True)
 class Grade:
@@ -124,16 +132,20 @@ class Grade:
         """Results that were skipped because of a check, directly or not."""
         return tuple(result for result in self.results if check in result.waits_for)
 
-    def first_to_fix(self) -> CheckResult | None:
-        """The failed check that most others wait for; of equals, the author's first.
-
-        None where no check failed.
-        """
-        return max(
-            self.of(Status.FAILED),
-            key=lambda result: len(self.waiting_for(result.id)),
-            default=None,
+    def same_reason(self, check: str) -> tuple[CheckResult, ...]:
+        """Other results that failed for the same reason as a failed check."""
+        reason = self.result(check).reason
+        return tuple(
+            result
+            for result in self.of(Status.FAILED)
+            if result.id != check and result.reason == reason
         )
+
+    def first_to_fix(self) -> CheckResult | None:
+        """The failed check on which most others depend, or None where no check failed."""
+        reasons = {result.id: result.reason for result in self.of(Status.FAILED)}
+        first = first_to_fix(reasons, [result.waits_for for result in self.results])
+        return self.result(first) if first is not None else None
 
     def disturbed_scenarios(self, status: Status) -> tuple[str, ...]:
         """Scenarios that are worth repeating alone, because the host disturbed them.

@@ -143,10 +143,7 @@ def _output(result: Result) -> str:
     if not result.graded:
         return "\n".join([_NOT_GRADED, *_notes(copy)])
     lines = [f"**{explanation.score(copy)}.** {explanation.headline(copy)}"]
-    first = next((check for check in copy.checks if check.id == copy.first_to_fix), None)
-    if first is not None:
-        lines += ["", f"**Fix this first:** {markdown.prose(first.title)}"]
-    return "\n".join([*lines, *_notes(copy)])
+    return "\n".join([*lines, *markdown.first_to_fix(copy), *_notes(copy)])
 
 
 def _notes(result: Result) -> Iterator[str]:

@@ -108,10 +108,17 @@ def _head(result: Result) -> str:
         "",
         explanation.headline(result),
     ]
+    return "\n".join([*lines, *first_to_fix(result), ""])
+
+
+def first_to_fix(result: Result) -> list[str]:
+    """What to mend first, and where; no lines where nothing failed."""
     first = next((check for check in result.checks if check.id == result.first_to_fix), None)
-    if first is not None:
-        lines += ["", f"**Fix this first:** {prose(first.title)}"]
-    return "\n".join([*lines, ""])
+    if first is None:
+        return []
+    place = words.first_place(first)
+    where = f" ({literal(place)})" if place else ""
+    return ["", f"**Fix this first:** {prose(first.title)}{where}"]
 
 
 def _table(result: Result) -> str:

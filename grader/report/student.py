@@ -7,6 +7,7 @@ from dataclasses import replace
 from grader.assignment.model import Visibility
 from grader.assignment.withheld import Withheld
 from grader.checks.finding import Status
+from grader.grade.first import first_to_fix, reason
 from grader.grade.model import CheckResult, Grade
 from grader.grade.points import total
 from grader.report.result_model import CheckPart, Result, WithheldPart
@@ -37,7 +38,7 @@ def for_student(result: Result) -> Result:
             "score": total(check.points for check in visible) if graded else None,
             "max_score": total(check.max_points for check in visible),
             "graded": graded,
-            "first_to_fix": first_to_fix(visible),
+            "first_to_fix": _first_to_fix(visible),
             "checks": tuple(_without_traceback(check) for check in visible),
             "withheld": WithheldPart(
                 checks=result.withheld.checks + len(hidden),
@@ -79,11 +80,14 @@ def grade_for_student(grade: Grade) -> Grade:
     )
 
 
-def first_to_fix(checks: tuple[CheckPart, ...]) -> str | None:
-    """Id of the failed check that most others wait for; of equals, the first. None: none failed."""
-    waiting = [name for check in checks for name in check.waits_for]
-    failed = [check.id for check in checks if check.status is Status.FAILED]
-    return max(failed, key=waiting.count, default=None)
+def _first_to_fix(checks: tuple[CheckPart, ...]) -> str | None:
+    """As :meth:`grader.grade.model.Grade.first_to_fix`."""
+    failed = [check for check in checks if check.status is Status.FAILED]
+    reasons = {
+        check.id: reason(check.id, check.scenario, check.observed, check.evidence)
+        for check in failed
+    }
+    return first_to_fix(reasons, [check.waits_for for check in checks])
 
 
 def _without_traceback(check: CheckPart) -> CheckPart:

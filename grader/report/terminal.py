@@ -246,7 +246,9 @@ def _tell_runs(console: Console, recordings: Mapping[str, Recording]) -> None:
 def _conclude(console: Console, grade: Grade, before: Grade | None = None) -> None:
     first = grade.first_to_fix()
     if first is not None:
-        text = f"{_line(console, first.title)}. {words.waiting(grade, first)}".rstrip()
+        place = words.first_place(first)
+        where = f" ({_line(console, place)})" if place else ""
+        text = f"{_line(console, first.title)}{where}. {words.waiting(grade, first)}".rstrip()
         console.print(Text.assemble(("Fix this first: ", "bold"), text))
     if grade.graded:
         score = f"{words.number(grade.score)} of {words.number(grade.max_score)} points"

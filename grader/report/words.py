@@ -11,6 +11,8 @@ from grader.checks.finding import Finding, Status
 from grader.checks.wording import counted
 from grader.grade.model import CheckResult, Grade
 from grader.recording.model import Breach
+from grader.report.result_model import CheckPart, PlacePart
+from grader.submission.record import SourceError
 
 
 @dataclass(frozen=True)
@@ -109,8 +111,23 @@ def counted_points(points: float) -> str:
     return f"{number(points)} point{'' if points == 1 else 's'}"
 
 
+def first_place(first: CheckResult | CheckPart) -> str:
+    """Where in the student's code it is to be mended, as ``file.py:8``; or nothing."""
+    places: Sequence[SourceError | PlacePart] = (
+        first.decisive.finding.evidence.places
+        if isinstance(first, CheckResult)
+        else first.evidence.places
+    )
+    return "".join(place.file + (f":{place.line}" if place.line else "") for place in places[:1])
+
+
 def waiting(grade: Grade, result: CheckResult) -> str:
-    """How many checks wait for a failed one, or nothing."""
+    """How many checks depend on a failed one, or nothing."""
+    same = grade.same_reason(result.id)
+    if same:
+        failed = {result.id, *(other.id for other in same)}
+        count = len(same) + sum(not failed.isdisjoint(one.waits_for) for one in grade.results)
+        return f"{counted(count, 'other check')} did not pass for the same reason."
     count = len(grade.waiting_for(result.id))
     if not count:
         return ""

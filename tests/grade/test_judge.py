@@ -3,7 +3,7 @@
 import pytest
 
 from grader.checks.check import Subject
-from grader.checks.finding import Finding, Status
+from grader.checks.finding import Evidence, Finding, Moment, Status
 from grader.errors import GraderFault
 from grader.grade import grade
 from grader.recording.model import NS, Disturbance, Ending, Truth
@@ -89,6 +89,35 @@ class TestFirstToFix:
     def test_of_equals_it_is_the_one_that_the_author_wrote_first(self):
         result = judge(Told("a"), Told("b", FAIL), Told("c", FAIL))
         assert result.first_to_fix() is result.result("b")
+
+    def test_a_crash_that_fails_several_checks_comes_before_what_only_misses_its_topic(self):
+        place = SourceError("bot.py", 8, "NameError: name 'coutn' is not defined")
+        crashed, again = (
+            Finding.failed("", f"ended after {ended_s} s", evidence=Evidence(places=(place,)))
+            for ended_s in (0.4, 0.5)
+        )
+        result = judge(
+            Told("dependencies", FAIL),
+            Told("alive", crashed),
+            Told("ends", requires=("alive",)),
+            Told("topic", again),
+            Told("type", requires=("topic",)),
+            Told("values", requires=("type",)),
+        )
+        assert result.first_to_fix() is result.result("alive")
+        assert [item.id for item in result.same_reason("alive")] == ["topic"]
+
+    def test_what_ended_in_another_run_may_have_another_reason(self):
+        ended = Evidence(moments=(Moment("bot ended", 0.4),))
+        crashed = Finding.failed("", "ended", evidence=ended)
+        result = judge(
+            Told("alive", {"listen": crashed, "renamed": PASS}),
+            Told("topic", {"listen": PASS, "renamed": crashed}),
+            Told("values", requires=("topic",)),
+            scenarios=("listen", "renamed"),
+        )
+        assert result.first_to_fix() is result.result("topic")
+        assert result.same_reason("topic") == ()
 
 
 class TestScenarios:

@@ -42,7 +42,8 @@ Publish a Twist every 300 ms   ada_lovelace
   where     src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)
   printed   loop took 0.31 s
 
-Fix this first: It publishes every 300 ms. 1 other check waits for it.
+Fix this first: It publishes every 300 ms
+(src/bot_publisher/bot_publisher/node.py:18). 1 other check waits for it.
 Score: 3.02 of 7 points
 """
 AT_120 = """\
@@ -61,7 +62,7 @@ Publish a Twist every 300 ms   ada_lovelace
   where     src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)
   printed   loop took 0.31 s
 
-Fix this first: It publishes every 300 ms. 1 other check waits for it.
+Fix this first: It publishes every 300 ms (src/bot_publisher/bot_publisher/node.py:18). 1 other check waits for it.
 Score: 3.02 of 7 points
 """  # noqa: E501
 

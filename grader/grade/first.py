@@ -1,0 +1,73 @@
+"""Which of the checks that failed a student should mend first. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Protocol
+
+
+class _Place(Protocol):
+    """A line of the student's code with what is wrong there."""
+
+    @property
+    def file(self) -> str: ...
+    @property
+    def line(self) -> int | None: ...
+    @property
+    def message(self) -> str: ...
+
+
+class _Moment(Protocol):
+    """A time in a run."""
+
+    @property
+    def time_s(self) -> float: ...
+
+
+class _Evidence(Protocol):
+    """Where a finding can be seen."""
+
+    @property
+    def places(self) -> Sequence[_Place]: ...
+    @property
+    def moments(self) -> Sequence[_Moment]: ...
+
+
+def reason(check: str, scenario: str | None, observed: str, evidence: _Evidence) -> Hashable:
+    """Why a check failed: equal for those that name the same mistake.
+
+    That is the same line of the student's code, in whichever run, or the same said of the same
+    moment of a run. What names neither is a mistake of its own.
+
+    Args:
+        check: Its id.
+        scenario: The run that decided.
+        observed: What it says of it.
+        evidence: Where that can be seen.
+    """
+    if evidence.places:
+        return tuple((one.file, one.line, one.message) for one in evidence.places)
+    if evidence.moments:
+        return scenario, observed, tuple(moment.time_s for moment in evidence.moments)
+    return check
+
+
+def first_to_fix(reasons: Mapping[str, Hashable], waits: Sequence[Sequence[str]]) -> str | None:
+    """Find the failed check on which most others depend; of equals, the author's first.
+
+    A node that crashed does not stay alive, and has no publisher either: of checks that failed
+    for the same reason the first stands for all, with whatever waits for any of them.
+
+    Args:
+        reasons: Why each check failed, in the author's order; for the same reason, equal.
+        waits: Of each check that was skipped, those that it waits for.
+
+    Returns:
+        The check, or None where none failed.
+    """
+
+    def others(check: str) -> int:
+        same = {name for name, reason in reasons.items() if reason == reasons[check]}
+        return len(same) - 1 + sum(not same.isdisjoint(one) for one in waits)
+
+    return max(reasons, key=others, default=None)
