@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from grader.report.overview import render_overview
@@ -25,6 +27,26 @@ def test_an_overview_is_accessible_quiet_and_fits(look, page_of_few, width, sche
     assert violations(found.page) == []
     assert found.complaints == [] and found.requests == []
     assert found.page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_nothing_that_is_said_of_a_submission_or_a_check_is_cut_off(look, width):
+    note = "handed in twice: a.zip too; " * 5
+    rows = [replace(row, note=note) for row in classroom(FEW)]
+    page = look(render_overview(rows), width).page
+    for said in ("#table .note", "#table .check-name button"):
+        assert page.locator(said).count()
+        assert page.locator(said).evaluate_all(
+            """found => found.every((one) => {
+                const style = getComputedStyle(one);
+                const cell = one.closest("th").getBoundingClientRect();
+                const box = one.getBoundingClientRect();
+                return one.scrollWidth <= one.clientWidth + 1
+                    && one.scrollHeight <= one.clientHeight + 1
+                    && style.textOverflow === "clip"
+                    && box.left >= cell.left - 1 && box.right <= cell.right + 1;
+            })"""
+        )
 
 
 def shown(page):
