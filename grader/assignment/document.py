@@ -181,6 +181,7 @@ _SCALAR_READERS: dict[str, Any] = {
 
 _EMPTY_CONTEXT = "while scanning for the next token"
 _ADVICE = {
+    "a quoted scalar, found unexpected end": "its closing quote is missing",
     "found character '\\t'": "indent with spaces, not with tabs",
     "that cannot start any token": "a text that begins with it needs quotes",
     "mapping values are not allowed here": "a text with ': ' in it needs quotes, and a key "
@@ -207,5 +208,40 @@ def _syntax(error: yaml.YAMLError, text: str) -> Problem:
         marks = (error.problem_mark, error.context_mark)
         mark = next(filter(None, reversed(marks) if unclosed else marks), None)
         line = mark.line + 1 if mark else None
+    quoted = _long_quoted(text, line) if line is not None else None
+    if quoted is not None:
+        begin, end = quoted
+        return Problem(
+            f"not valid YAML: the text in quotes that begins here ends only in line {end}: is its "
+            f"closing quote missing? (line {line}: {message})",
+            begin,
+        )
     advice = next((advice for sign, advice in _ADVICE.items() if sign in message), "")
     return Problem(f"not valid YAML: {message}" + (f" ({advice})" if advice else ""), line)
+
+
+def _long_quoted(text: str, line: int) -> tuple[int, int] | None:
+    """First and last line of a text in quotes over several lines that ends where an error is.
+
+    A quote that is not closed lasts until the next one, wherever that is, and turns all quotes
+    after it inside out.
+
+    Args:
+        text: The document.
+        line: Where the error is.
+    """
+    begin, end = 0, 0
+    try:
+        for token in yaml.scan(text, Loader=yaml.SafeLoader):
+            if token.start_mark.line >= line:
+                break
+            if not isinstance(token, yaml.ScalarToken) or token.style not in ("'", '"'):
+                continue
+            if token.start_mark.line == token.end_mark.line:
+                begin = 0
+            else:
+                begin, end = begin or token.start_mark.line + 1, token.end_mark.line + 1
+    except (yaml.YAMLError, ValueError, OverflowError):
+        # As far as it can be read is far enough; the last two are numbers of no character.
+        pass
+    return (begin, end) if begin and line - end in (0, 1) else None

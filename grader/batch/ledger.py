@@ -20,7 +20,7 @@ from urllib.parse import quote
 
 from grader.batch.files import RESULT_FILE
 from grader.errors import RosgradeError, UsageError
-from grader.report.files import write_whole
+from grader.report.files import check_folder, write_whole
 from grader.report.result import read_result
 from grader.report.result_model import Result
 
@@ -74,6 +74,7 @@ class Ledger:
         Raises:
             UsageError: Another batch writes to it, it holds something else, or it cannot be made.
         """
+        check_folder(self.out)
         try:
             self.out.mkdir(parents=True, exist_ok=True)
             known = {BATCH_FILE, SUBMISSIONS, _PARTIAL, _LOCK}

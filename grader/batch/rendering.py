@@ -36,6 +36,8 @@ def find_reports(out: Path) -> tuple[Path, ...]:
     """
     if not out.exists():
         raise UsageError(f"{out}: does not exist")
+    if not out.is_dir():
+        raise UsageError(f"{out}: is a file; name the folder that {RESULT_FILE} is in")
     if (out / RESULT_FILE).is_file():
         return (out,)
     if (out / BATCH_FILE).is_file():

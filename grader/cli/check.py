@@ -95,12 +95,14 @@ def check(
             from grader.assignment.load import load_assignment
             from grader.assignment.selection import select, visible_part
             from grader.batch.grading import RECORDINGS_FOLDER, Grading
+            from grader.report.files import check_folder
             from grader.submission.locate import check_path
 
             whole = load_assignment(assignment)
             shown = whole if hidden else visible_part(whole)
             loaded = select(shown, tuple(only or ()), tuple(scenario or ()))
             check_path(submission)
+            check_folder(report)
             grading = Grading(loaded, runner, cache_folder(), seed=seed)
             with progress.shown():
                 graded = grading.grade(

@@ -73,6 +73,7 @@ def watch(
     from grader.cli.browser import open_page
     from grader.cli.page import ReportPage
     from grader.errors import UsageError
+    from grader.report.files import check_folder
     from grader.run.runner import Runner
     from grader.submission.locate import check_path
 
@@ -83,6 +84,7 @@ def watch(
 
     loaded = load()
     check_path(submission)
+    check_folder(report)
     progress = GradingProgress(quiet, verbose)
     runner = Runner(
         ros.find(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import secrets
 import shutil
 from collections.abc import Mapping
@@ -40,7 +41,35 @@ def write_whole(file: Path, content: str | bytes) -> None:
             draft.unlink(missing_ok=True)
     except OSError as error:
         kind = GraderFault if error.errno in _OF_THE_DISK else UsageError
-        raise kind(f"{file} cannot be written: {error.strerror}") from error
+        raise kind(f"{file} cannot be written: {_why(file, error)}") from error
+
+
+def check_folder(folder: Path) -> None:
+    """See that a folder is there, or that nothing is in its place.
+
+    Raises:
+        UsageError: Something else is.
+    """
+    other = _in_the_way(folder)
+    if other is not None:
+        named = "" if other == folder else f"{other} "
+        raise UsageError(f"{folder}: {named}is not a folder; name another place")
+
+
+def _in_the_way(folder: Path) -> Path | None:
+    """What is where a folder is needed; None where that cannot be told either."""
+    there = next((one for one in (folder, *folder.parents) if os.path.lexists(one)), None)
+    try:
+        return None if there is None or there.is_dir() else there
+    except OSError:
+        return None
+
+
+def _why(file: Path, error: OSError) -> str:
+    if error.errno == errno.EISDIR:
+        return "it is a folder; name a file"
+    other = _in_the_way(file.parent) if error.errno in (errno.ENOTDIR, errno.EEXIST) else None
+    return f"{other} is not a folder" if other else error.strerror or str(error)
 
 
 def write_folders(place: Path, files: Mapping[str, str]) -> None:
@@ -54,6 +83,7 @@ def write_folders(place: Path, files: Mapping[str, str]) -> None:
     Raises:
         UsageError: They cannot be written there, or one of the folders is there already.
     """
+    check_folder(place)
     draft = place / f".rosgrade-{secrets.token_hex(4)}"
     try:
         try:

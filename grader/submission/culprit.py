@@ -23,6 +23,13 @@ _SETUPTOOLS = re.compile(r"error: (.+)")
 _NO_SETUP_PY = re.compile(r".*can't open file '[^']*setup\.py'")
 _NEVER_CALLED = "setup()' was never called"
 _QUOTED = re.compile(r"'([^']+)'")
+_CONFIG = re.compile(r"'setup\.cfg'[\s,]*\[?line:?\s*(\d+)")
+_BOM = r"\ufeff"
+"""As the reader of setup.cfg shows it."""
+_HAS_BOM = (
+    "begins with a byte order mark (BOM), so its first section is not found: save it as UTF-8 "
+    "without BOM"
+)
 _RUN_SETUP = ", in run_setup"
 _INTERFACE = re.compile(r"Error processing '([^']+)' of package '[^']+': (.+)")
 _INSTALLED = re.compile(r"(?:install|build/[^/]+/build)/lib/(?:python3[^/]*/site-packages/)?(.+)")
@@ -167,6 +174,10 @@ class _Place:
         message = block[-1] if block else ""
         if not self.package:
             return self._while_identifying()
+        if message.startswith("configparser."):
+            config = self._config(message, self.number + len(block))
+            if config is not None:
+                return config
         file, at, in_setup = None, None, False
         for line in block:
             frame = _FRAME.match(line)
@@ -189,6 +200,14 @@ class _Place:
         if any(_READ_OUTPUT in line for line in block):
             return self._setup("setup.py prints something, which colcon takes for its answer")
         return None
+
+    def _config(self, message: str, number: int) -> SourceError | None:
+        """What is wrong in setup.cfg, which setup.py reads and which the error itself names."""
+        said = "\n".join(self.lines[number : number + 3])
+        found = _CONFIG.search(said)
+        if found is None:
+            return None
+        return self._at("setup.cfg", int(found[1]), _HAS_BOM if _BOM in said else message)
 
     def _while_identifying(self) -> SourceError | None:
         """Colcon says only afterwards whose setup.py it ran to learn the package's name."""

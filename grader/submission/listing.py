@@ -194,7 +194,7 @@ def _links_inside(links: dict[str, str], files: list[SubmissionFile]) -> list[Su
 def _leads_out(path: str, target: str) -> str:
     return (
         f"{shown(path)}: the link to {shown(target)!r} leads out of the submission; "
-        "put the file itself there"
+        "put what it leads to there instead"
     )
 
 

@@ -244,7 +244,9 @@ def _no_package(located: Located) -> str:
     if alike:
         return f"{problem}; {shown(alike[0])} must be called package.xml"
     if archives:
-        return f"{problem}; hand in what is in {shown(archives[0])}, not the archive in another"
+        readable = archives[0].lower().endswith(SUFFIXES)
+        how = "and not the archive itself" if readable else "as a .zip"
+        return f"{problem}; hand in what is in {shown(archives[0])}, {how}"
     if any(file.path == ".gitmodules" for file in located.files):
         return f"{problem}; git submodules come empty: commit the package itself"
     if leftovers:

@@ -97,6 +97,23 @@ def test_another_distribution_in_the_shell_is_not_the_student_s_fault(
     assert "ROS 2 humble is sourced" in ended.stderr
 
 
+def test_a_file_in_the_place_of_the_report_is_told_before_anything_is_graded(
+    rosgrade: Rosgrade, tmp_path: Path
+) -> None:
+    (tmp_path / "mine").touch()
+    (tmp_path / "class").mkdir()
+    said = "mine: is not a folder; name another place"
+    for arguments in (
+        ("check", "timed_publisher", ROOT / "reference" / "timed_publisher", "--report", "mine"),
+        ("batch", "timed_publisher", "class", "--out", "mine"),
+        ("start", "timed_publisher", "mine"),
+    ):
+        ended = rosgrade(*arguments)
+        assert ended.returncode == 2
+        assert said in ended.stderr
+        assert "building" not in ended.stderr
+
+
 def test_a_library_that_is_not_there_is_a_doubt(rosgrade: Rosgrade, tmp_path: Path) -> None:
     ended = rosgrade("validate", lesson(tmp_path, "title: Test", "title: Test\nlibraries: [scypi]"))
     assert ended.returncode == 0

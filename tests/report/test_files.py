@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.errors import GraderFault, UsageError
-from grader.report.files import write_whole
+from grader.report.files import check_folder, write_whole
 
 
 def test_folders_are_made_and_text_is_utf_8(tmp_path):
@@ -39,15 +39,27 @@ def test_the_old_file_stays_when_the_new_one_cannot_be_written(tmp_path):
 def test_a_place_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "report").write_text("a file where a folder is needed")
     with pytest.raises(
-        UsageError, match=r"report/result\.json cannot be written: Not a dir|exists"
+        UsageError, match=r"report/result\.json cannot be written: .*/report is not a folder"
     ):
         write_whole(tmp_path / "report" / "result.json", "")
+
+
+@pytest.mark.parametrize("inside", [".", "a", "a/b"])
+def test_a_file_where_a_folder_is_needed_is_named(tmp_path, inside):
+    (tmp_path / "report").write_text("a file")
+    with pytest.raises(UsageError, match="is not a folder; name another place"):
+        check_folder(tmp_path / "report" / inside)
+    (tmp_path / "gone").symlink_to("nowhere")
+    with pytest.raises(UsageError, match="gone: is not a folder"):
+        check_folder(tmp_path / "gone")
+    for folder in (tmp_path, tmp_path / "new" / "one", Path("rosgrade-report")):
+        check_folder(folder)
 
 
 def test_a_folder_in_its_place_is_named_and_no_draft_is_left(tmp_path):
     folder = tmp_path / "result.json"
     folder.mkdir()
-    with pytest.raises(UsageError, match=r"result\.json cannot be written: Is a directory"):
+    with pytest.raises(UsageError, match=r"result\.json cannot be written: it is a folder"):
         write_whole(folder, "text")
     assert list(tmp_path.iterdir()) == [folder]
 

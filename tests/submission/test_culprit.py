@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from textwrap import dedent
 
 import pytest
@@ -43,6 +44,51 @@ def culprit(log: str, *failed: str, sources: Sources = SOURCES) -> str:
 def test_setup_py_that_raises_is_blamed_with_its_line() -> None:
     log = f'Starting >>> bot\n{RUN_SETUP}  File "<string>", line 5, in <module>\nValueError: boom\n'
     assert culprit(log) == "src/bot/setup.py:5: ValueError: boom"
+
+
+READS_CONFIG = f"""\
+Starting >>> bot
+{RUN_SETUP}  File "<string>", line 7, in <module>
+  File "/venv/setuptools/dist.py", line 448, in _parse_config_files
+    parser.read_file(reader)
+"""
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (
+            "MissingSectionHeaderError: File contains no section headers.\n"
+            "file: 'setup.cfg', line: 1\n'\\ufeff[develop]\\n'",
+            "1: begins with a byte order mark (BOM), so its first section is not found: save it "
+            "as UTF-8 without BOM",
+        ),
+        (
+            "MissingSectionHeaderError: File contains no section headers.\n"
+            "file: 'setup.cfg', line: 1\n'[develop\\n'",
+            "1: configparser.MissingSectionHeaderError: File contains no section headers.",
+        ),
+        (
+            "ParsingError: Source contains parsing errors: 'setup.cfg'\n\t[line  2]: 'script_dir'",
+            "2: configparser.ParsingError: Source contains parsing errors: 'setup.cfg'",
+        ),
+        (
+            "DuplicateOptionError: While reading from 'setup.cfg' [line  3]: option 'a' in "
+            "section 'b' already exists",
+            "3: configparser.DuplicateOptionError: While reading from 'setup.cfg' [line  3]: "
+            "option 'a' in section 'b' already exists",
+        ),
+    ],
+    ids=["BOM", "bracket", "no value", "twice"],
+)
+def test_setup_cfg_is_blamed_for_what_is_wrong_in_it_and_not_setup_py(
+    error: str, said: str
+) -> None:
+    sources = replace(SOURCES, files={*FILES, "src/bot/setup.cfg"})
+    log = f"{READS_CONFIG}configparser.{error}\n"
+    assert str(find_culprit(log, ("bot",), sources)) == f"src/bot/setup.cfg:{said}"
+    # Without one of its own it is setup.py that reads something else.
+    assert culprit(log).startswith("src/bot/setup.py:7: configparser.")
 
 
 def test_a_syntax_error_in_setup_py_is_blamed_with_its_line() -> None:
