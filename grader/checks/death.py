@@ -13,6 +13,7 @@ from grader.checks.failure import Failure, fatal_failure, student_place, submiss
 from grader.checks.finding import Evidence, Moment
 from grader.checks.library import lacking_package, library_hint
 from grader.checks.newer_name import newer_name
+from grader.checks.unimported import import_hint
 from grader.checks.wording import code
 from grader.recording.model import Ending, Process, Recording
 
@@ -312,7 +313,7 @@ def _exception_hint(failure: Failure, recording: Recording) -> str:
             "A callback group is an object, not its class: write ReentrantCallbackGroup() and "
             "MutuallyExclusiveCallbackGroup(), with brackets."
         )
-    slip = slip_hint(failure)
+    slip = import_hint(failure.message) if failure.type == "NameError" else slip_hint(failure)
     if slip is not None:
         return slip
     if _enters_init(failure):

@@ -31,7 +31,10 @@ _MAX_DEPTH = 30
 _MAX_DEPENDENCIES = 500
 _DEFAULT_BUILD_TYPE = "catkin"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
-_MISMATCHED_TAG = expat.errors.codes[expat.errors.XML_ERROR_TAG_MISMATCH]
+_UNCLOSED = (
+    expat.errors.codes[expat.errors.XML_ERROR_TAG_MISMATCH],
+    expat.errors.codes[expat.errors.XML_ERROR_NO_ELEMENTS],
+)
 _UNKNOWN_TAGS = re.compile(r"following tags: ([\w, -]+)")
 _QUOTED = re.compile(r"\"([^\"]+)\"|'([^']+)'")
 
@@ -151,7 +154,7 @@ def _parse(data: bytes) -> _Document:
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
-        if error.code == _MISMATCHED_TAG and path:
+        if error.code in _UNCLOSED and path:
             # The place to mend is where the element begins, not where expat noticed.
             document.error = (opened[-1], f"invalid XML: <{path[-1]}> is not closed")
         else:

@@ -106,6 +106,13 @@ class TestExists:
             ("ModuleNotFoundError: No module named 'bot'", "setup.py installs it"),
             ("rclpy.exceptions.NotInitializedException: rclpy.init() has not", "rclpy.init()"),
             (
+                "NameError: name 'Twist' is not defined. Did you mean: 'list'?",
+                "import it at the top of the file: `from geometry_msgs.msg import Twist`",
+            ),
+            ("NameError: name 'rclpy' is not defined", "`import rclpy`. Otherwise it is used"),
+            ("NameError: name 'self' is not defined", "only in a method that takes it"),
+            ("NameError: name 'coutn' is not defined", "used before it is defined, misspelt"),
+            (
                 "rclpy.exceptions.ParameterNotDeclaredException: Invalid access to undeclared",
                 "declare_parameter",
             ),

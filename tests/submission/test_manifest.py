@@ -103,6 +103,12 @@ def test_a_tag_that_is_not_closed_is_blamed_where_it_begins() -> None:
     assert (manifest.name, manifest.build_type) == ("bot_publisher", None)
 
 
+def test_a_last_tag_that_is_missing_is_named() -> None:
+    assert str(changed("</package>", "").error) == (
+        "src/bot/package.xml:2: invalid XML: <package> is not closed"
+    )
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [
