@@ -18,6 +18,7 @@ from grader.batch.intake import HandedIn
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade
 from grader.errors import GraderFault, RosgradeError, UsageError
+from grader.nearest import did_you_mean
 from grader.recording.fact import to_json
 from grader.report.facts import Clock
 from grader.report.files import write_whole
@@ -81,7 +82,7 @@ class Batch:
         self._refuse_other()
         unknown = self.retry - {RETRY_ALL, RETRY_ERRORS} - {row.key for row in rows}
         if unknown:
-            raise UsageError(f"--retry: there is no submission called {', '.join(sorted(unknown))}")
+            raise UsageError(" ".join(_unknown(name, rows) for name in sorted(unknown)))
         paths: dict[str, Path] = {}
         first: dict[str, str] = {}
         teams = _teams(rows)
@@ -254,6 +255,15 @@ class Batch:
     def _write(self) -> None:
         assignment = self.loaded.assignment.id
         self.ledger.write(self._entries.values(), assignment, self.loaded.sha256)
+
+
+def _unknown(name: str, rows: Sequence[HandedIn]) -> str:
+    """Say that nobody is called so, and who may be meant: students have names beside their keys."""
+    text = f"--retry: there is no submission called {name}."
+    keys = [row.key for row in rows if name.casefold() in (row.key.casefold(), row.name.casefold())]
+    if keys:
+        return f"{text} Did you mean {' or '.join(map(repr, keys[:_MOST_NAMED]))}?"
+    return text + did_you_mean(name, [row.key for row in rows])
 
 
 def _teams(rows: Sequence[HandedIn]) -> dict[str, str]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shutil
 from concurrent.futures import Future
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,25 @@ def test_of_the_same_submissions_either_may_be_named_to_be_graded_again(
     assert {key for key, item in done.items() if item.fresh} == {"ana", "cai"}
     after = course.written()
     assert after["ana"] != before["ana"] and after["ben"] == before["ben"]
+
+
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [
+        ("Cai", "called Cai. Did you mean 'cai'?"),
+        ("Ana Lopez", "called Ana Lopez. Did you mean 'ana'?"),
+        ("bem", "called bem. Did you mean 'ben'?"),
+        ("somebody else", "called somebody else."),
+    ],
+)
+def test_who_is_to_be_graded_again_and_is_not_there_is_told_with_the_nearest(
+    course: Class, named: str, said: str
+) -> None:
+    rows = take_in(course.folder / "class", course.folder)
+    rows = [replace(row, name="Ana Lopez") if row.key == "ana" else row for row in rows]
+    with course.ledger.opened(), pytest.raises(UsageError) as caught:
+        Batch(course.loaded, course.ledger, frozenset({named})).read(rows)
+    assert str(caught.value) == f"--retry: there is no submission {said}"
 
 
 def test_two_who_handed_in_nothing_did_not_copy_from_each_other(course: Class) -> None:
