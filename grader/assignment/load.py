@@ -102,6 +102,19 @@ def find_assignment(name: str | Path, folder: Path | None = None) -> Path:
     raise UsageError(f"no assignment {str(name)!r}." + (did_you_mean(str(name), known) or listed))
 
 
+def refuse_swapped(name: str, submission: Path) -> None:
+    """Help whoever names what was handed in first, and then the assignment.
+
+    Raises:
+        UsageError: What stands for the submission is the id of an assignment, and is nothing else.
+    """
+    known = list_assignments()
+    if name not in known and str(submission) in known and not submission.exists():
+        raise UsageError(
+            f"{submission} is an assignment, and an assignment comes first: {submission} {name}"
+        )
+
+
 def load_assignment(
     name: str | Path, catalogue: Mapping[str, Check] = CATALOGUE, folder: Path | None = None
 ) -> LoadedAssignment:

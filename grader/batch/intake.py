@@ -237,7 +237,7 @@ def _opened(source: Path, staging: Path) -> Path:
         raise UsageError(str(error)) from error
     # An archive of a folder holds that folder alone.
     inside = [item for item in target.iterdir() if not _is_ignored(item)]
-    alone = len(inside) == 1 and inside[0].is_dir() and not _looks_like_one(inside[0])
+    alone = len(inside) == 1 and inside[0].is_dir() and _manifest_of_one(inside[0]) is None
     return inside[0] if alone else target
 
 
@@ -250,15 +250,18 @@ def _export_in(folder: Path) -> Path | None:
 
 
 def _refuse_single(folder: Path, source: Path) -> None:
-    if _looks_like_one(folder):
+    found = _manifest_of_one(folder)
+    if found is not None:
         raise UsageError(
-            f"{source}: looks like one submission ({MANIFEST} is right in it); name the folder "
+            f"{source}: looks like one submission ({shown(str(found))} is in it); name the folder "
             "that holds those of the class, or use `rosgrade check`"
         )
 
 
-def _looks_like_one(folder: Path) -> bool:
-    return (folder / MANIFEST).is_file() or any((folder / "src").glob(f"*/{MANIFEST}"))
+def _manifest_of_one(folder: Path) -> Path | None:
+    """The package.xml by which a folder looks like one submission, relative to it; or None."""
+    found = [folder / MANIFEST, *sorted((folder / "src").glob(f"*/{MANIFEST}"))]
+    return next((file.relative_to(folder) for file in found if file.is_file()), None)
 
 
 def _is_ignored(item: Path) -> bool:

@@ -63,7 +63,7 @@ def batch(
     Leaves a report for each submission, an overview (index.html) and grades.csv in OUT. Ends
     with 0 if every submission was graded, whatever the grades, and with 3 if one was not.
     """
-    from grader.assignment.load import load_assignment
+    from grader.assignment.load import load_assignment, refuse_swapped
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.crew import CrewLost, DaskCrew, LocalCrew
@@ -72,6 +72,7 @@ def batch(
     from grader.run.admission import Admission
 
     at_once = _at_once(jobs)
+    refuse_swapped(assignment, submissions)
     loaded = load_assignment(assignment)
     order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
     admission = Admission(cells=at_once)

@@ -92,12 +92,13 @@ def check(
         runner.get_ready()
         try:
             # Imported while the cell gets ready.
-            from grader.assignment.load import load_assignment
+            from grader.assignment.load import load_assignment, refuse_swapped
             from grader.assignment.selection import select, visible_part
             from grader.batch.grading import RECORDINGS_FOLDER, Grading
             from grader.report.files import check_folder
             from grader.submission.locate import check_path
 
+            refuse_swapped(assignment, submission)
             whole = load_assignment(assignment)
             shown = whole if hidden else visible_part(whole)
             loaded = select(shown, tuple(only or ()), tuple(scenario or ()))

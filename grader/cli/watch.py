@@ -68,7 +68,7 @@ def watch(
     a run ends the run and begins anew. The files of the assignment are watched too.
     """
     from grader import ros
-    from grader.assignment.load import load_assignment
+    from grader.assignment.load import load_assignment, refuse_swapped
     from grader.assignment.selection import select, visible_part
     from grader.cli.browser import open_page
     from grader.cli.page import ReportPage
@@ -82,6 +82,7 @@ def watch(
         shown = whole if hidden else visible_part(whole)
         return select(shown, tuple(only or ()), tuple(scenario or ()))
 
+    refuse_swapped(assignment, submission)
     loaded = load()
     check_path(submission)
     check_folder(report)

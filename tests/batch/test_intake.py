@@ -368,7 +368,9 @@ def test_two_files_of_canvas_that_differ_by_a_number_are_both_kept(
 def test_one_submission_is_not_taken_for_a_class(course: Path, staging: Path) -> None:
     (course / "src" / "pkg").mkdir(parents=True)
     (course / "src" / "pkg" / "package.xml").write_text("<package/>")
-    with pytest.raises(UsageError, match=r"looks like one submission.*rosgrade check"):
+    with pytest.raises(
+        UsageError, match=r"one submission \(src/pkg/package.xml is in it\).*rosgrade check"
+    ):
         take_in(course, staging)
 
 

@@ -68,6 +68,17 @@ def test_an_assignment_that_does_not_exist_names_the_nearest(rosgrade: Rosgrade)
     assert "Did you mean 'timed_publisher'?" in ended.stderr
 
 
+@pytest.mark.parametrize("command", ["check", "watch", "batch"])
+def test_who_names_the_submission_first_is_told_the_order(
+    rosgrade: Rosgrade, tmp_path: Path, command: str
+) -> None:
+    (tmp_path / "mine").mkdir()
+    more = ("--out", "results") if command == "batch" else ()
+    ended = rosgrade(command, "mine", "timed_publisher", *more)
+    assert ended.returncode == 2
+    assert "an assignment comes first: timed_publisher mine" in ended.stderr
+
+
 def test_a_submission_that_does_not_exist_is_named(rosgrade: Rosgrade) -> None:
     ended = rosgrade("check", "timed_publisher", "homework.zip")
     assert ended.returncode == 2

@@ -207,7 +207,7 @@ def test_a_full_disk_is_no_fault_of_the_student(
     ],
 )
 def test_a_url_is_not_taken_for_a_path(path: str | Path) -> None:
-    with pytest.raises(UsageError, match="is a URL; clone it"), opened(path):
+    with pytest.raises(UsageError, match=r"(://|@)[^/].*: is a URL; clone it"), opened(path):
         pass
 
 
