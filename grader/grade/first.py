@@ -37,7 +37,7 @@ def reason(check: str, scenario: str | None, observed: str, evidence: _Evidence)
     """Why a check failed: equal for those that name the same mistake.
 
     That is the same line of the student's code, in whichever run, or the same said of the same
-    moment of a run. What names neither is a mistake of its own.
+    moment of a run. What names neither, or only a file, is a mistake of its own.
 
     Args:
         check: Its id.
@@ -45,7 +45,7 @@ def reason(check: str, scenario: str | None, observed: str, evidence: _Evidence)
         observed: What it says of it.
         evidence: Where that can be seen.
     """
-    if evidence.places:
+    if evidence.places and all(one.line is not None for one in evidence.places):
         return tuple((one.file, one.line, one.message) for one in evidence.places)
     if evidence.moments:
         return scenario, observed, tuple(moment.time_s for moment in evidence.moments)

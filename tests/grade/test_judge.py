@@ -107,6 +107,18 @@ class TestFirstToFix:
         assert result.first_to_fix() is result.result("alive")
         assert [item.id for item in result.same_reason("alive")] == ["topic"]
 
+    def test_two_mistakes_in_one_file_are_two(self):
+        places = (SourceError("setup.py", None, "console_scripts"),)
+        lacking = Finding.failed("", "it is not there", evidence=Evidence(places=places))
+        result = judge(
+            Told("talker", lacking),
+            Told("listener", lacking),
+            Told("node", FAIL),
+            Told("topic", requires=("node",)),
+        )
+        assert result.first_to_fix() is result.result("node")
+        assert result.same_reason("talker") == ()
+
     def test_what_ended_in_another_run_may_have_another_reason(self):
         ended = Evidence(moments=(Moment("bot ended", 0.4),))
         crashed = Finding.failed("", "ended", evidence=ended)
