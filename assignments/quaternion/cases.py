@@ -75,10 +75,11 @@ def scaled(seed: int) -> list[dict]:
 
 
 def gimbal_lock(seed: int) -> list[dict]:
-    """Quaternions with a pitch of 90 or -90 degrees and any roll and yaw.
+    """Quaternions with a pitch of 90 or -90 degrees and any roll and yaw, and some just short.
 
     They have length 1 but for rounding errors, which make the sine of the pitch a little less
-    than 1 in some, and a little more in others.
+    than 1 in some, and a little more in others. Short of it, roll and yaw are two angles still:
+    whoever takes a sine of 0.999 (87.4 degrees) or 0.9999 (89.2 degrees) for 1 loses one of them.
     """
     chance = random.Random(f"{seed}/gimbal_lock")
     half = math.sqrt(0.5)
@@ -102,6 +103,11 @@ def gimbal_lock(seed: int) -> list[dict]:
         elif min(sines) > 1.0:
             more.append(values)
     found += [one for pair in zip(less[:14], more[:14]) for one in pair]
+    found += [
+        _pitched(math.radians(pitch), chance)
+        for pitch in (88.0, -88.0, 89.5, -89.5)
+        for _ in range(2)
+    ]
     return [_quaternion(item) for item in found]
 
 

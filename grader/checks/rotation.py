@@ -256,7 +256,7 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
             "they are answered as at gimbal lock, with a pitch of 90 deg or -90 deg, but are not "
             "there",
             "Test for gimbal lock right at it only: abs(sin_pitch) > 0.9999999. At 0.99 the pitch "
-            "is 82 deg.",
+            "is 82 deg, at 0.9999 it is 89.2 deg.",
         )
     questions = np.array([question for question, _ in bad])
     found = explain(
@@ -292,7 +292,7 @@ def _by_kind(wrong: list[Case]) -> tuple[str, str]:
     hints = {
         Group.GIMBAL_LOCK: "At a pitch of 90 deg, roll and yaw turn about the same axis, and the "
         "usual formulas divide 0 by 0. Test for it with a margin, such as abs(sin_pitch) > "
-        "0.999999, set roll to 0 and take the whole turn as yaw.",
+        "0.9999999, set roll to 0 and take the whole turn as yaw.",
         Group.SCALED: "Divide by the length first: the axis and the quaternion need not have "
         "length 1.",
         Group.ZERO: "Test the length before you divide by it, and answer with no rotation "
