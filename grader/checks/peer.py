@@ -8,8 +8,9 @@ from pydantic import Field, model_validator
 
 from grader.assignment.name import Durability, Id, Reliability, TopicName
 from grader.assignment.quantity import Duration
+from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.compatibility import compatibility_table, refusals
+from grader.checks.compatibility import comparisons, compatibility_table, refusals
 from grader.checks.finding import Evidence, Finding
 from grader.checks.sighting import endpoints_seen
 from grader.checks.topic_absence import why_no_endpoint
@@ -76,7 +77,9 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
 
     Judged by what DDS discovered of every endpoint of the student's on the topic, by the rule
     "requested against offered": reliability, durability, deadline, liveliness and its lease
-    duration. With a late joiner as the peer, it is judged by whether the two did match.
+    duration. With a late joiner as the peer, it is judged by whether the two did match. A
+    subscription that asks for the best available refuses nobody: it requests what the publishers
+    offer that are there when it is made. Only the process tells that.
 
     Explains the policy that decides, and shows the rules as a table.
     """
@@ -103,6 +106,12 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
             moments=endpoints_seen(recording, (endpoint,)),
             tables=(compatibility_table(offered, requested),),
         )
+        if refused and parameters.expect == "refuse":
+            open_ = _left_open(recording, kind, endpoint, peer)
+            if open_:
+                return Finding.failed(
+                    expected, _open_words(endpoint, open_), _profile_hint(kind), evidence
+                )
         if bool(refused) is (parameters.expect == "refuse"):
             continue
         if refused:
@@ -133,6 +142,30 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
 def _sides(kind: Kind, endpoint: Endpoint, peer: Qos) -> tuple[Qos, Qos]:
     """What is offered, what is requested."""
     return (endpoint.qos, peer) if kind is Kind.PUBLISHER else (peer, endpoint.qos)
+
+
+def _left_open(recording: Recording, kind: Kind, endpoint: Endpoint, peer: Qos) -> tuple[str, ...]:
+    """Policies by which a subscription refuses the peer only because of others that were there.
+
+    None where another policy refuses it all the same. What a publisher offers as the best
+    available is always the strongest.
+    """
+    if kind is not Kind.SUBSCRIPTION:
+        return ()
+    open_ = testimony.left_open(recording, kind, endpoint.topic, endpoint.node)
+    offered, requested = _sides(kind, endpoint, peer)
+    deciding = [item.policy for item in comparisons(offered, requested) if item.compatible is False]
+    return tuple(deciding) if open_.issuperset(deciding) else ()
+
+
+def _open_words(endpoint: Endpoint, policies: tuple[str, ...]) -> str:
+    names = " and ".join(policies)
+    taken = ", ".join(str(getattr(endpoint.qos, policy)) for policy in policies)
+    return (
+        f"the subscription of {code(endpoint.node)} asks for the best available {names}, declared "
+        "by the process: it requests what the publishers offer that are there when it is made, "
+        f"here {taken}; to this peer alone it would give way"
+    )
 
 
 def _contradiction(recording: Recording, parameters: Compatible) -> str:

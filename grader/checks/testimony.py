@@ -149,6 +149,30 @@ def profiles(recording: Recording, kind: Kind, topic: str) -> tuple[tuple[str, Q
     )
 
 
+def left_open(recording: Recording, kind: Kind, topic: str, node: str) -> frozenset[str]:
+    """Policies that a node left to the middleware: it asked for the best that is available.
+
+    DDS shows only what this came to with those who were there. Of several endpoints of the node
+    on the topic, a policy counts if each of them left it open.
+
+    Args:
+        recording: The run.
+        kind: Of the endpoint.
+        topic: Its topic.
+        node: Its node's fully qualified name.
+    """
+    own = [
+        item.data
+        for item in recording.declared(kind.value)
+        if _text(item.data, "topic") == topic and _text(item.data, "node") == node
+    ]
+    return frozenset(
+        policy
+        for policy in ("reliability", "durability")
+        if own and all(_text(data, policy) == "best_available" for data in own)
+    )
+
+
 def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
     """Whether a declaration of a kind holds a text, such as a ``publisher`` on a ``topic``."""
     return any(_text(item.data, key) == value for item in recording.declared(kind))

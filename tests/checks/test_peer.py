@@ -6,7 +6,17 @@ import pytest
 
 from grader.checks.finding import Status
 from grader.recording.model import Kind, Qos
-from tests.checks.builder import RELIABLE, endpoint, failing, join, judge, reader, recording
+from tests.checks.builder import (
+    NODE,
+    RELIABLE,
+    declared,
+    endpoint,
+    failing,
+    join,
+    judge,
+    reader,
+    recording,
+)
 
 BEST_EFFORT = replace(RELIABLE, reliability="best_effort")
 LATCHED = replace(RELIABLE, durability="transient_local")
@@ -73,6 +83,48 @@ def test_the_student_s_subscription_is_the_one_that_requests():
                expect="refuse"),
     )  # fmt: skip
     assert "no policy of what is offered is weaker" in found
+
+
+class TestTheBestAvailable:
+    PICKY = replace(LATCHED, reliability="reliable")
+
+    def run(self, *told):
+        return recording(
+            endpoints=(endpoint(qos=self.PICKY, kind=Kind.SUBSCRIPTION), reader()),
+            declarations=tuple(
+                declared("subscription", topic="/cmd_vel", node=NODE, **policies)
+                for policies in told
+            ),
+        )
+
+    def volatile_refused(self, run):
+        wish = peer("subscription", durability="volatile", expect="refuse")
+        return judge("qos.compatible", run, **wish)
+
+    def test_it_refuses_nobody(self):
+        found = self.volatile_refused(self.run({"durability": "best_available"}))
+        assert found.status is Status.FAILED
+        assert "asks for the best available durability" in found.observed
+        assert "here transient_local" in found.observed
+
+    def test_another_policy_refuses_all_the_same(self):
+        run = self.run({"reliability": "best_available", "durability": "transient_local"})
+        assert self.volatile_refused(run).status is Status.PASSED
+
+    def test_one_that_was_made_anew_with_names_counts(self):
+        run = self.run({"durability": "best_available"}, {"durability": "transient_local"})
+        assert self.volatile_refused(run).status is Status.PASSED
+
+    def test_of_another_node_it_says_nothing(self):
+        run = replace(
+            self.run(),
+            declarations=(
+                declared(
+                    "subscription", topic="/cmd_vel", node="/other", durability="best_available"
+                ),
+            ),
+        )
+        assert self.volatile_refused(run).status is Status.PASSED
 
 
 class TestLateJoiner:
