@@ -25,6 +25,10 @@ from grader.recording.model import NS, Recording
 
 # Between two callbacks of a busy executor.
 _PAUSE_S = 0.1
+# Between the end of the work that a timer waited for and its start, besides what the machine took.
+_NEXT_S = 0.05
+# A declared period is the one that was seen.
+_SAME = 0.03
 _GAINED = 0.25
 """Share of its period by which a timer may seem to have gained."""
 
@@ -219,8 +223,12 @@ def _unhindered(
             if other.begin_ns < item.begin_ns
         ]
         newest_ns = max(before, default=0)
-        # What begins while others still work did not wait for them.
-        waited = due_ns < newest_ns <= item.begin_ns
+        # What begins while others still work did not wait for them, and what begins a while after
+        # them was not due before.
+        idle_s = (item.begin_ns - newest_ns) / NS
+        waited = due_ns < newest_ns <= item.begin_ns and idle_s <= _NEXT_S + recording.taken_s(
+            newest_ns, item.begin_ns
+        )
         hindered = waited and _worked(recording, reports, due_ns, item.begin_ns)
         found.append(min(due_ns, item.begin_ns) if hindered else item.begin_ns)
     return found
@@ -237,11 +245,30 @@ def _worked(recording: Recording, reports: Reports, from_ns: int, to_ns: int) ->
 
 
 def _period_hint(recording: Recording, found_s: float, wanted_s: float) -> str:
+    twice = _made_twice(recording)
+    if twice:
+        return twice
+    declared_s = {timer.period_s for timer in testimony.timers(recording)}
+    if any(math.isclose(item, found_s, rel_tol=_SAME) for item in declared_s):
+        given = next(item for item in declared_s if math.isclose(item, found_s, rel_tol=_SAME))
+        return (
+            f"The process declared a timer of {format_duration(given)}. create_timer takes its "
+            f"period in seconds: {format_duration(wanted_s)} is {wanted_s:g}."
+        )
     if found_s < 0.75 * wanted_s:
         return f"{SECONDS_HINT} A callback that is given to two timers runs twice as often."
     return (
         f"{SECONDS_HINT} While a callback works, no other callback of its executor or group "
         "begins: several that work longer than a period together are late."
+    )
+
+
+def _made_twice(recording: Recording) -> str:
+    """What to try where a process made a node twice, with all of its callbacks; else nothing."""
+    name = testimony.made_twice(recording)
+    return name and (
+        f"The process made the node {code(name)} twice, and each has its own timers and "
+        "subscriptions. Make it once, and hand this one to the executor."
     )
 
 
@@ -265,7 +292,8 @@ def _judge_messages(
         return Finding.failed(
             expected,
             observed,
-            "Create one subscription, and report the start and the end once in its callback.",
+            _made_twice(recording)
+            or "Create one subscription, and report the start and the end once in its callback.",
             evidence,
         )
     if ended == len(sent) or (ended >= parameters.at_least and _busy(recording, reports, callback)):

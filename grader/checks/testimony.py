@@ -178,6 +178,19 @@ def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
     return any(_text(item.data, key) == value for item in recording.declared(kind))
 
 
+def made_twice(recording: Recording) -> str:
+    """Fully qualified name of a node that one operating-system process made twice, or nothing."""
+    seen: set[tuple[str, str]] = set()
+    for item in recording.declared("node"):
+        name = _text(item.data, "node")
+        if name is None:
+            continue
+        if (item.process, name) in seen:
+            return name
+        seen.add((item.process, name))
+    return ""
+
+
 def process_of(recording: Recording, node: str) -> Process | None:
     """The process that declared a node, or the only one there is, or None."""
     if len(recording.processes) == 1:

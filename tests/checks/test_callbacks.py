@@ -223,6 +223,35 @@ class TestRun:
         words = failed("run", run(*mine, *others), ["timer_1"], period="1 s")
         assert "`timer_1` starts every" in words
 
+    def test_a_period_a_little_longer_beside_messages_is_told(self):
+        """Two timers of 1.1 s in one thread: a message fills what is left but for 0.1 s."""
+        runs = []
+        for number in range(1, 6):
+            now_s = 1.1 * number
+            runs += [("timer_1", now_s, now_s + 0.4), ("timer_2", now_s + 0.401, now_s + 0.8)]
+            if number < 4:
+                runs.append(("chatter", now_s + 0.801, now_s + 1.0))
+        told = tuple(declared("timer", node=NODE, period_s=1.1) for _ in TIMERS)
+        words = failed("run", run(*runs, declarations=told), TIMERS, period="1 s", tolerance="7 %")
+        assert "`timer_1` starts every 1.1 s" in words
+        assert "declared a timer of 1.1 s" in words
+
+    def test_a_node_that_was_made_twice_is_told(self):
+        runs = [
+            ("timer_1", at_s + late_s, at_s + 0.4) for at_s in range(1, 6) for late_s in (0, 0.1)
+        ]
+        node = declared("node", node=NODE)
+        words = failed("run", run(*runs, declarations=(node, node)), ["timer_1"], period="1 s")
+        assert f"The process made the node `{NODE}` twice" in words
+        runs = [("chatter", at_s, at_s + 0.2) for at_s in (1.0, 1.3, 2.0, 2.3)]
+        words = failed(
+            "run",
+            run(*runs, sent_s=(0.9, 1.9), declarations=(node, node)),
+            ["chatter"],
+            stimulus="/chatter",
+        )
+        assert f"The process made the node `{NODE}` twice" in words
+
     def test_too_few_runs(self):
         words = failed("run", run(*only(serial(), "timer_1")[:2]), ["timer_1"], period="1 s")
         assert "ran only 2 times" in words
