@@ -218,20 +218,52 @@ def _wrong(
     rows = tuple(
         (item.field, value_text(item.expected), value_text(item.observed)) for item in found[:50]
     )
-    integer = any(slip.was_integer(item.observed) for item in found)
     return Finding.failed(
         expected,
         observed,
-        "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
-        if integer
-        else "Set the fields of the message right before publish(msg); a new message has 0 "
-        "everywhere.",
+        _hint(messages, wrong, first),
         Evidence(
             moments=(
                 Moment(f"message {first} is wrong", recording.since_launch_s(message.stamp_ns)),
             ),
             tables=(Table(f"Message {first}", ("field", "expected", "observed"), rows),),
         ),
+    )
+
+
+def _hint(
+    messages: tuple[Message, ...], wrong: dict[int, tuple[Difference, ...]], first: int
+) -> str:
+    """What to try, by what was observed of the fields that are wrong in the first such message."""
+    found = wrong[first]
+    if any(slip.was_integer(item.observed) for item in found):
+        return "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
+    right = len(messages) - len(wrong)
+    if right:
+        return (
+            f"{counted(right, 'message')} of {len(messages)} {'is' if right == 1 else 'are'} "
+            "right. Look for what makes the others different: a counter, a condition, what is "
+            "added up, or a second publish()."
+        )
+    every = "in every message" if len(messages) > 1 else "in it"
+    values = [leaves(message.value) for message in messages]
+    unset = [
+        item.field
+        for item in found
+        if item.expected and all(not each.get(item.field, True) for each in values)
+    ]
+    if unset:
+        return (
+            f"{codes(unset[:_MOST_FIELDS])} {'is' if len(unset) == 1 else 'are'} 0 {every}, as in "
+            "a new one: set the fields right before publish(msg)."
+        )
+    which = codes([item.field for item in found[:_MOST_FIELDS]])
+    if all(len({str(each.get(item.field)) for each in values}) == 1 for item in found):
+        these = "has this value" if len(found) == 1 else "have these values"
+        return f"{which} {these} {every}: look where the program sets them before publish(msg)."
+    return (
+        f"From message to message {which} {'changes' if len(found) == 1 else 'change'}, and "
+        "every message must be right: look for a counter, and for what is added up."
     )
 
 

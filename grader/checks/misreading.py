@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from grader.checks.echo import Wanted
 from grader.checks.printed import shows
@@ -15,6 +15,8 @@ _FACTORS = (
     (1000.0, "1000 times the value, as in millimetres,"),
 )
 _MOST_NAMED = 2
+# A covariance has 36 numbers, most of them 0.
+_LONGEST = 36
 
 
 def explain(printed: Sequence[float], wanted: Wanted, missing: Sequence[str], decimals: int) -> str:
@@ -63,8 +65,9 @@ def _relation(number: float, value: float, decimals: int) -> str:
 def _names(number: float, wanted: Wanted, decimals: int) -> Iterator[str]:
     """Fields, and statistics of arrays, that a number stands for; the likeliest first.
 
-    Zeros are in nearly every message, and so tell nothing unless they are all there is. Nor does
-    infinity, which every beam shows that meets nothing.
+    One of hundreds of beams has nearly every distance, and so tells nothing. Zeros are in nearly
+    every message, and tell nothing unless they are all there is. Nor does infinity, which every
+    beam shows that meets nothing.
     """
     if not math.isfinite(number):
         return
@@ -74,9 +77,20 @@ def _names(number: float, wanted: Wanted, decimals: int) -> Iterator[str]:
         for path, value in fields.items()
         if isinstance(value, int | float) and path not in wanted.values
     }
-    for label, value in (*_statistics(wanted.message.value), *_spokes(numeric), *numeric.items()):
+    many = _in_long_arrays(numeric)
+    few = {path: value for path, value in numeric.items() if path not in many}
+    likely = [*_statistics(wanted.message.value), *_spokes(numeric), *few.items()]
+    for label, value in likely:
         if shows(number, value, decimals) and _tells(number, label):
             yield label
+
+
+def _in_long_arrays(paths: Iterable[str]) -> set[str]:
+    """Elements of arrays that are too long for one of them to be found by its value."""
+    by_array: dict[str, list[str]] = {}
+    for path in paths:
+        by_array.setdefault(path.partition("[")[0], []).append(path)
+    return {path for own in by_array.values() if len(own) > _LONGEST for path in own}
 
 
 def _tells(number: float, label: str) -> bool:

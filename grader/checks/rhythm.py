@@ -14,6 +14,8 @@ from grader.recording.model import Kind, Recording
 
 _TENS = (10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
 _TENS_TOLERANCE = 0.1
+# Milliseconds and microseconds.
+_UNITS = (1e3, 1e6)
 _MOST_TIMES = 5
 _TIMES_TOLERANCE = 0.08
 _SAME = 0.05
@@ -133,6 +135,14 @@ def _wrong_period(
                 return Explanation(f"{amount} the expected period{said}", _seconds_hint(limits))
     if same:
         return Explanation(said.removeprefix("; "), _seconds_hint(limits))
+    for factor in _UNITS:
+        short_s = next((x for x in declared if math.isclose(x * factor, wanted_s)), None)
+        if short_s is not None and short_s < median_s < wanted_s:
+            return Explanation(
+                f"the process declared a timer of {format_duration(short_s)}, 1/{factor:g} of the "
+                "expected period, and its callback does not come round that often",
+                _seconds_hint(limits),
+            )
     skipped = _skipped(recording, declared, verdict, limits)
     if skipped is not None:
         return skipped

@@ -21,6 +21,12 @@ from grader.submission.record import SourceError
 _LOG_LINES = 5
 _LONGEST_QUOTE = 80
 _SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
+ENDED_HINT = (
+    "Publish in every call of the callback. Look for a counter or a condition that ends it, for "
+    "timer.cancel(), and for a callback that does not return."
+)
+# After so many periods of silence a timer has stopped.
+_ENDED_PERIODS = 3.0
 # Share of the observation that the host may take before silence says nothing any more.
 _STARVED = 0.5
 _COMPLAINT_WORDS = ("error", "exception", "traceback", "warn")
@@ -122,6 +128,15 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
     if unspun is not None:
         return unspun
     timers = f"; the process declared a timer of {listing(periods)}" if periods else ""
+    silent_s = (recording.stop_ns - messages[-1].stamp_ns) / NS
+    if periods and silent_s > _ENDED_PERIODS * max(
+        timer.period_s for timer in testimony.timers(recording)
+    ):
+        return Cause(
+            f"{seen}, none in the last {format_duration(silent_s)}{timers}",
+            ENDED_HINT,
+            Evidence(moments=moments),
+        )
     return Cause(
         seen + timers,
         _SECONDS_HINT
@@ -368,8 +383,9 @@ def _idle(recording: Recording, topic: str) -> Cause:
         return Cause(
             f"the publisher on {code(topic)} is there but silent, and the process declared no "
             "timer that would call it",
-            "Call self.create_timer(period_in_seconds, self.callback) in the constructor, or "
-            "publish from a callback that runs.",
+            "Is publish(msg) reached? Look for a condition before it, and for a loop that waits "
+            "for what never comes, such as subscriptions. A callback publishes only if something "
+            "calls it: self.create_timer(period_in_seconds, self.callback) does.",
             evidence,
         )
     timers = [timer for timer in testimony.timers(recording) if _fires(recording, timer)]

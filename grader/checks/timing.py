@@ -21,7 +21,7 @@ from grader.checks.period import (
     judge,
 )
 from grader.checks.rhythm import explain, is_declared
-from grader.checks.silence import why_few
+from grader.checks.silence import ENDED_HINT, why_few
 from grader.checks.stamps import why_not_believed
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, counted
@@ -160,8 +160,7 @@ def _why_ended(
         return cause_of_death(recording, dying[0]).after(seen)
     return Cause(
         seen,
-        "Publish in every call of the callback. Look for a counter or a condition that ends it, "
-        "for timer.cancel(), and for a callback that does not return.",
+        ENDED_HINT,
         Evidence(moments=(Moment("last message", recording.since_launch_s(last_ns)),)),
     )
 

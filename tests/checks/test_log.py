@@ -362,6 +362,14 @@ class TestOtherValues:
         assert "which shows `min(ranges)`" in found
         assert "`msg.ranges[0]`" in found
 
+    def test_a_number_of_some_beam_tells_nothing(self):
+        """A mean of the beams is the distance of one of them, too."""
+        value = {**scan(), "ranges": [*RANGES[:137], 2.345, *RANGES[138:]]}
+        changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
+        found = front(lines("front 2.345", SCAN_TIMES_S), messages=changed)
+        assert "none shows `ranges[0]`" in found
+        assert "which shows" not in found
+
     def test_the_greatest_measurable_distance(self):
         assert "shows `range_max`" in front(lines("3.5", SCAN_TIMES_S))
 

@@ -143,6 +143,12 @@ class TestCount:
         assert "1 message on `/cmd_vel` in 4.1 s; the process declared a timer of 3 s" in found
         assert "0.3 is 300 ms" in found
 
+    def test_a_timer_that_was_cancelled(self):
+        run = recording(messages=messages(every(0.3)[:4]))
+        found = failing("messages.count", run, topic="/cmd_vel", at_least=10)
+        assert "none in the last" in found and "declared a timer of 300 ms" in found
+        assert "timer.cancel()" in found and "seconds" not in found
+
 
 class TestSilence:
     def found(self, **changes):
@@ -216,7 +222,10 @@ class TestSilence:
         assert "prints" not in self.found(log=log)
 
     def test_no_timer_at_all(self):
-        assert "declared no timer" in self.found(declarations=declarations(timer_s=None))
+        found = self.found(declarations=declarations(timer_s=None))
+        assert "declared no timer" in found
+        # The lesson may want one message, without a timer.
+        assert "a loop that waits for what never comes" in found
 
     def test_silent_for_no_reason_that_can_be_seen(self):
         found = self.found(log=output("something went wrong"))
@@ -284,6 +293,24 @@ class TestEqual:
             finding = equal(recording(), value)
             assert finding.status is Status.PASSED
             assert finding.observed == "all of 12 messages"
+
+    @pytest.mark.parametrize(
+        ("stream", "hint"),
+        [
+            ([twist()] * 4 + [twist((2, 0, 0))], "4 messages of 5 are right. Look for what makes"),
+            ([twist((0, 0, 0))] * 3, "`linear.x` is 0 in every message, as in a new one"),
+            ([twist((0, 0, 0))], "`linear.x` is 0 in it, as in a new one"),
+            ([twist((1.5, 0, 0))] * 3, "`linear.x` has this value in every message"),
+            ([twist((x, 0, 0)) for x in (2, 3, 4)], "message to message `linear.x` changes"),
+        ],
+    )
+    def test_the_hint_tells_what_was_observed(self, stream, hint):
+        times_s = every(0.3)[: len(stream)]
+        received = tuple(
+            message(t, v, sequence=n)
+            for n, (t, v) in enumerate(zip(times_s, stream, strict=True), 1)
+        )
+        assert hint in equal(recording(messages={"/cmd_vel": received})).hint
 
     def test_expected_is_told_with_the_rest(self):
         assert equal(recording()).expected == (

@@ -260,6 +260,11 @@ class TestMistakes:
         assert "declared a timer of 3 ms" in found
         assert "create_timer takes its period in seconds: 300 ms is 0.3." in found
 
+    def test_microseconds_that_no_callback_keeps_up_with(self):
+        found = wrong([0.0006] * 500, declarations=declarations(timer_s=300e-6))
+        assert "a timer of 300 us, 1/1000 of the expected period" in found
+        assert "create_timer takes its period in seconds: 300 ms is 0.3." in found
+
     def test_thirty_milliseconds(self):
         assert "1/10 of the expected period" in wrong([0.03] * 50)
 
