@@ -28,7 +28,8 @@ _DECIDED_HINT = (
 )
 _HELD_HINT = (
     "The robot keeps the last command: publish one with every scan, or from a timer of 10 Hz or "
-    "more, and to stop one with linear.x = 0.0."
+    "more, and to stop one with linear.x = 0.0. A time.sleep() or a loop in a callback keeps it "
+    "from coming in time."
 )
 _BLIND_HINT = (
     "Without scans the robot drives blindly: keep the time of the last scan, and let a timer stop "

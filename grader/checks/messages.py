@@ -259,8 +259,8 @@ def _hint(
         )
     which = codes([item.field for item in found[:_MOST_FIELDS]])
     if all(len({str(each.get(item.field)) for each in values}) == 1 for item in found):
-        these = "has this value" if len(found) == 1 else "have these values"
-        return f"{which} {these} {every}: look where the program sets them before publish(msg)."
+        these, them = ("has this value", "it") if len(found) == 1 else ("have these values", "them")
+        return f"{which} {these} {every}: look where the program sets {them} before publish(msg)."
     return (
         f"From message to message {which} {'changes' if len(found) == 1 else 'change'}, and "
         "every message must be right: look for a counter, and for what is added up."

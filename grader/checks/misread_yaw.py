@@ -45,7 +45,7 @@ _READINGS = (
         "always 0",
         "A quaternion in ROS is x, y, z, w: read as w, x, y, z, no turn on the ground is left of "
         "it. Nor is one in roll or pitch: of as_euler('xyz') and euler_from_quaternion(), yaw is "
-        f"the last. {_FORMULA}.",
+        f"the last. {_FORMULA}, anew in each callback: at the start it may have been 0.",
         lambda _: 0.0,
     ),
     Reading(

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
+from statistics import median
 from typing import Literal
 
 from pydantic import Field
 
 from grader.assignment.quantity import Frequency, PositiveLength, Ratio
+from grader.assignment.unit import format_duration
 from grader.checks.answer import MOST_BEHIND, answers
 from grader.checks.approach import Approach, approach
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.command import command_topic
+from grader.checks.command import command_topic, commands
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.immobility import why_cut_short
 from grader.checks.law import Law, Sample, Verdict, examine
@@ -24,10 +27,12 @@ from grader.checks.reference import GoalPose
 from grader.checks.silence import why_silent
 from grader.checks.steering import LEAST_SAMPLES, at_the_goal, on_the_way
 from grader.checks.wording import counted, percent
-from grader.recording.model import Recording
+from grader.recording.model import NS, Recording
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 _MOST_POINTS = 400
+# Odometry comes 30 times in a second, and a timer of 10 Hz is right.
+_RARE_S = 0.2
 _WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
 _FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
 
@@ -104,12 +109,25 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
             evidence,
         )
     observed, hint = _words(verdict, parameters, len(samples))
+    apart_s = _apart_s(recording)
+    if verdict.law is Law.PROPORTIONAL and apart_s > _RARE_S:
+        observed += f", one every {format_duration(apart_s)}"
+        hint += (
+            " Publish one with every odometry, or from a timer of 10 Hz or more: a time.sleep() in "
+            "a callback lets odometry grow old."
+        )
     misread = misread_yaw(run, parameters.position)
     if misread is not None:
         return Finding.failed(
             expected, f"the commands do not follow the error: {misread}", misread.hint, evidence
         )
     return Finding.failed(expected, observed, hint, evidence)
+
+
+def _apart_s(recording: Recording) -> float:
+    """Median time between two commands; 0 without two."""
+    times_ns = [item.time_ns for item in commands(recording)]
+    return median((b - a) / NS for a, b in pairwise(times_ns)) if len(times_ns) > 1 else 0.0
 
 
 def _range_words(parameters: Proportional) -> str:

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from grader.assignment.name import TopicName
 from grader.assignment.quantity import Duration, Frequency
 from grader.assignment.unit import format_duration
+from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Finding, Moment
@@ -103,8 +104,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         return Finding.failed(
             expected,
             observed,
-            "create_timer takes its period in seconds: the reciprocal of the rate. A callback that "
-            "sleeps or works longer than the period slows the timer down.",
+            _slow_hint(recording),
             evidence,
         )
     if high is not None and found_hz > high:
@@ -117,6 +117,18 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         )
     return _too_long_without(recording, parameters, messages) or Finding.passed(
         expected, observed, evidence
+    )
+
+
+def _slow_hint(recording: Recording) -> str:
+    if testimony.traced(recording) and not testimony.said(recording, "timer"):
+        return (
+            "Publish in every call of the callback: look for a counter or a condition that leaves "
+            "calls out, and for a time.sleep()."
+        )
+    return (
+        "create_timer takes its period in seconds: the reciprocal of the rate. A callback that "
+        "sleeps or works longer than the period slows the timer down."
     )
 
 

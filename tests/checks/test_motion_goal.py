@@ -192,6 +192,25 @@ def test_the_gain_is_told():
     assert finding.evidence.plots[0].y_label == "angular.z (rad/s)"
 
 
+def test_a_callback_that_sleeps_works_with_old_odometry():
+    """It takes one odometry of its queue of ten every 0.8 s."""
+    student, queue, next_s = Student(GOAL), [], [0.8]
+
+    def sleeps(senses):
+        if senses.new_odometry and senses.odometry is not None:
+            queue.append(senses.odometry.pose)
+            del queue[:-10]
+        if not queue or senses.time_s < next_s[0]:
+            return None
+        next_s[0] += 0.8
+        return student(queue.pop(0))
+
+    said = failing(
+        "motion.proportional", drive(sleeps, seconds=40), goal=yaml(GOAL), phase="position"
+    )
+    assert "one every 800 ms" in said and "time.sleep()" in said
+
+
 def test_a_gain_out_of_range():
     run = run_to(GOAL, angular=0.5)
     said = failing("motion.proportional", run, goal=yaml(GOAL), phase="align", gain_min="0.8 Hz")

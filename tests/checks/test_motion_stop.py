@@ -349,6 +349,7 @@ class TestStops:
         said = failing("motion.no_contact", drive(slow, world=WALL, seconds=12))
         assert "as the last command, sent 8." in said
         assert "The robot keeps the last command" in said
+        assert "A time.sleep() or a loop in a callback" in said
 
     def test_drives_into_it_long_after_the_last_scan(self):
         run = drive(by_front(), world=WALL, seconds=12, options={"lidar": {"stops": "3 s"}})
