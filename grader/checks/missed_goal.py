@@ -76,8 +76,8 @@ def why_not_there(run: Approach, position_m: float) -> Cause | None:
             if nearest_m <= position_m
             else (
                 "it ended a little before it",
-                "Compare the distance with the tolerance as it is now asked for, in metres, and "
-                "drive on until it is smaller.",
+                "Compare the distance, math.hypot(dx, dy) in metres, with the tolerance as it is "
+                "now asked for, and drive on until it is smaller.",
             )
             if left_m <= _A_LITTLE * run.distance_m(truth[0])
             else (

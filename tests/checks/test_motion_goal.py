@@ -386,7 +386,7 @@ class TestMistakes:
         run = run_to(GOAL)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.03 m", heading="0.1 rad")
         assert "cm from the goal: it ended a little before it" in said
-        assert "Compare the distance with the tolerance" in said
+        assert "Compare the distance, math.hypot(dx, dy) in metres, with the tolerance" in said
 
     @pytest.mark.parametrize(
         ("goal", "words"),
