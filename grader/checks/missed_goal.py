@@ -162,6 +162,14 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
             "is, and not times dx. Turn towards the goal, also where dx is negative.",
             evidence,
         )
+    if left_m > began_m and _keeps_the_heading(run):
+        return Cause(
+            f"{seen}, farther than at its start ({metres(began_m)}): it has turned to the heading "
+            f"that it is to have at the goal, and drives that way, {moving}",
+            "On the way the error is the direction to the goal, math.atan2(dy, dx) - yaw; only at "
+            "the goal it is goal_theta - yaw.",
+            evidence,
+        )
     if left_m > began_m and _keeps_a_direction(run):
         return Cause(
             f"{seen}, farther than at its start ({metres(began_m)}): it keeps to one direction, "
@@ -174,8 +182,9 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
         return Cause(
             f"{seen}, farther than at its start ({metres(began_m)}): it drives straight away from "
             f"it, {moving}, as if half a turn were no error",
-            "The direction is math.atan2(dy, dx): math.atan(dy / dx) is the same for the opposite "
-            "one. An error is wrapped by whole turns, 2 * math.pi, not by math.pi.",
+            "The direction is math.atan2(dy, dx) with dx = goal_x - x, not x - goal_x, and so for "
+            "dy; math.atan(dy / dx) is the same for the opposite one. An error is wrapped by whole "
+            "turns, 2 * math.pi, not by math.pi.",
             evidence,
         )
     if left_m > began_m:
@@ -240,8 +249,7 @@ def _keeps_a_direction(run: Approach) -> bool:
     One that takes half a turn for no error looks straight away from the goal instead.
     """
     last, first = run.truth[-1], run.truth[0]
-    straight = last.linear_m_s > NO_SPEED_M_S and abs(last.angular_rad_s) < _STRAIGHT_RAD_S
-    if not straight or abs(run.bearing_error_rad(last)) > math.pi - _EXACTLY_RAD:
+    if not _drives_straight(last) or abs(run.bearing_error_rad(last)) > math.pi - _EXACTLY_RAD:
         return False
     directions = (
         math.atan2(run.goal.y_m - y_m, run.goal.x_m - x_m)
@@ -250,14 +258,24 @@ def _keeps_a_direction(run: Approach) -> bool:
     return any(abs(wrap_angle(item - last.yaw_rad)) < _EXACTLY_RAD for item in directions)
 
 
+def _keeps_the_heading(run: Approach) -> bool:
+    """Whether it has turned to the heading of the goal, and drives on with it."""
+    last, first = run.truth[-1], run.truth[0]
+    return (
+        _drives_straight(last)
+        and abs(run.heading_error_rad(last)) < _EXACTLY_RAD
+        and abs(run.heading_error_rad(first)) > _A_LITTLE_RAD
+    )
+
+
+def _drives_straight(step: Truth) -> bool:
+    return step.linear_m_s > NO_SPEED_M_S and abs(step.angular_rad_s) < _STRAIGHT_RAD_S
+
+
 def _has_turned_its_back(run: Approach) -> bool:
     """Whether the robot drives ahead in the end, without turning, and the goal is right behind."""
     last = run.truth[-1]
-    return (
-        last.linear_m_s > NO_SPEED_M_S
-        and abs(last.angular_rad_s) < _STRAIGHT_RAD_S
-        and abs(run.bearing_error_rad(last)) > math.pi - _A_LITTLE_RAD
-    )
+    return _drives_straight(last) and abs(run.bearing_error_rad(last)) > math.pi - _A_LITTLE_RAD
 
 
 def _weaves(run: Approach) -> bool:

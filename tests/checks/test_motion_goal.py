@@ -377,6 +377,12 @@ class TestMistakes:
         said = failing("motion.path_length", run, goal=yaml(BEHIND), most="180 %")
         assert "as if half a turn were no error" in said and "math.atan2(dy, dx)" in said
 
+    def test_the_heading_of_the_goal_taken_for_the_direction(self):
+        run = drive(on_odometry(lambda pose: (0.2, wrap(GOAL[2] - pose.yaw_rad))), seconds=20)
+        said = failing("motion.path_length", run, goal=yaml(GOAL), most="40 %")
+        assert "it has turned to the heading that it is to have at the goal" in said
+        assert "math.atan2(dy, dx) - yaw" in said
+
     def test_turns_a_little_too_little(self):
         run = run_to(GOAL, straight=0.08)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.03 rad")
