@@ -20,7 +20,7 @@ from grader.run.load import Load, cpu_count
 _CELLS_PER_CPU = 16
 _STARTS_PER_CPU = 1.5
 """More than one, because a start also waits: for processes, and for DDS to discover them."""
-_BUSY_PER_CPU = 2.5
+_BUSY_PER_CPU = 4.0
 """Runnable threads of the machine for each CPU from which on nobody more is let in."""
 _LONGEST_START_S = 2.0
 """What has not matched by then waits for something, and costs no CPU any more."""
