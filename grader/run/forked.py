@@ -11,6 +11,7 @@ import array
 import contextlib
 import json
 import os
+import select
 import signal
 import socket
 import struct
@@ -18,14 +19,16 @@ from collections.abc import Callable, Mapping
 
 from grader.run.descendants import descendants
 from grader.run.enclosure import HOME, EnclosedProcess, Enclosure
-from grader.sandbox import namespaces
 
 _HOLDER = ("/usr/bin/cat",)
 """It answers when the sandbox stands, and ends with its standard input."""
 _HELD = b"."
-_LIMIT_S = 10.0
+_LIMIT_S = 5.0
+"""Then it is started anew."""
 _REPLY_BYTES = 64
+# As the zygote says it, which sees nothing of this module.
 _FORKED = b"forked"
+_GO = b"+"
 _CREDENTIALS = struct.Struct("=iII")
 _DESCRIPTOR_BYTES = array.array("i").itemsize
 
@@ -61,38 +64,35 @@ class ForkedProcess(EnclosedProcess):
         """
         self._told_group: int | None = None
         self._told_code: int | None = None
-        super().__init__(enclosure, _HOLDER, {"PATH": "/usr/bin:/bin"}, (), held=True)
-        assert self.stdin is not None
-        assert self.stdout is not None
-        assert self.stderr is not None
-        out_read, out_write = os.pipe()
-        error_read, error_write = os.pipe()
-        self._reply, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._reply.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
-        self._reply.settimeout(_LIMIT_S)
         try:
-            with theirs:
-                self._ask(
-                    enclosure,
-                    zygote,
-                    environment,
-                    (out_write, error_write),
-                    (*pipes, theirs.fileno()),
-                )
+            self._reply, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        except OSError as error:
+            raise NotForked(str(error)) from error
+        super().__init__(enclosure, _HOLDER, {"PATH": "/usr/bin:/bin"}, (), held=True)
+        given = [theirs.detach()]
+        try:
+            self._reply.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
+            self._reply.settimeout(_LIMIT_S)
+            readable = []
+            for _ in range(2):
+                read, write = os.pipe()
+                readable.append(open(read, "rb", 0))  # noqa: PTH123, SIM115
+                given.append(write)
+            reply, *streams = given
+            self._ask(enclosure, zygote, environment, (*streams, *pipes, reply))
             self._hear_of_fork(watch)
         except (OSError, NotForked) as error:
-            for descriptor in (out_read, error_read):
-                os.close(descriptor)
             self._tear_down()
             raise NotForked(str(error)) from error
         finally:
-            for descriptor in (out_write, error_write):
+            for descriptor in given:
                 os.close(descriptor)
         self._reply.setblocking(False)
+        assert self.stdout is not None
+        assert self.stderr is not None
         self.stdout.close()
         self.stderr.close()
-        self.stdout = open(out_read, "rb", 0)  # noqa: PTH123, SIM115
-        self.stderr = open(error_read, "rb", 0)  # noqa: PTH123, SIM115
+        self.stdout, self.stderr = readable
 
     @property
     def group(self) -> int | None:
@@ -125,42 +125,50 @@ class ForkedProcess(EnclosedProcess):
         enclosure: Enclosure,
         zygote: int,
         environment: Mapping[str, str],
-        streams: tuple[int, int],
         given: tuple[int, ...],
     ) -> None:
-        assert self.stdin is not None
-        assert self.stdout is not None
-        os.write(self.stdin.fileno(), _HELD)
-        if self.stdout.read(1) != _HELD:
-            raise NotForked("the sandbox does not stand")
-        init = self.init
-        holders = tuple(descendants(init)) if init is not None else ()
-        if len(holders) != 1:
-            raise NotForked("nobody holds the sandbox")
+        """Ask for a fork.
+
+        Args:
+            enclosure: The sandbox.
+            zygote: Descriptor of its socket.
+            environment: Variables of the process.
+            given: Its standard output and error, the tracer's pipes, and where it replies.
+        """
         request = {
             # As bubblewrap sets it with the folder.
             "environment": {**environment, "PWD": HOME},
             "folder": HOME,
             "limits": list(enclosure.limits.rlimits().items()),
-            "namespaces": namespaces.beside(holders[0]),
-            "seccomp": enclosure.calls["seccomp"],
         }
-        opened = [os.pidfd_open(holders[0])]
+        stdout, stderr, *others = given
+        opened = [os.pidfd_open(self._holder())]
         try:
-            opened += [
-                os.open(enclosure.guard, os.O_RDONLY),
-                os.open(enclosure.filter, os.O_RDONLY),
-            ]
+            for file in (enclosure.guard, enclosure.filter):
+                opened.append(os.open(file, os.O_RDONLY))
             holder, guard, rules = opened
             with socket.socket(fileno=os.dup(zygote)) as asked:
                 socket.send_fds(
                     asked,
                     [json.dumps(request).encode()],
-                    [holder, *streams, guard, rules, *given],
+                    [holder, stdout, stderr, guard, rules, *others],
+                    socket.MSG_DONTWAIT,
                 )
         finally:
             for descriptor in opened:
                 os.close(descriptor)
+
+    def _holder(self) -> int:
+        """Process id of what holds the sandbox, when that stands."""
+        assert self.stdin is not None
+        assert self.stdout is not None
+        os.write(self.stdin.fileno(), _HELD)
+        stands = select.select([self.stdout], [], [], _LIMIT_S)[0] and self.stdout.read(1) == _HELD
+        init = self.init
+        holders = tuple(descendants(init)) if stands and init is not None else ()
+        if len(holders) != 1:
+            raise NotForked("the sandbox does not stand")
+        return holders[0]
 
     def _hear_of_fork(self, watch: Callable[[int], None]) -> None:
         room = socket.CMSG_SPACE(_CREDENTIALS.size) + socket.CMSG_SPACE(_DESCRIPTOR_BYTES)
@@ -172,6 +180,7 @@ class ForkedProcess(EnclosedProcess):
                 self._told_group, _, _ = _CREDENTIALS.unpack(data[: _CREDENTIALS.size])
         if self._told_group is None:
             raise NotForked("the zygote's fork has ended")
+        self._reply.send(_GO)
 
     def _hear_of_end(self) -> None:
         try:

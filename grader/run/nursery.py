@@ -219,14 +219,16 @@ class Nursery:
                 os.close(descriptor)
         return ForkedCell(open(in_write, "w"), open(out_read), status_read, self._kill)  # noqa: PTH123
 
-    def expect(self, argv: Sequence[str], environment: Mapping[str, str]) -> None:
+    def expect(self, argv: Sequence[str], environment: Mapping[str, str], seccomp: int) -> None:
         """Say that a cell is about to start a program of a student's in its sandbox.
 
         Args:
             argv: Python and the program.
             environment: Its variables, without those of one run.
+            seccomp: Number of seccomp(2) on this machine.
         """
-        asked = {"program": {"argv": list(argv), "environment": dict(environment)}}
+        program = {"argv": list(argv), "environment": dict(environment), "seccomp": seccomp}
+        asked = {"program": program}
         # Whoever starts the next cell finds out whether it has ended.
         with contextlib.suppress(OSError):
             self._socket.send(json.dumps(asked).encode())

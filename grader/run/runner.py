@@ -248,7 +248,7 @@ class Runner:
                     worlds,
                 )
                 if order.enclosure is not None and order.enclosure.may_fork:
-                    self._expect(order)
+                    self._expect(order, order.enclosure.calls["seccomp"])
                 recording.parent.mkdir(parents=True, exist_ok=True)
                 launched_ns = time.time_ns()
                 try:
@@ -320,12 +320,12 @@ class Runner:
             self._nursery = Nursery(self.ros, self.sandbox)
         return CellProcess(self._nursery, imports)
 
-    def _expect(self, order: CellOrder) -> None:
+    def _expect(self, order: CellOrder, seccomp: int) -> None:
         for command in order.commands:
             if command.argv[0] == str(self.ros.python):
                 with self._lock:
                     if self._nursery is not None:
-                        self._nursery.expect(command.argv, order.environment)
+                        self._nursery.expect(command.argv, order.environment, seccomp)
 
     def _give_back(self, cell: CellProcess) -> None:
         cell.close()

@@ -142,9 +142,10 @@ class StudentProcesses:
         if self._enclosure is not None and self._guard is not None:
             zygote = self._zygotes.get(key_of(argv, environment))
             if zygote is not None and self._enclosure.may_fork:
+                watch = self._guard.watch
                 with contextlib.suppress(NotForked):
-                    return ForkedProcess(
-                        self._enclosure, zygote, variables, pass_fds, self._guard.watch
+                    return self._guard.start(
+                        partial(ForkedProcess, self._enclosure, zygote, variables, pass_fds, watch)
                     )
             return self._guard.start(
                 partial(EnclosedProcess, self._enclosure, argv, variables, pass_fds)

@@ -23,6 +23,8 @@ _VARIABLE = "ROSGRADE_ZYGOTE_FD"
 _TOLD_BYTES = 64
 _ASKED_BEFORE = 2
 """The first of a class is started as everywhere; who grades only one needs no zygote."""
+_MOST_TRIES = 3
+"""A zygote that ends, for whatever reason, is replaced that often."""
 _MOST = 4
 """Each takes some 100 MB, and a submission's install space decides about its environment."""
 IMPORTS = (
@@ -88,20 +90,27 @@ class Zygotes:
     def __init__(self) -> None:
         """There is none."""
         self._asked: Counter[str] = Counter()
+        self._started: Counter[str] = Counter()
         self._zygotes: list[_Zygote] = []
         self._cpu_s = 0.0
 
-    def ask(self, argv: Sequence[str], environment: Mapping[str, str]) -> None:
+    def ask(self, argv: Sequence[str], environment: Mapping[str, str], seccomp: int) -> None:
         """Note that a command is about to be run; it may be run more often.
 
         Args:
             argv: Python and a program.
             environment: Its variables, without those of one run.
+            seccomp: Number of seccomp(2) on this machine.
         """
         key = key_of(argv, environment)
         self._asked[key] += 1
-        if self._asked[key] == _ASKED_BEFORE and len(self._zygotes) < _MOST:
-            self._start(key, argv, environment)
+        if self._asked[key] < _ASKED_BEFORE or any(one.key == key for one in self._zygotes):
+            return
+        if self._started[key] < _MOST_TRIES:
+            self._started[key] += 1
+            for oldest in self._zygotes[: 1 + len(self._zygotes) - _MOST]:
+                self._remove(oldest)
+            self._start(key, argv, environment, seccomp)
 
     def sockets(self) -> list[int]:
         """What becomes readable as a zygote gets ready, has forked, or ends."""
@@ -115,8 +124,7 @@ class Zygotes:
                 with contextlib.suppress(OSError):
                     told = one.socket.recv(_TOLD_BYTES)
                 if not told or not one.is_silent():
-                    self._zygotes.remove(one)
-                    one.let_go()
+                    self._remove(one)
                     continue
                 one.is_ready = True
                 self._cpu_s += float(told) - one.cpu_s
@@ -137,7 +145,13 @@ class Zygotes:
             one.let_go()
         self._zygotes.clear()
 
-    def _start(self, key: str, argv: Sequence[str], environment: Mapping[str, str]) -> None:
+    def _remove(self, one: _Zygote) -> None:
+        self._zygotes.remove(one)
+        one.let_go()
+
+    def _start(
+        self, key: str, argv: Sequence[str], environment: Mapping[str, str], seccomp: int
+    ) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             variables = {**environment, _VARIABLE: str(theirs.fileno())}
@@ -151,5 +165,5 @@ class Zygotes:
                 stderr=subprocess.PIPE,
                 pass_fds=(theirs.fileno(),),
             )
-        ours.send(json.dumps(IMPORTS).encode())
+        ours.send(json.dumps({"imports": IMPORTS, "seccomp": seccomp}).encode())
         self._zygotes.append(_Zygote(key, popen, ours))

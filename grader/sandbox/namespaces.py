@@ -28,7 +28,6 @@ MOUNT_POINTS = (CELL, STUDENT / "disk", STUDENT / "shared")
 
 # linux/sched.h
 _CLONE_NEWNS = 0x00020000
-_CLONE_NEWCGROUP = 0x02000000
 _CLONE_NEWUTS = 0x04000000
 _CLONE_NEWIPC = 0x08000000
 _CLONE_NEWUSER = 0x10000000
@@ -165,20 +164,6 @@ def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
         wire = Wire()
     _drop_capabilities()
     return Rights(mounter, wire)
-
-
-def beside(pid: int) -> int:
-    """The namespaces to join for whoever is to be where a student's process is.
-
-    Args:
-        pid: Its id.
-
-    Returns:
-        Flags of setns(2).
-    """
-    flags = _CLONE_NEWUSER | _CLONE_NEWPID | _CLONE_NEWNS | _CLONE_NEWIPC | _CLONE_NEWUTS
-    own, its = (Path(f"/proc/{one}/ns/cgroup").stat().st_ino for one in ("self", pid))
-    return flags | _CLONE_NEWNET | (_CLONE_NEWCGROUP if own != its else 0)
 
 
 def _wait_for(child: int, sentence: Callable[[], int | None]) -> None:

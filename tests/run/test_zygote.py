@@ -289,7 +289,7 @@ def test_what_prints_while_it_imports_ahead_is_not_used(
     environment["PYTHONPATH"] = os.pathsep.join((str(TRACER), str(tmp_path)))
     zygotes = Zygotes()
     for _ in range(2):
-        zygotes.ask([sys.executable, "/nowhere/program"], environment)
+        zygotes.ask([sys.executable, "/nowhere/program"], environment, 0)
     (descriptor,) = zygotes.sockets()
     (zygote,) = zygotes._zygotes
     select.select([descriptor], [], [])
@@ -297,6 +297,58 @@ def test_what_prints_while_it_imports_ahead_is_not_used(
     assert len(zygotes.ready()) == count
     zygotes.close()
     assert zygote.popen.wait() == 0
+
+
+def test_a_zygote_that_is_asked_for_nonsense_runs_nothing(tmp_path: Path) -> None:
+    program = tmp_path / "program"
+    program.write_text(f"open({str(tmp_path / 'ran')!r}, 'w')", encoding="utf-8")
+    environment = {**ros.find().environment(os.environ), "PYTHONPATH": str(TRACER)}
+    zygotes = Zygotes()
+    for _ in range(2):
+        zygotes.ask([sys.executable, str(program)], environment, 0)
+    (zygote,) = zygotes._zygotes
+    zygotes.hear(zygote.socket.fileno())
+    zygote.socket.send(b"{}")
+    assert zygote.popen.wait() == 1
+    zygotes.close()
+    assert not (tmp_path / "ran").exists()
+
+
+def test_forks_do_not_share_random_numbers(pair: Pair) -> None:
+    source = "import random, numpy\nprint(random.random(), numpy.random.rand(), flush=True)"
+    first, second = (lines(pair.forked(source))[0].split() for _ in range(2))
+    assert first[0] != second[0]
+    assert first[1] != second[1]
+
+
+def test_whoever_only_looks_for_a_module_does_not_use_it_up(pair: Pair) -> None:
+    source = (
+        "import importlib.util, inspect\nspec = importlib.util.find_spec('numpy')\n"
+        "print(spec.origin, spec.has_location, len(spec.loader.get_source('numpy')))\n"
+        "import numpy, rclpy\nprint(numpy.__spec__.loader, rclpy.__file__, numpy.__file__)\n"
+        "print(len(inspect.getsource(rclpy.init)))"
+    )
+    anew, forked = outcome(pair.anew(source)), outcome(pair.forked(source))
+    assert forked == anew
+
+
+PRISON = """
+import os
+for pid in sorted(filter(str.isdigit, os.listdir("/proc")), key=int):
+    status = dict(line.split(":", 1) for line in open(f"/proc/{pid}/status"))
+    print(pid, status["Seccomp_filters"].strip(), status["CapEff"].strip(), flush=True)
+try:
+    print(os.listdir(f"/proc/{os.getppid()}/fd"))
+except PermissionError as error:
+    print("the parent is closed", flush=True)
+"""
+
+
+def test_every_process_of_its_sandbox_is_as_bound_as_itself(pair: Pair) -> None:
+    *processes, parent = lines(pair.forked(PRISON))
+    assert len(processes) >= 4
+    assert {line.split()[1] for line in processes} == {"2"}
+    assert parent == "the parent is closed"
 
 
 IMPORTING = (

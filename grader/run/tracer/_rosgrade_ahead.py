@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import atexit
 import builtins
-import os
 import sys
 
 TYPE_CHECKING = False
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 
 _STARTED = frozenset(sys.modules)
 _bootstrap: Any = sys.modules["_frozen_importlib"]
-_MIDDLEWARE = "RMW_IMPLEMENTATION"
-_STARTED_WITH = os.environ.get(_MIDDLEWARE)
 _ABSENT = object()
 
 
@@ -38,11 +35,16 @@ class _Kept:
         self.children: dict[str, Any] = {}
         self.injected: dict[str, Any] = {}
 
+    def __getattr__(self, name: str) -> Any:
+        """What its own loader knows of it, such as its source."""
+        return getattr(self.spec.loader, name)
+
     def create_module(self, _spec: Any) -> Any:
         return self.module
 
     def exec_module(self, module: Any) -> None:
         """Do to others what the execution of the module did."""
+        self._ahead.take(self.spec.name)
         module.__spec__ = self.spec
         sys.modules.update(self.injected)
         for name in self.imports:
@@ -127,14 +129,21 @@ class Ahead:
 
     def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> Any:
         """What was executed ahead, the first time."""
-        kept = self._waiting.pop(name, None)
+        kept = self._waiting.get(name)
         if kept is None:
             return None
-        if name == "rclpy" and not self.is_loading:
-            _check_middleware()
-        spec = _bootstrap.ModuleSpec(name, kept, origin=kept.spec.origin)
-        spec.submodule_search_locations = kept.spec.submodule_search_locations
+        spec = _bootstrap.ModuleSpec(name, kept)
+        vars(spec).update(vars(kept.spec), loader=kept)
         return spec
+
+    def take(self, name: str) -> None:
+        """It is there now; whoever throws it away and imports it again gets a new one."""
+        self._waiting.pop(name, None)
+
+    def reseed(self) -> None:
+        """Give a fork random numbers of its own; Python's own module does it by itself."""
+        if "numpy.random" in self._kept:
+            self._kept["numpy.random"].module.seed()
 
     def executing(self, module: Any, execute: Callable[[Any], None]) -> None:
         """Execute a module under watch."""
@@ -227,9 +236,3 @@ def _import(name: str) -> None:
     except Exception:
         # It is not there, and the program that needs it is told so.
         return
-
-
-def _check_middleware() -> None:
-    """Rcl compares as it is loaded; where the program asks for another one, it loads it anew."""
-    if os.environ.get(_MIDDLEWARE) != _STARTED_WITH:
-        os.execv(sys.executable, sys.orig_argv)

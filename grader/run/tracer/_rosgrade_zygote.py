@@ -35,6 +35,9 @@ _FORKED = b"forked"
 _OWN = ("ctypes", "gc", "importlib", "json", "resource", "signal", "socket")
 _REQUEST_BYTES = 65_536
 _DESCRIPTORS = 8
+# linux/sched.h: CLONE_NEWNS, NEWUTS, NEWIPC, NEWUSER, NEWPID, NEWNET
+_NAMESPACES = 0x0002_0000 | 0x0400_0000 | 0x0800_0000 | 0x1000_0000 | 0x2000_0000 | 0x4000_0000
+_CLONE_NEWCGROUP = 0x0200_0000
 # linux/prctl.h, linux/seccomp.h, linux/capability.h
 _PR_SET_DUMPABLE, _PR_SET_SECCOMP, _PR_CAPBSET_DROP, _PR_SET_NO_NEW_PRIVS = 4, 22, 24, 38
 _SECCOMP_MODE_FILTER, _SET_MODE_FILTER, _NEW_LISTENER = 2, 1, 1 << 3
@@ -49,15 +52,26 @@ _SIGNALLED = 128
 
 def serve() -> None:
     """Wait for runs; returns in the fork that is to be a student's program."""
+    try:
+        _serve()
+    except BaseException:
+        # Nothing of a student's runs outside of a sandbox. Whoever asked sees the end of the reply.
+        os._exit(1)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+
+
+def _serve() -> None:
     ahead = Ahead()
     ahead.load(_OWN)
     for name in _OWN:
         globals()[name] = ahead.module(name)
     with socket.socket(fileno=int(os.environ.pop(_VARIABLE))) as asked:
-        ahead.load(json.loads(asked.recv(_REQUEST_BYTES)))
+        told = json.loads(asked.recv(_REQUEST_BYTES))
+        ahead.load(told["imports"])
         # Pages that the collector touches would be copied by every fork.
         gc.collect()
         gc.freeze()
+        has_forked = False
         while True:
             # Ready, also for the next one.
             asked.send(str(sum(os.times()[:4])).encode())
@@ -69,26 +83,35 @@ def serve() -> None:
                 break
             for descriptor in descriptors:
                 os.close(descriptor)
-            os.waitpid(pid, 0)
+            _, status = os.waitpid(pid, 0)
+            has_forked = has_forked or not status
+            if not has_forked:
+                # The system does not let it join a sandbox.
+                os._exit(1)
     request = json.loads(text)
-    try:
-        tracer, seen = _enter(request, descriptors)
-        told = {"ROSGRADE_TRACER_FD": str(tracer), "ROSGRADE_SEEN_FD": str(seen)}
-        _become({**request["environment"], **told}, ahead)
-    except BaseException:
-        # Whoever asked sees the end of the reply.
-        os._exit(1)
+    tracer, seen = _enter(request, descriptors, told["seccomp"])
+    pipes = {"ROSGRADE_TRACER_FD": str(tracer), "ROSGRADE_SEEN_FD": str(seen)}
+    _become({**request["environment"], **pipes}, ahead)
 
 
-def _enter(request: Mapping[str, Any], descriptors: list[int]) -> tuple[int, int]:
+def _enter(request: Mapping[str, Any], descriptors: list[int], call: int) -> tuple[int, int]:
     """Go on as the student's process in a sandbox; the others of the way there end.
+
+    All signals are blocked in it.
+
+    Args:
+        request: Of the cell.
+        descriptors: Given with it.
+        call: Number of seccomp(2).
 
     Returns:
         Descriptors of the tracer's pipes.
     """
     sandbox, stdout, stderr, guard, rules, tracer, seen, told = descriptors
     libc = ctypes.CDLL(None, use_errno=True)
-    _call(libc.setns, sandbox, request["namespaces"])
+    # Not every kernel makes a new cgroup namespace, and the same one may not be joined again.
+    if libc.setns(sandbox, _NAMESPACES | _CLONE_NEWCGROUP) == -1:
+        _call(libc.setns, sandbox, _NAMESPACES)
     # A process is adopted within the namespace of its parent: this one's child is the first in it.
     child = os.fork()
     if child:
@@ -100,37 +123,38 @@ def _enter(request: Mapping[str, Any], descriptors: list[int]) -> tuple[int, int
     os.chdir(request["folder"])
     for number, value in request["limits"]:
         resource.setrlimit(number, (value, value))
-    listener = _give_up_rights(libc, guard, rules, request["seccomp"])
+    listener = _give_up_rights(libc, guard, rules, call)
     nothing = os.open(os.devnull, os.O_RDONLY)
     for target, descriptor in enumerate((nothing, stdout, stderr)):
         os.dup2(descriptor, target)
     for descriptor in (sandbox, stdout, stderr, guard, rules, nothing):
         os.close(descriptor)
-    # The student's process group is this one's, and none of its signals is meant for it.
+    # The student's process group is this one's, and none of its signals is meant for it. Nor may
+    # the student's process look into it, and write what it tells.
     signal.pthread_sigmask(signal.SIG_SETMASK, signal.valid_signals())
-    child = os.fork()
-    if child:
-        _wait_for(child, (tracer, seen), told, listener)
-    os.close(told)
+    _call(libc.prctl, _PR_SET_DUMPABLE, 0, 0, 0, 0)
+    reply = socket.socket(fileno=told)
+    socket.send_fds(reply, [_FORKED], [] if listener is None else [listener])
     if listener is not None:
         os.close(listener)
-    # The kernel forbids to look into what had rights; the student's process has none any more.
+    # Whoever has waited too long has begun anew, and this program must not run as well.
+    if not reply.recv(1):
+        os._exit(1)
+    child = os.fork()
+    if child:
+        _wait_for(child, (tracer, seen), reply)
+    reply.close()
     _call(libc.prctl, _PR_SET_DUMPABLE, 1, 0, 0, 0)
-    signal.pthread_sigmask(signal.SIG_SETMASK, ())
     return tracer, seen
 
 
-def _wait_for(child: int, given: tuple[int, int], told: int, listener: int | None) -> None:
+def _wait_for(child: int, given: tuple[int, int], reply: socket.socket) -> None:
     """Tell how a process ended, and end."""
     for descriptor in {*range(_STANDARD), *given}:
         os.close(descriptor)
-    with socket.socket(fileno=told) as reply:
-        socket.send_fds(reply, [_FORKED], [] if listener is None else [listener])
-        if listener is not None:
-            os.close(listener)
-        _, status = os.waitpid(child, 0)
-        code = os.waitstatus_to_exitcode(status)
-        reply.send(str(code if code >= 0 else _SIGNALLED - code).encode())
+    _, status = os.waitpid(child, 0)
+    code = os.waitstatus_to_exitcode(status)
+    reply.send(str(code if code >= 0 else _SIGNALLED - code).encode())
     os._exit(0)
 
 
@@ -184,6 +208,7 @@ def _become(environment: Mapping[str, str], ahead: Ahead) -> None:
         os.execv(sys.executable, sys.orig_argv)
     for name in (__name__, Ahead.__module__):
         del sys.modules[name]
+    ahead.reseed()
     ahead.be_as_at_the_start()
 
 
