@@ -116,7 +116,7 @@ def test_a_file_in_the_place_of_the_report_is_told_before_anything_is_graded(
     said = "mine: is not a folder; name another place"
     for arguments in (
         ("check", "timed_publisher", ROOT / "reference" / "timed_publisher", "--report", "mine"),
-        ("batch", "timed_publisher", "class", "--out", "mine"),
+        ("batch", "timed_publisher", "class", "--out", "mine", "--sandbox", "none"),
         ("start", "timed_publisher", "mine"),
     ):
         ended = rosgrade(*arguments)
