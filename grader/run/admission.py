@@ -18,9 +18,9 @@ from contextlib import contextmanager
 from grader.run.load import Load, cpu_count
 
 _CELLS_PER_CPU = 16
-_STARTS_PER_CPU = 1.5
+_STARTS_PER_CPU = 3.0
 """More than one, because a start also waits: for processes, and for DDS to discover them."""
-_BUSY_PER_CPU = 4.0
+_BUSY_PER_CPU = 6.0
 """Runnable threads of the machine for each CPU from which on nobody more is let in."""
 _LONGEST_START_S = 2.0
 """What has not matched by then waits for something, and costs no CPU any more."""
@@ -37,7 +37,7 @@ class Admission:
 
         Args:
             cells: Most cells at once, whatever the load; by default the load decides.
-            starts: Most cells that start at once; by default three for each two CPUs.
+            starts: Most cells that start at once; by default three for each CPU.
             load: Of the machine.
         """
         cpus = cpu_count()
