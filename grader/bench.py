@@ -184,6 +184,7 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
             with ThreadPoolExecutor(max_workers=runner.admission.most) as pool:
                 work(0)
                 before_s, own_s = runner.cpu_s, time.process_time()
+                machine_s = _machine_cpu_s()
                 began_s = time.monotonic()
                 futures = [pool.submit(work, number) for number in range(count)]
                 done_s: list[float] = []
@@ -193,12 +194,16 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
                     if len(done_s) % _TOLD_EACH == 0:
                         print(f"{name}: {len(done_s)} of {count}", file=sys.stderr, flush=True)
                 wall_s = done_s[-1]
+            machine_s = _machine_cpu_s() - machine_s
             cpu_s = runner.cpu_s - before_s + time.process_time() - own_s
         rates.append(60 * count / wall_s)
         samples.add(f"batch, {name}: submissions per minute", rates[-1])
         samples.add(f"batch, {name}: CPU of each", cpu_s / count)
         share = cpu_s / cpu_count() / wall_s
         samples.add(f"batch, {name}: share of what the CPUs bound", share)
+        # With what the kernel does for a sandbox in threads of its own, and with all others' load.
+        busy = machine_s / cpu_count() / wall_s
+        samples.add(f"batch, {name}: share of the CPUs in use on the machine", busy)
         # In the first and the last seconds of a class too few are under way to fill the CPUs.
         first, last = count // 4, count - count // 4
         middle = 60 * (last - first) / (done_s[last] - done_s[first])
@@ -209,6 +214,15 @@ def _batch(samples: Samples, folder: Path, _: int) -> None:
     plain_s = median(_plain(samples, prepared) for _ in range(_SERIAL))
     samples.add("batch: times our own rate of one after the other", rates[0] / rates[1])
     samples.add("batch: times the rate of the plain test program", rates[0] * plain_s / 60)
+
+
+def _machine_cpu_s() -> float:
+    """CPU time of the whole machine since it started, in seconds: see proc_stat(5)."""
+    user, nice, system, _idle, _iowait, irq, softirq, steal = map(
+        int, Path("/proc/stat").read_text().split()[1:9]
+    )
+    ticks = user + nice + system + irq + softirq + steal
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def _plain(samples: Samples, prepared: Prepared) -> float:

@@ -3,7 +3,7 @@
 Starting a node costs nearly all of its CPU time (imports, DDS), and many starts at one
 instant disturb the timing of those that already run; so starts are counted apart. Beyond a
 few, another cell is let in only while the machine, with all that others do on it, has a CPU
-to spare.
+and memory to spare.
 """
 
 from __future__ import annotations
@@ -17,11 +17,14 @@ from contextlib import contextmanager
 
 from grader.run.load import Load, cpu_count
 
-_CELLS_PER_CPU = 16
+_CELLS_PER_CPU = 24
+"""At 16, one second of the first five of a class passed with both CPUs half idle."""
 _STARTS_PER_CPU = 3.0
 """More than one, because a start also waits: for processes, and for DDS to discover them."""
 _BUSY_PER_CPU = 6.0
 """Runnable threads of the machine for each CPU from which on nobody more is let in."""
+_FREE_MEMORY = 0.125
+"""Share of the memory that stays free; a cell of the course takes some 40 MB."""
 _LONGEST_START_S = 2.0
 """What has not matched by then waits for something, and costs no CPU any more."""
 _LOOK_AGAIN_S = 0.05
@@ -98,7 +101,9 @@ class Admission:
             return False
         if self._starting() >= self._starts:
             return False
-        return running < self._always or self._load.runnable() < self._busy
+        if running < self._always:
+            return True
+        return self._load.runnable() < self._busy and self._load.free_memory() > _FREE_MEMORY
 
     def _starting(self) -> int:
         since_s = time.monotonic() - _LONGEST_START_S

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 _STAT = Path("/proc/stat")
+_MEMINFO = Path("/proc/meminfo")
 _SAMPLE_S = 0.04
 _MEMORY_S = 0.4
 
@@ -38,6 +39,17 @@ class Load:
             self._average += weight * (_procs_running() - 1 - self._average)
             self._sampled_s = now_s
         return self._average
+
+    def free_memory(self) -> float:
+        """Share of the machine's memory that a program can still get without swapping.
+
+        ``MemAvailable`` of ``MemTotal`` in /proc/meminfo, see proc_meminfo(5).
+        """
+        sizes = {
+            name: int(size.split()[0])
+            for name, _, size in (line.partition(":") for line in _MEMINFO.read_text().splitlines())
+        }
+        return sizes["MemAvailable"] / sizes["MemTotal"]
 
 
 def _procs_running() -> int:

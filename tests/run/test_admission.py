@@ -79,14 +79,18 @@ def test_alone_waits_for_the_others_and_keeps_them_out() -> None:
 
 
 class Busy(Load):
-    """A machine with so many runnable threads."""
+    """A machine with so many runnable threads, and this share of its memory free."""
 
-    def __init__(self, threads: float) -> None:
+    def __init__(self, threads: float, memory: float = 1.0) -> None:
         super().__init__()
         self.threads = threads
+        self.memory = memory
 
     def runnable(self) -> float:
         return self.threads
+
+    def free_memory(self) -> float:
+        return self.memory
 
 
 def test_a_busy_machine_takes_one_cell_for_each_cpu() -> None:
@@ -100,6 +104,23 @@ def test_a_busy_machine_takes_one_cell_for_each_cpu() -> None:
     assert one_more.is_inside()
     for visitor in (*inside, one_more):
         visitor.go()
+
+
+def test_a_machine_short_of_memory_takes_one_cell_for_each_cpu() -> None:
+    load = Busy(0.0, memory=0.05)
+    admission = Admission(starts=100, load=load)
+    inside = [Visitor(admission) for _ in range(cpu_count())]
+    assert all(visitor.is_inside() for visitor in inside)
+    one_more = Visitor(admission)
+    assert not one_more.inside.wait(0.2)
+    load.memory = 0.5
+    assert one_more.is_inside()
+    for visitor in (*inside, one_more):
+        visitor.go()
+
+
+def test_the_free_memory_is_a_share() -> None:
+    assert 0.0 < Load().free_memory() < 1.0
 
 
 def test_the_load_counts_threads_of_the_whole_machine() -> None:
