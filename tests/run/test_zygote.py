@@ -234,9 +234,15 @@ def test_what_comes_of_a_forked_process_is_the_same(name: str, pair: Pair) -> No
     assert forked == anew
 
 
-def test_ctrl_c_comes_where_the_program_is(pair: Pair) -> None:
-    anew, forked = (outcome(run(INTERRUPTED, discovery="1 s")) for run in (pair.anew, pair.forked))
+# With one of them, Python is started anew in the fork.
+@pytest.mark.parametrize("module", ["robot.py", "queue.py"])
+def test_ctrl_c_comes_where_the_program_is(module: str, pair: Pair) -> None:
+    anew, forked = (
+        outcome(run(INTERRUPTED, discovery="1 s", modules={module: ""}))
+        for run in (pair.anew, pair.forked)
+    )
     assert anew["lines"][-1] == "KeyboardInterrupt"
+    assert [stopped_by for _, stopped_by, _ in anew["ends"]] == ["SIGINT"]
     assert forked == anew
 
 

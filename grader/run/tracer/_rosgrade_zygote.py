@@ -205,6 +205,9 @@ def _become(environment: Mapping[str, str], ahead: Ahead) -> None:
     os.environ.clear()
     os.environ.update(environment)
     if ahead.roots & _modules_of(sys.orig_argv[1]):
+        # What is blocked stays so in whatever is executed.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_SETMASK, ())
         os.execv(sys.executable, sys.orig_argv)
     for name in (__name__, Ahead.__module__):
         del sys.modules[name]
