@@ -223,6 +223,15 @@ PROGRAMS = {
         "import rclpy\nrclpy.init()\n"
     ),
     "a warning": "import warnings, numpy\nwarnings.warn('old', DeprecationWarning)",
+    "objects that end with the program": (
+        "class Robot:\n    def __del__(self):\n        print('stopped', flush=True)\n"
+        "def wait():\n    try:\n        yield\n    finally:\n        print('closed', flush=True)\n"
+        "robot = Robot()\nwaiting = wait()\nnext(waiting)\n"
+    ),
+    "what is asked of C": (
+        "import ctypes, os, threading\nprint(ctypes.get_errno())\n"
+        "print(threading.main_thread().native_id == os.getpid())\n"
+    ),
     "one left behind": "import subprocess; subprocess.Popen(['sleep', '100'])",
 }
 

@@ -140,8 +140,11 @@ class Ahead:
         """It is there now; whoever throws it away and imports it again gets a new one."""
         self._waiting.pop(name, None)
 
-    def reseed(self) -> None:
-        """Give a fork random numbers of its own; Python's own module does it by itself."""
+    def be_a_fork(self) -> None:
+        """Give a fork random numbers and an id of its own, as Python's own modules do or do not."""
+        if "threading" in self._kept:
+            threading = self._kept["threading"].module
+            threading.main_thread()._native_id = threading.get_native_id()
         if "numpy.random" in self._kept:
             self._kept["numpy.random"].module.seed()
 

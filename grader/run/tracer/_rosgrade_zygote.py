@@ -211,8 +211,17 @@ def _become(environment: Mapping[str, str], ahead: Ahead) -> None:
         os.execv(sys.executable, sys.orig_argv)
     for name in (__name__, Ahead.__module__):
         del sys.modules[name]
-    ahead.reseed()
+    _renew_main()
+    ahead.be_a_fork()
     ahead.be_as_at_the_start()
+    ctypes.set_errno(0)
+
+
+def _renew_main() -> None:
+    """Let what the program leaves in ``__main__`` end with it: the old one is frozen."""
+    main = type(sys)("__main__")
+    vars(main).update(vars(sys.modules["__main__"]))
+    sys.modules["__main__"] = main
 
 
 def _modules_of(program: str) -> set[str]:
