@@ -70,23 +70,29 @@ class ForkedProcess(EnclosedProcess):
             raise NotForked(str(error)) from error
         super().__init__(enclosure, _HOLDER, {"PATH": "/usr/bin:/bin"}, (), held=True)
         given = [theirs.detach()]
+        readable = []
         try:
             self._reply.setsockopt(socket.SOL_SOCKET, socket.SO_PASSCRED, 1)
             self._reply.settimeout(_LIMIT_S)
-            readable = []
-            for _ in range(2):
-                read, write = os.pipe()
-                readable.append(open(read, "rb", 0))  # noqa: PTH123, SIM115
-                given.append(write)
-            reply, *streams = given
-            self._ask(enclosure, zygote, environment, (*streams, *pipes, reply))
+            try:
+                for _ in range(2):
+                    read, write = os.pipe()
+                    readable.append(open(read, "rb", 0))  # noqa: PTH123, SIM115
+                    given.append(write)
+                reply, *streams = given
+                self._ask(enclosure, zygote, environment, (*streams, *pipes, reply))
+            finally:
+                # Of a reply that is open here as well nobody would see the end.
+                for descriptor in given:
+                    os.close(descriptor)
             self._hear_of_fork(watch)
         except (OSError, NotForked) as error:
             self._tear_down()
+            for stream in readable:
+                stream.close()
+            if isinstance(error, TimeoutError):
+                _dismiss(zygote)
             raise NotForked(str(error)) from error
-        finally:
-            for descriptor in given:
-                os.close(descriptor)
         self._reply.setblocking(False)
         assert self.stdout is not None
         assert self.stderr is not None
@@ -205,3 +211,9 @@ class ForkedProcess(EnclosedProcess):
             if stream is not None:
                 stream.close()
         self.wait()
+
+
+def _dismiss(zygote: int) -> None:
+    """Let nobody wait again for one that does not answer; its nursery sees that it has ended."""
+    with socket.socket(fileno=os.dup(zygote)) as asked, contextlib.suppress(OSError):
+        asked.shutdown(socket.SHUT_RDWR)

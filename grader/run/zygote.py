@@ -125,6 +125,9 @@ class Zygotes:
                     told = one.socket.recv(_TOLD_BYTES)
                 if not told or not one.is_silent():
                     self._remove(one)
+                    if not told:
+                        # A cell has dismissed it, if it has not ended by itself.
+                        one.popen.kill()
                     continue
                 one.is_ready = True
                 self._cpu_s += float(told) - one.cpu_s

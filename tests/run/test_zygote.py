@@ -20,6 +20,7 @@ from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
 from grader.run.descendants import descendants
 from grader.run.environment import TRACER
+from grader.run.forked import _dismiss
 from grader.run.runner import Runner
 from grader.run.zygote import IMPORTS, Zygotes
 from grader.sandbox.sandbox import Sandbox
@@ -312,6 +313,21 @@ def test_what_prints_while_it_imports_ahead_is_not_used(
     assert len(zygotes.ready()) == count
     zygotes.close()
     assert zygote.popen.wait() == 0
+
+
+def test_a_zygote_that_hangs_is_ended_once_a_cell_has_dismissed_it() -> None:
+    environment = {**ros.find().environment(os.environ), "PYTHONPATH": str(TRACER)}
+    zygotes = Zygotes()
+    for _ in range(2):
+        zygotes.ask([sys.executable, "/nowhere/program"], environment, 0)
+    (zygote,) = zygotes._zygotes
+    zygotes.hear(zygote.socket.fileno())
+    (descriptor,) = zygotes.ready().values()
+    zygote.popen.send_signal(signal.SIGSTOP)
+    _dismiss(descriptor)
+    zygotes.hear(descriptor)
+    assert not zygotes.ready()
+    assert zygote.popen.wait() == -signal.SIGKILL
 
 
 def test_a_zygote_that_is_asked_for_nonsense_runs_nothing(tmp_path: Path) -> None:

@@ -134,21 +134,22 @@ def _enter(request: Mapping[str, Any], descriptors: list[int], call: int) -> tup
     signal.pthread_sigmask(signal.SIG_SETMASK, signal.valid_signals())
     _call(libc.prctl, _PR_SET_DUMPABLE, 0, 0, 0, 0)
     reply = socket.socket(fileno=told)
-    socket.send_fds(reply, [_FORKED], [] if listener is None else [listener])
+    # Before it says that it has forked: what cannot be forked is begun anew.
+    child = os.fork()
+    if child:
+        socket.send_fds(reply, [_FORKED], [] if listener is None else [listener])
+        _wait_for(child, (tracer, seen, *([] if listener is None else [listener])), reply)
     if listener is not None:
         os.close(listener)
     # Whoever has waited too long has begun anew, and this program must not run as well.
     if not reply.recv(1):
         os._exit(1)
-    child = os.fork()
-    if child:
-        _wait_for(child, (tracer, seen), reply)
     reply.close()
     _call(libc.prctl, _PR_SET_DUMPABLE, 1, 0, 0, 0)
     return tracer, seen
 
 
-def _wait_for(child: int, given: tuple[int, int], reply: socket.socket) -> None:
+def _wait_for(child: int, given: tuple[int, ...], reply: socket.socket) -> None:
     """Tell how a process ended, and end."""
     for descriptor in {*range(_STANDARD), *given}:
         os.close(descriptor)
