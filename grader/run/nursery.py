@@ -41,7 +41,6 @@ from grader.run.zygote import Zygotes
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.namespaces import CELL, enter
-from grader.sandbox.python_tree import trees_folder
 from grader.scratch import Scratch
 
 if TYPE_CHECKING:
@@ -261,12 +260,10 @@ class Nursery:
             self._socket.send(json.dumps({"kill": pid}).encode())
 
 
-def _trees_of(sandbox: Sandbox | None) -> tuple[int, int] | None:
-    """What a sandbox shows of the cache: another folder once somebody has emptied that."""
-    if sandbox is None:
-        return None
-    status = trees_folder(sandbox.cache).stat()
-    return status.st_dev, status.st_ino
+def _trees_of(sandbox: Sandbox | None) -> list[tuple[int, int]]:
+    """What a sandbox shows of the cache: other folders once somebody has deleted in there."""
+    found = [path.stat() for path in sandbox.cached] if sandbox is not None else []
+    return [(status.st_dev, status.st_ino) for status in found]
 
 
 def _serve(requests: socket.socket) -> None:

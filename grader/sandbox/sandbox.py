@@ -123,6 +123,12 @@ class Sandbox:
                 self._tree = student_prefix(self.cache, self.libraries)
             return self._tree
 
+    @property
+    def cached(self) -> tuple[Path, ...]:
+        """Folders of the cache that students' interpreters start from."""
+        own = (self.python_tree,) if _in_environment() else ()
+        return (trees_folder(self.cache), *own)
+
     def watched(self) -> Callable[[], None]:
         """See that untrusted code does not fail because something of ours was deleted.
 

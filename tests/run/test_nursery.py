@@ -91,6 +91,23 @@ def test_a_cell_that_hangs_does_not_outlive_long_whoever_could_kill_it() -> None
     nursery.close()
 
 
+def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(tmp_path: Path) -> None:
+    found = try_sandbox()
+    if found.problem:
+        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
+    sandbox = Sandbox(tmp_path / "cache")
+    nursery = Nursery(ros.find(), sandbox)
+    check = sandbox.watched()
+    check()
+    assert nursery.is_alive
+    next(sandbox.python_tree.glob("lib/python3*/site-packages/rclpy/node.py")).unlink()
+    with pytest.raises(GraderFault, match="files of the students' Python were deleted"):
+        check()
+    # Its zygotes would start from what is left of them.
+    assert not nursery.is_alive
+    nursery.close()
+
+
 def test_whoever_installs_a_package_meanwhile_spoils_no_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
