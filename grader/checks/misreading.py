@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from statistics import mean
 
 from grader.checks.echo import Wanted
 from grader.checks.printed import shows
@@ -15,6 +16,8 @@ _FACTORS = (
     (1000.0, "1000 times the value, as in millimetres,"),
 )
 _MOST_NAMED = 2
+# How many beams to either side of the one ahead a mean is usually taken over.
+_SIDES = (1, 2, 3, 5, 10, 15, 20, 30)
 # A covariance has 36 numbers, most of them 0.
 _LONGEST = 36
 
@@ -79,7 +82,12 @@ def _names(number: float, wanted: Wanted, decimals: int) -> Iterator[str]:
     }
     many = _in_long_arrays(numeric)
     few = {path: value for path, value in numeric.items() if path not in many}
-    likely = [*_statistics(wanted.message.value), *_spokes(numeric), *few.items()]
+    likely = [
+        *_statistics(wanted.message.value),
+        *_spokes(numeric),
+        *few.items(),
+        *_means_ahead(wanted.message.value),
+    ]
     for label, value in likely:
         if shows(number, value, decimals) and _tells(number, label):
             yield label
@@ -109,11 +117,23 @@ def _statistics(value: Mapping[str, object]) -> Iterator[tuple[str, float]]:
 
 
 def _spokes(numeric: Mapping[str, float]) -> Iterator[tuple[str, float]]:
-    """Beams that are taken for the one ahead: the middle one, those at the sides."""
+    """Beams that are taken for the one ahead: the middle one, those at the sides, the next ones."""
     beams = [path for path in numeric if path.startswith("ranges[")]
     count = len(beams)
-    for share in (2, 4):
-        for index in range(1, share):
-            path = f"ranges[{index * (count + 1) // share}]"
-            if path in numeric:
-                yield path, numeric[path]
+    quarters = [index * (count + 1) // share for share in (2, 4) for index in range(1, share)]
+    # The one ahead, which should be shown, is not among them.
+    for index in (*quarters, 1, count):
+        path = f"ranges[{index}]"
+        if path in numeric:
+            yield path, numeric[path]
+
+
+def _means_ahead(value: Mapping[str, object]) -> Iterator[tuple[str, float]]:
+    """Means of the beams about the first one, which looks ahead."""
+    ranges = value.get("ranges")
+    if not isinstance(ranges, Sequence) or isinstance(ranges, str):
+        return
+    for sides in _SIDES:
+        beams = [*ranges[: sides + 1], *ranges[-sides:]]
+        if len(beams) < len(ranges) and all(map(math.isfinite, beams)):
+            yield f"mean(ranges[-{sides}] ... ranges[{sides}])", mean(beams)

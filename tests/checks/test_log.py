@@ -350,6 +350,19 @@ class TestOtherValues:
     def test_another_beam(self):
         assert "`2.50`, which shows `ranges[180]`" in front(lines("2.50", SCAN_TIMES_S))
 
+    def test_the_beam_beside_the_one_ahead(self):
+        value = {**scan(), "ranges": [*RANGES[:359], 2.731]}
+        changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
+        found = front(lines("front 2.73", SCAN_TIMES_S), messages=changed)
+        assert "which shows `ranges[359]`" in found
+
+    def test_a_mean_of_the_beams_ahead(self):
+        value = {**scan(), "ranges": [AHEAD, *[2.2] * 30, *[2.0] * 299, *[2.4] * 30]}
+        changed = {"/scan": sent("/scan", SCAN, value, SCAN_TIMES_S)}
+        # Of ten beams of 2.2 m, ten of 2.4 m and the one ahead.
+        found = front(lines("front 2.278", SCAN_TIMES_S), messages=changed)
+        assert "which shows `mean(ranges[-10] ... ranges[10])`" in found
+
     def test_what_is_written_at_ctrl_c_answers_no_message(self):
         log = lines("2.50", SCAN_TIMES_S) + output(traceback("KeyboardInterrupt"), time_s=4.25)
         found = front(log, stop_s=4.2)
