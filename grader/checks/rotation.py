@@ -45,6 +45,8 @@ _AT_ONCE_S = 0.05
 _SLOW_S = 0.05
 # One that publishes a first message when it is created does no harm.
 _GREETINGS = 2
+# Nor does one that says everything twice; one that does not stop answers far more often.
+_COPIES = 3
 
 Tolerance = Annotated[float, QuantityOf(Dimension.ANGLE, minimum=0.0, exclusive=True)]
 
@@ -105,7 +107,8 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     at gimbal lock any roll and yaw that make it are right. A zero axis or a zero quaternion may
     be answered by no rotation at all (the identity) or by nothing, but not by NaN. Answers may
     come late or twice: each is paired with the question that it answers, and one that is missing
-    does not shift the others.
+    does not shift the others. A node that repeats its last answer for as long as nothing new is
+    asked is wrong.
 
     Names the mistake where the wrong answers are what it gives: the angle not halved, the axis
     not normalized, w first instead of last, degrees, roll and yaw swapped, axes that turn with
@@ -141,6 +144,10 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     if unasked > _GREETINGS:
         evidence = replace(evidence, moments=first_seen(recording, received))
         return _unasked(parameters, unasked, evidence)
+    if judged and len(judged[-1].answers) > _COPIES:
+        when_s = recording.since_launch_s(received[-1].stamp_ns)
+        evidence = replace(evidence, moments=(Moment("once more the same answer", when_s),))
+        return _again(parameters, judged[-1], evidence)
     if len(judged) < parameters.at_least:
         return _too_few(recording, parameters, found, judged).finding(expected)
     return Finding.passed(expected, _summary(judged), evidence)
@@ -309,6 +316,17 @@ def _unasked(parameters: Answers, unasked: int, evidence: Evidence) -> Finding:
         parameters.words,
         f"{counted(unasked, 'message')} on {code(parameters.topic)} before anything was asked on "
         f"{code(parameters.stimulus)}",
+        "Publish in the callback of the subscription, once for each message, and not in a timer.",
+        evidence,
+    )
+
+
+def _again(parameters: Answers, last: Case, evidence: Evidence) -> Finding:
+    """What is said about a node that goes on answering when nothing is asked any more."""
+    return Finding.failed(
+        parameters.words,
+        f"case {last.number} was answered {counted(len(last.answers), 'time')}: the same answer "
+        f"comes on {code(parameters.topic)} again and again when nothing new is asked",
         "Publish in the callback of the subscription, once for each message, and not in a timer.",
         evidence,
     )

@@ -466,6 +466,12 @@ class TestPairing:
         doubled = [[one, one] for one in self.answers]
         assert judged(self.conversion, self.asked, doubled).status is Status.PASSED
 
+    def test_an_answer_that_is_repeated_when_nothing_is_asked(self):
+        answers = [*self.answers[:-1], [self.answers[-1]] * 6]
+        words = failed(self.conversion, self.asked, answers)
+        assert "case 100 was answered 6 times" in words
+        assert "once for each message, and not in a timer" in words
+
     def test_one_missing_answer_is_one_missing_answer(self):
         answers = [*self.answers[:10], None, *self.answers[11:]]
         words = failed(self.conversion, self.asked, answers)
