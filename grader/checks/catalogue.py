@@ -20,7 +20,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "qos": ("qos", "peer", "late_joiner"),
         "messages": ("messages", "following", "sequence"),
         "timing": ("timing", "rate", "latency"),
-        "executor": ("executor",),
+        "executor": ("executor", "timer"),
         "callbacks": ("callbacks", "overlap", "together"),
         "service": ("service",),
         "action": ("action", "action_end"),

@@ -98,6 +98,7 @@ PARAMETERS = {
         "conversion": "rpy_to_quaternion",
     },
     "executor.responsive": {"within": "1 s"},
+    "executor.timer": {"topic": "/cmd_vel"},
     "motion.drives": {"speed": "0.22 m/s", "tolerance": "5 %"},
     "motion.keeps_driving": {"distance": "0.5 m"},
     "motion.straight": {},
