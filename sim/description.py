@@ -177,6 +177,11 @@ class OdometryOptions(Model):
         description="Where `odom` is: with `world` the coordinates of the world file are those "
         "of odometry.",
     )
+    continuous: bool = Field(
+        False,
+        description="The quaternion goes on without a jump when the robot turns, so that its `w` "
+        "is negative after half a turn; by default `w` is never negative. Both say the same.",
+    )
     drift: DriftOptions = Field(default_factory=DriftOptions, description="Errors.")
     covariance: CovarianceOptions = Field(
         default_factory=CovarianceOptions, description="Variances that are reported."

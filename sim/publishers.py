@@ -49,6 +49,7 @@ class OdometryPublisher:
         self._message = Odometry()
         self._message.header.frame_id = options.frame
         self._message.child_frame_id = options.child_frame
+        self._is_continuous = options.continuous
         variances = options.covariance
         diagonal = (variances.x, variances.y, *[UNKNOWN_VARIANCE] * 3, variances.yaw)
         for index, variance in enumerate(diagonal):
@@ -67,7 +68,12 @@ class OdometryPublisher:
         _set_time(message.header.stamp, stamp_ns)
         message.pose.pose.position.x = sample.pose.x_m
         message.pose.pose.position.y = sample.pose.y_m
-        _set_yaw(message.pose.pose.orientation, sample.pose.yaw_rad)
+        quaternion = message.pose.pose.orientation
+        z, w = quaternion.z, quaternion.w
+        _set_yaw(quaternion, sample.pose.yaw_rad)
+        # It still held the one before: of the two that say the same, take the nearer.
+        if self._is_continuous and z * quaternion.z + w * quaternion.w < 0.0:
+            quaternion.z, quaternion.w = -quaternion.z, -quaternion.w
         message.twist.twist.linear.x = sample.twist.linear_m_s
         message.twist.twist.angular.z = sample.twist.angular_rad_s
         self.publisher.publish(message)

@@ -94,6 +94,8 @@ def mistakes(value: SourceValue, message: Mapping[str, Any]) -> Iterator[tuple[s
         yield "asin(z), which is half of the yaw", math.asin(max(-1.0, min(1.0, z)))
         size = 2.0 * math.acos(max(-1.0, min(1.0, w)))
         yield "2 acos(w), which has lost the sign of the yaw", size
+        doubled = 2.0 * math.asin(max(-1.0, min(1.0, z)))
+        yield "2 asin(z), which is wrong where w is negative: math.atan2 knows both", doubled
         folded = math.atan(math.tan(right))
         yield "the yaw without its quadrant: math.atan2(a, b), not math.atan(a / b)", folded
         yield "the yaw from asin, which gives -90° to 90° only", math.asin(math.sin(right))

@@ -176,6 +176,30 @@ class TestExplains:
         assert words in found
         assert "yaw(pose.pose.orientation)" in found
 
+    def test_twice_the_asin_where_w_is_negative(self):
+        def turned(time_s):
+            sent = odometry(time_s)
+            if place(time_s)[1] < 0.0:
+                quaternion = sent["pose"]["pose"]["orientation"]
+                quaternion.update({key: -number for key, number in quaternion.items()})
+            return sent
+
+        def values(time_s):
+            x, _, speed = place(time_s)
+            z = turned(time_s)["pose"]["pose"]["orientation"]["z"]
+            return status(x, 2.0 * math.asin(z), speed)
+
+        sources = tuple(
+            message(t, turned(t), sequence=n, topic=ODOM, type="nav_msgs/msg/Odometry")
+            for n, t in enumerate(TIMES, start=1)
+        )
+        subject = run(values)
+        subject = replace(subject, messages={**subject.messages, ODOM: sources})
+        assert "it is 2 asin(z), which is wrong where w is negative" in told(subject)
+        subject = run(right)
+        subject = replace(subject, messages={**subject.messages, ODOM: sources})
+        assert verdict(subject).status is Status.PASSED
+
     def test_another_field_of_the_source(self):
         found = told(run(lambda t: status(-2.0 * place(t)[0], *place(t)[1:])))
         assert "it is `pose.pose.position.y`" in found

@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -121,6 +122,30 @@ def command(v: float, w: float) -> TwistMessage:
     message = TwistMessage()
     message.linear.x, message.angular.z = v, w
     return message
+
+
+@pytest.mark.parametrize("continuous", [False, True])
+def test_beyond_half_a_turn_the_quaternion_goes_on_or_has_no_negative_w(
+    bench: Bench, continuous: bool
+) -> None:
+    simulator = bench.simulator(
+        robot={"drives": [{"at": "0 s", "angular": "2.8 rad/s"}]},
+        lidar={"enabled": False},
+        odometry={"continuous": continuous},
+    )
+    odometry = bench.listen(Odometry, "/odom")
+    bench.wait(lambda: simulator.odometry.publisher.get_subscription_count() == 1, "match")
+    for _ in range(20):
+        bench.step(simulator, 10)
+        number = sum(step.odometry is not None for step in bench.truth.steps)
+        bench.wait(lambda number=number: len(odometry) == number, "odometry")
+    sent = [step for step in bench.truth.steps if step.odometry is not None]
+    told = [message.pose.pose.orientation for message in odometry]
+    turns = [a.z * b.z + a.w * b.w for a, b in pairwise(told)]
+    assert (min(turns) > 0.9, min(q.w for q in told) < 0.0) == (continuous, continuous)
+    for quaternion, step in zip(told, sent, strict=True):
+        off_rad = 2.0 * math.atan2(quaternion.z, quaternion.w) - step.pose.yaw_rad
+        assert math.remainder(off_rad, math.tau) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_student_drives_and_sees(bench: Bench) -> None:
