@@ -229,6 +229,19 @@ PROGRAMS = {
         "def wait():\n    try:\n        yield\n    finally:\n        print('closed', flush=True)\n"
         "robot = Robot()\nwaiting = wait()\nnext(waiting)\n"
     ),
+    "folders of its own before Python's": (
+        "import sys\nfrom pathlib import Path\n"
+        "for name in ('queue.py', 'numpy/__init__.py'):\n"
+        "    file = Path('/tmp/own', name)\n"
+        "    file.parent.mkdir(parents=True, exist_ok=True)\n    file.touch()\n"
+        "sys.path.insert(0, '/tmp/own')\n"
+        "import json, numpy, queue\nprint(json.__file__, numpy.__file__, queue.__file__)\n"
+        "import rclpy\nprint(rclpy.__file__)\nimport numpy.random\n"
+    ),
+    "folders of its own after Python's": (
+        "import sys\nfrom pathlib import Path\nPath('queue.py').touch()\nsys.path.append('')\n"
+        "import queue\nprint(queue.__file__)\n"
+    ),
     "what is asked of C": (
         "import ctypes, os, threading\nprint(ctypes.get_errno())\n"
         "print(threading.main_thread().native_id == os.getpid())\n"

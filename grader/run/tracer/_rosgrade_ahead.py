@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _STARTED = frozenset(sys.modules)
 _bootstrap: Any = sys.modules["_frozen_importlib"]
+_PathFinder: Any = sys.modules["_frozen_importlib_external"].PathFinder
 _ABSENT = object()
 
 
@@ -75,6 +76,7 @@ class Ahead:
         self._kept: dict[str, _Kept] = {}
         self._waiting: dict[str, _Kept] = {}
         self._executing: list[_Kept] = []
+        self._path: list[str] = []
         self.is_loading = False
 
     def be_as_at_the_start(self) -> None:
@@ -83,6 +85,7 @@ class Ahead:
             if hasattr(finder, "invalidate_caches"):
                 finder.invalidate_caches()
         sys.path_importer_cache.clear()
+        self._path = list(sys.path)
         sys.meta_path.insert(0, self)
 
     @property
@@ -127,14 +130,23 @@ class Ahead:
                 delattr(parent, child)
         self._waiting = dict(self._kept)
 
-    def find_spec(self, name: str, _path: Any = None, _target: Any = None) -> Any:
+    def find_spec(self, name: str, path: Any = None, _target: Any = None) -> Any:
         """What was executed ahead, the first time."""
         kept = self._waiting.get(name)
-        if kept is None:
+        if kept is None or self._finds_another(kept, path):
             return None
         spec = _bootstrap.ModuleSpec(name, kept)
         vars(spec).update(vars(kept.spec), loader=kept)
         return spec
+
+    def _finds_another(self, kept: _Kept, path: Any) -> bool:
+        """Whether the program looks in other folders than at its start, and that is in one."""
+        # Before the others stands the folder of the program, which was looked into.
+        if self.is_loading or sys.path[1:] == self._path:
+            return False
+        found = _PathFinder.find_spec(kept.spec.name, path)
+        # One that is in no folder is Python's own, if it is not in a package.
+        return bool(found.origin != kept.spec.origin if found else path)
 
     def take(self, name: str) -> None:
         """It is there now; whoever throws it away and imports it again gets a new one."""
