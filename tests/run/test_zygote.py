@@ -110,7 +110,7 @@ dump(
     leads=os.getpid() == os.getpgrp(), session=os.getpgrp() == os.getsid(0),
     limits=[resource.getrlimit(i) for i in range(16)], host=socket.gethostname(),
     status={n: status[n] for n in status if n.startswith(("Cap", "Sig", "Shd", "NoNew", "Secc",
-        "Uid", "Gid", "Threads", "Groups", "Umask", "Cpus_allowed_list"))},
+        "Uid", "Gid", "Groups", "Umask", "Cpus_allowed_list"))},
     handlers={i: repr(signal.getsignal(i)) for i in signal.valid_signals()},
     streams=[stream(sys.stdin), stream(sys.stdout), stream(sys.stderr)],
     descriptors=sorted(os.path.basename(os.readlink(f"/proc/self/fd/{n}")).split("[")[0]
@@ -126,7 +126,8 @@ dump(
 """
 
 
-# Handled by the C library itself, once a library of ROS's has made a thread.
+# Handled by the C library itself, once a library of ROS's has made a thread; in a fork it makes
+# these at the start, and not only with the import of rclpy.
 _OF_LIBC = 1 << 32
 
 
@@ -218,6 +219,9 @@ PROGRAMS = {
         "os.environ['RCUTILS_CONSOLE_OUTPUT_FORMAT'] = '<{severity}> {message}'\n"
         "import rclpy\nrclpy.init()\n"
         "node = rclpy.create_node('talker')\nnode.get_logger().warning('hot')\n"
+    ),
+    "a node that nobody has destroyed": (
+        "import rclpy\nrclpy.init()\nnode = rclpy.create_node('talker')\nrclpy.shutdown()\n"
     ),
     "another middleware": (
         "import os\nos.environ['RMW_IMPLEMENTATION'] = 'rmw_cyclonedds_cpp'\n"

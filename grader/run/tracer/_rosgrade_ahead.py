@@ -153,10 +153,12 @@ class Ahead:
         self._waiting.pop(name, None)
 
     def be_a_fork(self) -> None:
-        """Give a fork random numbers and an id of its own, as Python's own modules do or do not."""
+        """Give a fork an id, a host's name and random numbers of its own, where no module does."""
         if "threading" in self._kept:
             threading = self._kept["threading"].module
             threading.main_thread()._native_id = threading.get_native_id()
+        if "platform" in self._kept:
+            self._kept["platform"].module._uname_cache = None
         if "numpy.random" in self._kept:
             self._kept["numpy.random"].module.seed()
 

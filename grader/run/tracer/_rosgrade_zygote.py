@@ -44,6 +44,10 @@ _SECCOMP_MODE_FILTER, _SET_MODE_FILTER, _NEW_LISTENER = 2, 1, 1 << 3
 _CAPABILITY_VERSION_3 = 0x20080522
 _LAST_CAPABILITY = 63
 _INSTRUCTION_BYTES = 8
+_SIGNALS = b"\xff" * 128
+"""All, as the C library has them."""
+_CALLS = 3
+"""Of LTTng-UST, around a fork."""
 _STANDARD = 3
 """Descriptors of the standard streams."""
 _SIGNALLED = 128
@@ -72,15 +76,18 @@ def _serve() -> None:
         gc.collect()
         gc.freeze()
         has_forked = False
+        tracing = _Tracing()
         while True:
             # Ready, also for the next one.
             asked.send(str(sum(os.times()[:4])).encode())
             text, descriptors, _, _ = socket.recv_fds(asked, _REQUEST_BYTES, _DESCRIPTORS)
             if not text:
                 os._exit(0)
+            tracing.before_fork()
             pid = os.fork()
             if not pid:
                 break
+            tracing.after_fork("parent")
             for descriptor in descriptors:
                 os.close(descriptor)
             _, status = os.waitpid(pid, 0)
@@ -91,7 +98,37 @@ def _serve() -> None:
     request = json.loads(text)
     tracer, seen = _enter(request, descriptors, told["seccomp"])
     pipes = {"ROSGRADE_TRACER_FD": str(tracer), "ROSGRADE_SEEN_FD": str(seen)}
-    _become({**request["environment"], **pipes}, ahead)
+    _become({**request["environment"], **pipes}, ahead, tracing)
+
+
+class _Tracing:
+    """LTTng-UST, which ROS loads: as a program ends, it cancels its threads, and a fork has none.
+
+    Its own calls around a fork make new ones there; without them that end is a crash.
+    """
+
+    def __init__(self) -> None:
+        """Find it; it may not be there."""
+        self._signals = ctypes.create_string_buffer(_SIGNALS, len(_SIGNALS))
+        self._calls: dict[str, Any] = {}
+        with open("/proc/self/maps", encoding="utf-8") as maps:
+            files = {line.split()[-1] for line in maps if "/liblttng-ust" in line}
+        for library in map(ctypes.CDLL, files):
+            for prefix in ("lttng_ust_", "ust_"):
+                for name in ("before_fork", "after_fork_parent", "after_fork_child"):
+                    if hasattr(library, prefix + name):
+                        self._calls[name] = getattr(library, prefix + name)
+
+    def before_fork(self) -> None:
+        """Let its threads hold nothing."""
+        if len(self._calls) == _CALLS:
+            self._calls["before_fork"](self._signals)
+
+    def after_fork(self, side: str) -> None:
+        """Let them go on, or begin anew in a child, which blocks all signals."""
+        if len(self._calls) == _CALLS:
+            signals = self._signals if side == "parent" else _SIGNALS
+            self._calls[f"after_fork_{side}"](signals)
 
 
 def _enter(request: Mapping[str, Any], descriptors: list[int], call: int) -> tuple[int, int]:
@@ -201,7 +238,7 @@ def _call(function: Any, *arguments: Any) -> None:
         raise OSError(ctypes.get_errno(), function.__name__)
 
 
-def _become(environment: Mapping[str, str], ahead: Ahead) -> None:
+def _become(environment: Mapping[str, str], ahead: Ahead, tracing: _Tracing) -> None:
     """Be as Python is at its start."""
     os.environ.clear()
     os.environ.update(environment)
@@ -212,6 +249,7 @@ def _become(environment: Mapping[str, str], ahead: Ahead) -> None:
         os.execv(sys.executable, sys.orig_argv)
     for name in (__name__, Ahead.__module__):
         del sys.modules[name]
+    tracing.after_fork("child")
     _renew_main()
     ahead.be_a_fork()
     ahead.be_as_at_the_start()
