@@ -65,7 +65,8 @@ _READINGS = (
     ),
     Reading(
         "what it is with its sign changed",
-        f"Counter-clockwise is positive (REP-103): {_FORMULA}.",
+        "Counter-clockwise is positive (REP-103), and 2 * asin(z) has the wrong sign where w is "
+        f"negative: {_FORMULA}.",
         lambda yaw_rad: -yaw_rad,
     ),
     Reading(
@@ -73,7 +74,11 @@ _READINGS = (
         f"asin and atan know only half of the circle: {_FORMULA}, with atan2.",
         lambda yaw_rad: math.asin(math.sin(yaw_rad)),
     ),
-    Reading("never negative", f"acos loses the sign: {_FORMULA}.", abs),
+    Reading(
+        "never negative",
+        f"acos loses the sign, and asin does where w is negative: {_FORMULA}.",
+        abs,
+    ),
 )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from pydantic import Field
 
 from grader.assignment.quantity import Ratio
@@ -19,6 +21,10 @@ from grader.recording.model import Recording
 # The last one alone may be of a callback that was late.
 _LAST = 5
 _MOST_POINTS = 400
+# Of a proportion that is limited, the limit comes again and again, but nothing below it does.
+_SWITCHED = 2
+_SEVERAL = 3
+_DIGITS = 4
 
 
 class SlowsDown(Parameters):
@@ -37,8 +43,10 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     drive must be at most a share of the fastest. A speed in proportion to the distance is so with
     any gain and any clamp, as long as the goal's tolerance is small enough to leave the clamp.
 
-    Explains a speed that is the same all the way, and the same causes as motion.reaches where the
-    robot never moved.
+    It is no proportion either where all commands have one of two sizes, each of them several times.
+
+    Explains a speed that is the same all the way, one that is switched, and the same causes as
+    motion.reaches where the robot never moved.
     """
     expected = (
         f"linear.x at the end of the way at most {percent(parameters.share)} of its largest value"
@@ -61,6 +69,15 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     last = min(driving[-_LAST:], key=_size)
     evidence = _evidence(recording, driving, last)
     seen = f"{speed(_size(last))} at the end, {speed(fastest)} at most"
+    levels = Counter(round(_size(item), _DIGITS) for item in driving)
+    if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL:
+        sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))
+        return Finding.failed(
+            expected,
+            f"linear.x is switched between {sizes}, whatever the distance is",
+            "linear.x = gain * distance, at most the limit: it becomes less with every command.",
+            evidence,
+        )
     if _size(last) <= parameters.share * fastest:
         return Finding.passed(expected, seen, evidence)
     same = all(abs(_size(item) - fastest) <= NO_SPEED_M_S for item in driving)

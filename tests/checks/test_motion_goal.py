@@ -314,6 +314,17 @@ class TestMistakes:
         finding = judge("motion.slows_down", run_to(GOAL, near=0.02, **style))
         assert finding.status is Status.PASSED, finding
 
+    def test_a_speed_that_is_switched_near_the_goal(self):
+        student = Student(GOAL)
+
+        def switched(pose):
+            speed, turn = student(pose)
+            far = math.hypot(GOAL[0] - pose.x_m, GOAL[1] - pose.y_m) > 0.2
+            return (0.2 if far else 0.05) if speed else 0.0, turn
+
+        said = failing("motion.slows_down", drive(on_odometry(switched), seconds=20))
+        assert "linear.x is switched between 0.2 m/s and 0.05 m/s" in said
+
     def test_turning_without_a_way_does_not_slow_down(self):
         run = drive(on_odometry(lambda _: (0.0, 0.5)), seconds=3)
         assert "no command on `/cmd_vel` has a linear.x other than 0" in failing(
