@@ -119,6 +119,8 @@ def mistakes(value: SourceValue, message: Mapping[str, Any]) -> Iterator[tuple[s
         whole = f"`{value.path}` as a whole number, as of int(), round() or //"
         for rounded in (round, math.trunc, math.floor):
             yield whole, float(rounded(right)) if math.isfinite(right) else right
+        for decimals, words in ((1, "one decimal"), (2, "two decimals")):
+            yield f"`{value.path}` with {words} only, as of round()", round(right, decimals)
     for path, number in leaves(message).items():
         if path != value.path and isinstance(number, int | float):
             yield f"`{path}`", float(number)

@@ -226,6 +226,7 @@ class TestExplains:
             (lambda x: float(round(x)), "as a whole number"),
             (lambda x: float(int(x)), "as a whole number"),
             (lambda x: float(math.floor(x)), "as a whole number"),
+            (lambda x: round(x, 1), "with one decimal only"),
         ],
     )
     def test_a_value_in_another_form(self, seen, words):
