@@ -32,6 +32,7 @@ _AUTO = "auto"
 
 
 def batch(
+    context: typer.Context,
     assignment: AssignmentName,
     submissions: Annotated[
         Path,
@@ -72,6 +73,7 @@ def batch(
     from grader.run.admission import Admission
 
     at_once = _at_once(jobs)
+    _refuse_more(submissions, context.args)
     refuse_swapped(assignment, submissions)
     loaded = load_assignment(assignment)
     order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
@@ -154,6 +156,23 @@ def _rows(
         progress.note(f"{name} is neither a folder nor an archive, and is left out")
 
     return read, take_in(submissions, staging, read, left_out, out)
+
+
+def _refuse_more(submissions: Path, others: Sequence[str]) -> None:
+    """Say what to name instead of several submissions, which is what a shell makes of `class/*`.
+
+    Raises:
+        UsageError: There are others.
+    """
+    if not others:
+        return
+    folders = {path.parent for path in (submissions, *map(Path, others))}
+    remedy = (
+        f"name the folder that holds them, {folders.pop()}"
+        if len(folders) == 1
+        else "put them into one folder, or into the column `submission` of a roster (.csv)"
+    )
+    raise UsageError(f"batch takes one folder, not {1 + len(others)} submissions: {remedy}")
 
 
 def _at_once(jobs: str) -> int | None:
