@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from typing import Protocol
 
 
@@ -52,22 +52,30 @@ def reason(check: str, scenario: str | None, observed: str, evidence: _Evidence)
     return check
 
 
-def first_to_fix(reasons: Mapping[str, Hashable], waits: Sequence[Sequence[str]]) -> str | None:
+def first_to_fix(
+    reasons: Mapping[str, Hashable],
+    waits: Sequence[Sequence[str]],
+    without_points: Collection[str] = (),
+) -> str | None:
     """Find the failed check on which most others depend; of equals, the author's first.
 
     A node that crashed does not stay alive, and has no publisher either: of checks that failed
-    for the same reason the first stands for all, with whatever waits for any of them.
+    for the same reason the first stands for all, with whatever waits for any of them. What is
+    shown without points, and keeps nothing else waiting, is nothing that must be mended.
 
     Args:
         reasons: Why each check failed, in the author's order; for the same reason, equal.
         waits: Of each check that was skipped, those that it waits for.
+        without_points: Checks that are worth none.
 
     Returns:
-        The check, or None where none failed.
+        The check, or None where none failed that must be mended.
     """
 
     def others(check: str) -> int:
         same = {name for name, reason in reasons.items() if reason == reasons[check]}
         return len(same) - 1 + sum(not same.isdisjoint(one) for one in waits)
 
-    return max(reasons, key=others, default=None)
+    waited_for = {check for one in waits for check in one}
+    costly = [check for check in reasons if check not in without_points or check in waited_for]
+    return max(costly, key=others, default=None)

@@ -142,9 +142,13 @@ class Grade:
         )
 
     def first_to_fix(self) -> CheckResult | None:
-        """The failed check on which most others depend, or None where no check failed."""
+        """The failed check on which most others depend, or None where none must be mended."""
         reasons = {result.id: result.reason for result in self.of(Status.FAILED)}
-        first = first_to_fix(reasons, [result.waits_for for result in self.results])
+        first = first_to_fix(
+            reasons,
+            [result.waits_for for result in self.results],
+            [result.id for result in self.results if not result.max_points],
+        )
         return self.result(first) if first is not None else None
 
     def disturbed_scenarios(self, status: Status) -> tuple[str, ...]:

@@ -87,7 +87,11 @@ def _first_to_fix(checks: tuple[CheckPart, ...]) -> str | None:
         check.id: reason(check.id, check.scenario, check.observed, check.evidence)
         for check in failed
     }
-    return first_to_fix(reasons, [check.waits_for for check in checks])
+    return first_to_fix(
+        reasons,
+        [check.waits_for for check in checks],
+        [check.id for check in checks if not check.max_points],
+    )
 
 
 def _without_traceback(check: CheckPart) -> CheckPart:

@@ -107,6 +107,19 @@ class TestFirstToFix:
         assert result.first_to_fix() is result.result("alive")
         assert [item.id for item in result.same_reason("alive")] == ["topic"]
 
+    def test_what_is_shown_without_points_need_not_be_mended(self):
+        result = judge(Told("node", PASS, points=1), Told("silence", FAIL, points=0))
+        assert result.first_to_fix() is None
+        assert result.full_points
+
+    def test_what_has_points_comes_before_what_is_shown_without(self):
+        result = judge(Told("silence", FAIL, points=0), Told("node", FAIL, points=1))
+        assert result.first_to_fix() is result.result("node")
+
+    def test_a_check_without_points_comes_first_if_others_wait_for_it(self):
+        result = judge(Told("starts", FAIL, points=0), Told("node", requires=("starts",)))
+        assert result.first_to_fix() is result.result("starts")
+
     def test_two_mistakes_in_one_file_are_two(self):
         places = (SourceError("setup.py", None, "console_scripts"),)
         lacking = Finding.failed("", "it is not there", evidence=Evidence(places=places))
