@@ -47,7 +47,7 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
     Explains a robot that never moved or touched something, a process that ended, commands that
     are not finite, a goal with x and y swapped or a sign changed or counted from the start, one
     that was passed or circled, a yaw that was read wrongly, degrees instead of radians, a heading
-    that was never turned to, oscillation, and a robot that is too slow.
+    that was never turned to or turned past, oscillation, and a robot that is too slow.
     """
     run = approach(recording, parameters.goal)
     heading = parameters.heading

@@ -34,6 +34,9 @@ _ASTRAY_RAD = math.radians(30.0)
 # A curve in which every error changes, but no command does.
 _SAME_NS = 5 * NS
 _AT_LIMIT = 0.98
+# So long after it was there a node may see it at the latest: odometry, a timer of 10 Hz, and some
+# of the machine's doing.
+_SEEN_LATE_NS = 300 * NS // 1000
 # An error of angle that a proportional controller has done away with.
 _EXACTLY_RAD = 3e-3
 # One that turns the long way of an error comes to the goal after that, or after the next one.
@@ -393,6 +396,14 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
             ": it has not turned since it arrived",
             "After the position is reached, turn on the spot by the error goal_theta - yaw.",
         )
+    passing_rad_s = _turning_past_rad_s(run)
+    if passing_rad_s is not None:
+        return (
+            f": it still turned at {turn(passing_rad_s)} when it was there, and beyond it before "
+            "it stood",
+            "Your node sees it late, and the robot cannot stop at once. Make the angular gain "
+            "smaller, or turn back where the error has become too large again.",
+        )
     if is_at_rest(last) and abs(run.heading_error_rad(last)) < _A_LITTLE_RAD:
         return (
             ": it stopped turning a little before",
@@ -400,3 +411,20 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
             "is smaller. It is not goal_tolerance, and no number of your own.",
         )
     return "", "The error is goal_theta - yaw in radians; yaw comes from the quaternion."
+
+
+def _turning_past_rad_s(run: Approach) -> float | None:
+    """How fast it turned where it came by the goal's heading, just before it was told to stand.
+
+    None for one that did not come by, or that was not told to stand because of that.
+    """
+    turning = [index for index, step in enumerate(run.truth) if step.command_rad_s]
+    if not turning or turning[-1] == len(run.truth) - 1:
+        return None
+    told_ns = run.truth[turning[-1] + 1].time_ns
+    late = [step for step in run.truth if step.time_ns >= told_ns - _SEEN_LATE_NS]
+    for before, after in pairwise(late):
+        error_rad = run.heading_error_rad(before)
+        if abs(error_rad) < _A_LITTLE_RAD and error_rad * run.heading_error_rad(after) < 0.0:
+            return after.angular_rad_s
+    return None

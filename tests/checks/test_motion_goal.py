@@ -56,8 +56,9 @@ class Student:
         self.align_law = style.pop("align_law", self.law)
         self.creep = style.pop("creep", 0.0)
         self.forgets = style.pop("forgets", False)
+        self.once = style.pop("once", False)
         self.yaw = style.pop("yaw", lambda yaw_rad: yaw_rad)
-        self.arrived = False
+        self.arrived = self.done = False
         assert not style
 
     def __call__(self, pose):
@@ -72,7 +73,8 @@ class Student:
             return speed, clamp(self.law(error), self.spin)
         self.arrived = not self.forgets
         error = self.wrap_theta(theta - self.yaw(pose.yaw_rad))
-        if abs(error) < self.straight:
+        if abs(error) < self.straight or self.done:
+            self.done = self.once
             return 0.0, 0.0
         return self.creep, clamp(self.align_law(error), self.spin)
 
@@ -398,6 +400,14 @@ class TestMistakes:
         run = run_to(GOAL, straight=0.08)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.03 rad")
         assert "it stopped turning a little before" in said and "angle_tolerance" in said
+
+    @pytest.mark.parametrize(("gain", "period_s"), [(4.0, None), (4.0, 0.05), (3.0, 0.1)])
+    def test_turns_too_fast_to_stop_where_it_sees_the_goal_s_heading(self, gain, period_s):
+        run = run_to(GOAL, angular=gain, period_s=period_s, once=True)
+        said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.1 rad")
+        assert "when it was there, and beyond it before it stood" in said
+        assert "Make the angular gain smaller, or turn back" in said
+        assert "angle_tolerance" not in said
 
     def test_ends_a_little_before_the_goal(self):
         run = run_to(GOAL)
