@@ -115,7 +115,9 @@ def points(check: CheckPart) -> str:
 def headline(result: Result) -> str:
     """The headline of the report, from a result."""
     withheld = Withheld(result.withheld.checks, result.withheld.points)
-    return words.summary([check.status for check in result.checks], withheld)
+    full_points = result.score == result.max_score
+    statuses = [check.status for check in result.checks]
+    return words.summary(statuses, withheld, full_points=full_points)
 
 
 def score(result: Result) -> str:

@@ -76,17 +76,20 @@ def tally(grade: Grade, status: Status) -> str:
 
 def headline(grade: Grade) -> str:
     """One sentence on the whole, and one on what is judged only at grading."""
-    return summary([result.status for result in grade.results], grade.withheld)
+    statuses = [result.status for result in grade.results]
+    return summary(statuses, grade.withheld, full_points=grade.full_points)
 
 
-def summary(statuses: Sequence[Status], withheld: Withheld) -> str:
+def summary(statuses: Sequence[Status], withheld: Withheld, *, full_points: bool) -> str:
     """:func:`headline` of checks that ended so."""
     total, passed = len(statuses), statuses.count(Status.PASSED)
     failed, skipped = statuses.count(Status.FAILED), statuses.count(Status.SKIPPED)
     if Status.ERROR in statuses:
         text = "Something of the grader or of the machine failed; no point is lost by it"
-    elif passed == total:
+    elif full_points or passed == total:
         text = f"{passed} of {total} visible checks passed" if withheld.checks else "Full points"
+        if failed:
+            text += f"; {counted(failed, 'check')} without points failed"
     else:
         text = f"{counted(failed, 'check')} failed"
         if skipped:

@@ -15,7 +15,7 @@ from grader.assignment.withheld import SHOWN_FROM, Withheld
 from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Status, Table
 from grader.grade import grade
-from grader.report import classroom50, github
+from grader.report import classroom50, explanation, github
 from grader.report.foxglove import render_layout
 from grader.report.gradebook import plain_csv
 from grader.report.gradescope import render_gradescope
@@ -27,7 +27,7 @@ from grader.report.student import for_student, grade_for_student
 from grader.report.terminal import print_grade
 from grader.report.words import headline, summary
 from grader.submission.record import SourceError
-from tests.grade.sample import Told, make_loaded, make_submission
+from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.sample import make_facts, make_run
 
 SECRET = "zq"
@@ -201,6 +201,16 @@ def test_hidden_checks_are_announced_with_their_number_and_points():
 
 
 def test_the_announcement_also_stands_behind_what_failed():
-    assert summary([Status.PASSED, Status.FAILED], Withheld(1, 0.5)) == (
+    assert summary([Status.PASSED, Status.FAILED], Withheld(1, 0.5), full_points=False) == (
         "1 check failed; 1 hidden check, 0.5 points, runs at grading."
     )
+
+
+def test_what_is_shown_without_points_is_no_reason_to_worry():
+    told = grade(
+        make_loaded([Told("node"), Told("silence", FAIL, points=0)]),
+        make_submission(),
+        recordings(),
+    )
+    assert headline(told) == "Full points; 1 check without points failed."
+    assert explanation.headline(make_result(told, recordings(), make_facts())) == headline(told)
