@@ -129,8 +129,8 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
 
     Explains an executor with one thread or fewer threads than callbacks, and callbacks in one
     mutually exclusive group. A MultiThreadedExecutor takes as many threads as there are CPUs; the
-    grader gives it four at least. Where that is not possible and the machine has one CPU, it
-    cannot be judged, which costs no point.
+    grader gives it four at least, and os.cpu_count() says so. Where that is not possible and the
+    machine has one CPU, it cannot be judged, which costs no point.
     """
     expected = (
         f"{codes(parameters.callbacks)} running at the same time as "

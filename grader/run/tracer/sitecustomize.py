@@ -7,8 +7,10 @@ publisher on a topic that the probe listens to is held until it is matched, beca
 volatile publisher that publishes in a constructor otherwise writes before discovery has
 matched anybody, and the message is lost. And a MultiThreadedExecutor that takes as many
 threads as there are CPUs gets four at least, because right code would look serial on a small
-machine of ours; a number of threads that the program names stays as it is. And an EventsExecutor
-of the wheels waits in slices, because without a limit it never calls anything there.
+machine of ours; a number of threads that the program names stays as it is, but os.cpu_count()
+says four at least as well, for a program may hand its answer to the executor. And an
+EventsExecutor of the wheels waits in slices, because without a limit it never calls anything
+there.
 
 Only the standard library may be used here, as little as possible of it, and an error must
 never reach the student's program.
@@ -271,6 +273,22 @@ def _give_threads(executor_class: Any) -> None:
     executor_class.__init__ = made
 
 
+def _count_more_cpus() -> None:
+    """Let the ways to ask for the number of CPUs, except which ones they are, say four at least."""
+    for name in ("cpu_count", "process_cpu_count"):
+        if hasattr(os, name):
+            setattr(os, name, _at_least_threads(getattr(os, name)))
+
+
+def _at_least_threads(count: Any) -> Any:
+    def counted() -> int:
+        return max(_LEAST_THREADS, count() or 0)
+
+    counted.__name__ = counted.__qualname__ = count.__name__
+    counted.__doc__ = count.__doc__
+    return counted
+
+
 def _patch_events_executor(module: Any) -> None:
     make = module.EventsExecutor
 
@@ -357,6 +375,7 @@ if _PIPE is not None and str(_PIPE[1]) == os.environ.get("ROSGRADE_TRACER_PIPE")
     sys.meta_path.insert(0, _Finder)
     # Imports make objects and no garbage: until rclpy.init() there is little to look for.
     gc.set_threshold(_IMPORTED)
+    _count_more_cpus()
     import atexit
 
     atexit.register(_exit)
