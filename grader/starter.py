@@ -36,7 +36,7 @@ class Program:
 
     Attributes:
         executable: As `ros2 run` calls it.
-        module: Python module that holds it; also the name of its node.
+        module: Python module that holds it; also the name of its node, if no check asks for one.
     """
 
     executable: str
@@ -164,7 +164,11 @@ def _package(
 ) -> Iterator[tuple[str, str]]:
     nodes = {
         program.executable: rendered(
-            "starter/node.py", package=package, program=program, assignment=assignment.id
+            "starter/node.py",
+            package=package,
+            program=program,
+            node=_node_name(assignment, package, program) or program.module,
+            assignment=assignment.id,
         )
         for program in programs(package)
     }
@@ -173,6 +177,22 @@ def _package(
         files[interface.file] = rendered("starter/interface", interface=interface)
     for path, content in files.items():
         yield f"{package.name}/{path}", content
+
+
+def _node_name(assignment: Assignment, package: Package, program: Program) -> str | None:
+    """What a visible check wants the node of a program to be called, where it is run alone."""
+    alone = {
+        scenario.id
+        for scenario in assignment.scenarios
+        if [(launch.package or package.name, launch.executable) for launch in scenario.launch]
+        == [(package.name, program.executable)]
+    }
+    for spec in assignment.checks:
+        judged = set(spec.scenarios) or {scenario.id for scenario in assignment.scenarios}
+        visible = spec.visibility is Visibility.VISIBLE
+        if spec.uses == "node.exists" and visible and judged and judged <= alone:
+            return str(spec.with_["name"]).rpartition("/")[2]
+    return None
 
 
 def _interfaces(assignment: Assignment, package: Package) -> Iterator[Interface]:

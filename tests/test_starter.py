@@ -34,6 +34,12 @@ checks:
     with: {{interface: talker_msgs/msg/Secret}}
     points: 1
     visibility: hidden
+  - id: secret_name
+    uses: node.exists
+    with: {{name: Secret}}
+    points: 1
+    visibility: hidden
+  - {{id: speaker, uses: node.exists, with: {{name: speaker}}, points: 1}}
 """
 
 
@@ -76,6 +82,16 @@ def test_several_programs_have_a_module_each(tmp_path: Path) -> None:
     files = starter_files(lesson(tmp_path))
     assert "class Hear(Node):" in files["talker/talker/hear.py"]
     assert "'speak = talker.speak:main'," in files["talker/setup.py"]
+
+
+def test_a_node_is_called_as_a_visible_check_wants_it(tmp_path: Path) -> None:
+    files = starter_files(load_assignment("executors"))
+    for module in ("single_threaded", "multi_threaded"):
+        code = files[f"executors_demo/executors_demo/{module}.py"]
+        assert "super().__init__('executor_demo')" in code
+    files = starter_files(lesson(tmp_path))
+    assert "super().__init__('speaker')" in files["talker/talker/speak.py"]
+    assert "super().__init__('hear')" in files["talker/talker/hear.py"]
 
 
 def test_an_interface_package_generates_what_the_visible_checks_name(tmp_path: Path) -> None:
