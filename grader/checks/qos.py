@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -220,7 +220,7 @@ def _mismatch(
     return Finding.failed(
         expected,
         observed,
-        _hint(parameters, side),
+        _hint(parameters, side, wrong),
         Evidence(
             moments=moments,
             tables=(Table("Requested against offered", header, rows),),
@@ -228,16 +228,18 @@ def _mismatch(
     )
 
 
-def _hint(parameters: Profile, side: _Side) -> str:
+def _hint(parameters: Profile, side: _Side, wrong: Collection[str]) -> str:
     asked = {name: item for name, item in parameters.policies.items() if name in _WORD_POLICIES}
     default = {"reliability": "reliable", "durability": "volatile", "liveliness": "automatic"}
     if len(asked) == len(parameters.policies) and all(
         default[name] == item for name, item in asked.items()
     ):
-        return (
-            "A number as QoS, such as 10, is the default profile: reliable and volatile. "
-            "qos_profile_sensor_data is best_effort."
-        )
+        hint = "A number as QoS, such as 10, is the default profile: reliable and volatile."
+        if "reliability" in wrong:
+            hint += " qos_profile_sensor_data is best_effort."
+        if "durability" in wrong:
+            hint += " A profile is transient_local only where its durability says so: leave it out."
+        return hint
     arguments = ", ".join(
         f"{name}={name.capitalize()}Policy.{item.upper()}"
         if name in _WORD_POLICIES
@@ -310,6 +312,6 @@ def _depth_hint(parameters: Depth) -> str:
             f"self.create_publisher(Type, 'topic', {parameters.depth})."
         )
     return (
-        "The last argument of create_subscription is the depth: "
+        "The fourth argument of create_subscription is the depth: "
         f"self.create_subscription(Type, 'topic', callback, {parameters.depth})."
     )

@@ -108,6 +108,12 @@ class TestOffered:
         assert "durability transient_local instead of volatile" in found
         assert "would still match it" in found
 
+    def test_the_hint_names_only_what_is_wrong(self):
+        wanted = {"topic": "/cmd_vel", "reliability": "reliable", "durability": "volatile"}
+        hint = judge("qos.offered", offering(LATCHED), **wanted).hint
+        assert "transient_local" in hint
+        assert "best_effort" not in hint
+
     def test_every_publisher_counts(self):
         run = offering(RELIABLE, BEST_EFFORT)
         assert "best_effort" in failing(
