@@ -112,6 +112,16 @@ def points(check: CheckPart) -> str:
     return f"{earned} / {words.number(check.max_points)}"
 
 
+def only_shown(result: Result) -> frozenset[str]:
+    """Ids of the checks that failed without points, and that nothing else waits for."""
+    waited_for = {name for check in result.checks for name in check.waits_for}
+    return frozenset(
+        check.id
+        for check in result.checks
+        if check.status is Status.FAILED and not check.max_points and check.id not in waited_for
+    )
+
+
 def headline(result: Result) -> str:
     """The headline of the report, from a result."""
     withheld = Withheld(result.withheld.checks, result.withheld.points)

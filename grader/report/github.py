@@ -43,7 +43,11 @@ def annotation_lines(result: Result, prefix: str | None = "") -> tuple[str, ...]
         return (command("warning", explanation.headline(copy), title="Not graded"),)
     failed = [check for check in copy.checks if check.status is Status.FAILED]
     failed.sort(key=lambda check: (check.id != copy.first_to_fix, check.points - check.max_points))
-    return tuple(_annotation(check, prefix) for check in failed[:MOST_ANNOTATIONS])
+    shown = explanation.only_shown(copy)
+    return tuple(
+        _annotation(check, "notice" if check.id in shown else "error", prefix)
+        for check in failed[:MOST_ANNOTATIONS]
+    )
 
 
 def summary(result: Result, used_bytes: int = 0) -> str:
@@ -104,7 +108,7 @@ def command(name: str, message: str, **properties: str) -> str:
     return f"::{name}{' ' if told else ''}{told}::{_data(clean(message)[:MOST_CHARACTERS])}"
 
 
-def _annotation(check: CheckPart, prefix: str | None) -> str:
+def _annotation(check: CheckPart, level: str, prefix: str | None) -> str:
     properties: dict[str, str] = {}
     place = next(iter(check.evidence.places), None)
     if place is not None and prefix is not None:
@@ -112,7 +116,7 @@ def _annotation(check: CheckPart, prefix: str | None) -> str:
         if place.line:
             properties["line"] = str(place.line)
     properties["title"] = one_line(f"{check.title} ({explanation.points(check)})")
-    return command("error", "\n".join(_message(check)), **properties)
+    return command(level, "\n".join(_message(check)), **properties)
 
 
 def _message(check: CheckPart) -> Iterator[str]:

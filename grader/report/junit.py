@@ -1,7 +1,8 @@
 """JUnit XML: a check is a test case.
 
 A check that failed is a ``failure``, a fault of ours an ``error``, a check that waits for
-another is ``skipped``. The default family, xunit2, is what Jenkins' junit-10.xsd allows; xunit1
+another is ``skipped``. So is one that failed without points, or full points would look like a
+mistake. The default family, xunit2, is what Jenkins' junit-10.xsd allows; xunit1
 adds the student's file and line and the points to each test case, which that schema forbids.
 Source: https://github.com/jenkinsci/xunit-plugin, ``junit-10.xsd``.
 """
@@ -9,6 +10,7 @@ Source: https://github.com/jenkinsci/xunit-plugin, ``junit-10.xsd``.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
@@ -19,6 +21,7 @@ from grader.report.result_model import CheckPart, Result
 
 _ELEMENT = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "skipped"}
 _TYPE = {Status.FAILED: "check", Status.ERROR: "grader", Status.SKIPPED: "requirement"}
+_WITHOUT_POINTS = "no points"
 
 
 def render_junit(result: Result, *, xunit1: bool = False) -> str:
@@ -31,24 +34,26 @@ def render_junit(result: Result, *, xunit1: bool = False) -> str:
     Returns:
         A whole document; the same input gives the same text.
     """
+    elements = _elements(result)
+    count = Counter(elements.values())
     counts = {
         "tests": str(len(result.checks)),
-        "failures": str(_count(result, Status.FAILED)),
-        "errors": str(_count(result, Status.ERROR)),
+        "failures": str(count[_ELEMENT[Status.FAILED]]),
+        "errors": str(count[_ELEMENT[Status.ERROR]]),
     }
     name, time = one_line(result.assignment.id), f"{result.duration_s:.3f}"
     root = ET.Element("testsuites", {"name": name, **counts, "time": time})
     suite = ET.SubElement(
         root,
         "testsuite",
-        {"name": name, **counts, "skipped": str(_count(result, Status.SKIPPED)), "time": time},
+        {"name": name, **counts, "skipped": str(count[_ELEMENT[Status.SKIPPED]]), "time": time},
     )
     # Without offset: the strictest of the dialects reads no other.
     if re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", result.started):
         suite.set("timestamp", result.started[:19])
     _properties(suite, _of_suite(result))
     for check in result.checks:
-        _case(suite, result, check, xunit1=xunit1)
+        _case(suite, result, check, elements.get(check.id), xunit1=xunit1)
     if lines := list(_notes(result)):
         ET.SubElement(suite, "system-out").text = "\n".join(lines)
     ET.indent(root)
@@ -56,8 +61,14 @@ def render_junit(result: Result, *, xunit1: bool = False) -> str:
     return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'
 
 
-def _count(result: Result, status: Status) -> int:
-    return sum(check.status is status for check in result.checks)
+def _elements(result: Result) -> dict[str, str]:
+    """What the test case of a check holds for how it ended, where it did not pass."""
+    shown = explanation.only_shown(result)
+    return {
+        check.id: _ELEMENT[Status.SKIPPED if check.id in shown else check.status]
+        for check in result.checks
+        if check.status is not Status.PASSED
+    }
 
 
 def _of_suite(result: Result) -> dict[str, str]:
@@ -90,7 +101,9 @@ def _properties(parent: ET.Element, values: dict[str, str]) -> None:
         ET.SubElement(element, "property", {"name": one_line(name), "value": one_line(value)})
 
 
-def _case(suite: ET.Element, result: Result, check: CheckPart, *, xunit1: bool) -> None:
+def _case(
+    suite: ET.Element, result: Result, check: CheckPart, element: str | None, *, xunit1: bool
+) -> None:
     # What compares two runs knows a test by these two, so they say nothing of how it ended.
     attributes = {"classname": result.assignment.id, "name": check.id}
     place = next(iter(check.evidence.places), None)
@@ -101,12 +114,11 @@ def _case(suite: ET.Element, result: Result, check: CheckPart, *, xunit1: bool) 
     case = ET.SubElement(suite, "testcase", {k: one_line(v) for k, v in attributes.items()})
     if xunit1:
         _properties(case, {"points": explanation.points(check), "title": check.title})
-    if check.status is Status.PASSED:
+    if element is None:
         return
     message = one_line(f"{check.title}: {check.observed}")
-    verdict = ET.SubElement(
-        case, _ELEMENT[check.status], {"type": _TYPE[check.status], "message": message}
-    )
+    kind = _TYPE[check.status] if element == _ELEMENT[check.status] else _WITHOUT_POINTS
+    verdict = ET.SubElement(case, element, {"type": kind, "message": message})
     if check.status is not Status.SKIPPED:
         body = [f"points: {explanation.points(check)}", explanation.plain(check), check.traceback]
         verdict.text = clean("\n".join(part for part in body if part))

@@ -11,7 +11,7 @@ from grader.grade import grade
 from grader.report import github
 from grader.report.result import make_result
 from grader.submission.record import SourceError
-from tests.grade.sample import Told, make_loaded, make_submission
+from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.sample import (
     Sample,
     everywhere,
@@ -85,6 +85,16 @@ def test_the_runner_shows_ten_so_the_most_useful_come_first():
     titles = [runner_reads(line)[1]["title"] for line in lines]
     assert titles[0] == "Title of c1 (0 / 1)"
     assert titles[1:] == [f"Title of c{n} (0 / {n})" for n in range(14, 5, -1)]
+
+
+def test_what_is_only_shown_is_a_notice():
+    recordings = {"listen": make_run()}
+    checks = [Told("node"), Told("silence", FAIL, points=0)]
+    told = grade(make_loaded(checks), make_submission(), recordings)
+    (line,) = github.annotation_lines(make_result(told, recordings, make_facts()))
+    kind, properties, _ = runner_reads(line)
+    assert kind == "notice"
+    assert properties["title"] == "Title of silence (0 / 0)"
 
 
 def test_a_message_stays_below_what_the_runner_cuts():

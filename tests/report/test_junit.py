@@ -15,7 +15,7 @@ from grader.checks.finding import Evidence, Finding
 from grader.grade import grade
 from grader.report.junit import render_junit
 from grader.report.result import make_result
-from tests.grade.sample import Told, make_loaded, make_submission
+from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.sample import (
     Sample,
     everywhere,
@@ -81,6 +81,27 @@ def test_whose_fault_it_was():
     }
     assert [child.tag for child in cases["depth"]] == ["error"]
     assert "KeyError" in cases["depth"][0].text
+
+
+def test_what_is_only_shown_makes_no_test_fail():
+    recordings = {"listen": make_run()}
+    checks = [Told("node"), Told("silence", FAIL, points=0)]
+    told = grade(make_loaded(checks), make_submission(), recordings)
+    text = render_junit(make_result(told, recordings, make_facts()))
+    jenkins().validate(text)
+    (suite,) = ET.fromstring(text)
+    assert (suite.get("failures"), suite.get("skipped")) == ("0", "1")
+    (shown,) = suite.iter("skipped")
+    assert shown.get("type") == "no points"
+    assert shown.get("message") == f"Title of silence: {FAIL.observed}"
+
+
+def test_what_others_wait_for_is_a_failure_also_without_points():
+    recordings = {"listen": make_run()}
+    checks = [Told("starts", FAIL, points=0), Told("node", requires=("starts",))]
+    told = grade(make_loaded(checks), make_submission(), recordings)
+    (suite,) = ET.fromstring(render_junit(make_result(told, recordings, make_facts())))
+    assert (suite.get("failures"), suite.get("skipped")) == ("1", "1")
 
 
 def test_a_failure_says_what_to_try():
