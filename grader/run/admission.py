@@ -9,6 +9,7 @@ and memory to spare.
 from __future__ import annotations
 
 import math
+import resource
 import threading
 import time
 from collections import deque
@@ -25,6 +26,9 @@ _BUSY_PER_CPU = 6.0
 """Runnable threads of the machine for each CPU from which on nobody more is let in."""
 _FREE_MEMORY = 0.125
 """Share of the memory that stays free; a cell of the course takes some 40 MB."""
+_FILES_PER_CELL = 4
+"""Pipes to it, and what else is open for its submission."""
+_OTHER_FILES = 256
 _LONGEST_START_S = 2.0
 """What has not matched by then waits for something, and costs no CPU any more."""
 _LOOK_AGAIN_S = 0.05
@@ -39,12 +43,13 @@ class Admission:
         """Set the bounds.
 
         Args:
-            cells: Most cells at once, whatever the load; by default the load decides.
+            cells: Most cells at once, whatever the load; by default the load decides. No more
+                than the descriptors of this process suffice for.
             starts: Most cells that start at once; by default three for each CPU.
             load: Of the machine.
         """
         cpus = cpu_count()
-        self.most = cells if cells is not None else _CELLS_PER_CPU * cpus
+        self.most = _with_descriptors(cells if cells is not None else _CELLS_PER_CPU * cpus)
         self._always = self.most if cells is not None else cpus
         self._starts = starts if starts is not None else math.ceil(_STARTS_PER_CPU * cpus)
         self._busy = _BUSY_PER_CPU * cpus
@@ -135,3 +140,18 @@ class Ticket:
         if self.is_starting:
             self.is_starting = False
             self._admission._note_started()
+
+
+def _with_descriptors(cells: int) -> int:
+    """Get descriptors for so many cells; how many cells there are enough for.
+
+    Most shells allow 1024, and up to some larger number whoever asks: see getrlimit(2).
+    """
+    wanted = _FILES_PER_CELL * cells + _OTHER_FILES
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    if soft == resource.RLIM_INFINITY or soft >= wanted:
+        return cells
+    return max(1, (soft - _OTHER_FILES) // _FILES_PER_CELL)

@@ -18,7 +18,6 @@ import gc
 import importlib
 import json
 import os
-import select
 import signal
 import socket
 import struct
@@ -36,6 +35,7 @@ from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.run.descendants import kill_tree
 from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
+from grader.run.readable import readable
 from grader.run.stall import Stall
 from grader.run.zygote import Zygotes
 from grader.sandbox import bubblewrap
@@ -122,8 +122,7 @@ class ForkedCell:
             self._pid = told and told[0]
 
     def _told(self, timeout: float | None) -> tuple[int, float] | None:
-        readable, _, _ = select.select([self._status], [], [], timeout)
-        if not readable:
+        if not readable((self._status,), timeout):
             raise subprocess.TimeoutExpired("cell", timeout or 0.0)
         told = os.read(self._status, _TOLD.size)
         if not told:
@@ -282,20 +281,20 @@ def _serve(requests: socket.socket) -> None:
     limit_s: float | None = None
     while len(sources) > 1 or running:
         heard = zygotes.sockets()
-        readable, _, _ = select.select([*sources, *heard], [], [], limit_s)
-        for descriptor in set(readable) & set(heard):
+        ready = readable((*sources, *heard), limit_s)
+        for descriptor in ready & set(heard):
             zygotes.hear(descriptor)
-        if not readable:
+        if not ready:
             for pid in running:
                 kill_tree(pid)
             limit_s = None
-        if ended_read in readable:
+        if ended_read in ready:
             with contextlib.suppress(BlockingIOError):
                 os.read(ended_read, 4096)
             own_s = time.process_time() + zygotes.cpu_s
             if _tell_ended(running, own_s - told_s):
                 told_s = own_s
-        if requests.fileno() in readable:
+        if requests.fileno() in ready:
             text, descriptors, _, _ = socket.recv_fds(requests, _REQUEST_BYTES, 4)
             request = json.loads(text) if text else {}
             if request.get("kill") in running:
@@ -375,9 +374,11 @@ def _become_cell(
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         for target, descriptor in enumerate(descriptors):
             os.dup2(descriptor, target)
-        for descriptor in set(range(3, 256)).difference(zygotes.values()):
-            with contextlib.suppress(OSError):
-                os.close(descriptor)
+        # Of a class on a large machine there are hundreds, one for each cell that runs.
+        for descriptor in [int(path.name) for path in Path("/proc/self/fd").iterdir()]:
+            if descriptor > 2 and descriptor not in zygotes.values():
+                with contextlib.suppress(OSError):
+                    os.close(descriptor)
         folder, rights = Path(arguments[0]), None
         if private:
             # As the one that waits for it sees it: nothing of this process can while it stalls.

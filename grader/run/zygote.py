@@ -12,12 +12,13 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import select
 import socket
 import subprocess
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+from grader.run.readable import readable
 
 _VARIABLE = "ROSGRADE_ZYGOTE_FD"
 _TOLD_BYTES = 64
@@ -75,7 +76,7 @@ class _Zygote:
         """Whether it has printed nothing, which each program that imports the same would print."""
         assert self.popen.stdout is not None
         assert self.popen.stderr is not None
-        return not select.select([self.popen.stdout, self.popen.stderr], [], [], 0)[0]
+        return not readable((self.popen.stdout.fileno(), self.popen.stderr.fileno()), 0)
 
     def let_go(self) -> None:
         """Let it end as soon as no cell can ask it any more."""

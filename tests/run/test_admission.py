@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import resource
 import subprocess
 import sys
 import threading
 import time
+
+import pytest
 
 from grader.run.admission import Admission
 from grader.run.load import Load, cpu_count
@@ -134,3 +137,24 @@ def test_the_load_counts_threads_of_the_whole_machine() -> None:
     finally:
         burner.kill()
         burner.wait()
+
+
+@pytest.mark.parametrize(
+    ("soft", "hard", "most", "then"),
+    [
+        (1024, 1_048_576, 400, 1856),
+        (1024, 1024, 192, 1024),
+        (1024, resource.RLIM_INFINITY, 400, 1856),
+        (4096, 4096, 400, 4096),
+        (resource.RLIM_INFINITY, resource.RLIM_INFINITY, 400, resource.RLIM_INFINITY),
+        (64, 64, 1, 64),
+    ],
+)
+def test_no_more_cells_than_there_are_descriptors_for(
+    soft: int, hard: int, most: int, then: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits = [(soft, hard)]
+    monkeypatch.setattr(resource, "getrlimit", lambda _: limits[-1])
+    monkeypatch.setattr(resource, "setrlimit", lambda _, pair: limits.append(pair))
+    assert Admission(cells=400).most == most
+    assert limits[-1] == (then, hard)
