@@ -40,7 +40,8 @@ def explain(printed: Sequence[float], wanted: Wanted, missing: Sequence[str], de
             relation = _relation(number, value, decimals)
             if relation:
                 return f"shows {relation.format(path=code(path))}"
-    others = [name for number in printed for name in _names(number, wanted, decimals)]
+    likely = _likely(wanted)
+    others = [name for number in printed for name in _names(number, likely, decimals)]
     named = list(dict.fromkeys(others))[:_MOST_NAMED]
     return f"shows {listing(map(code, named), last='or')}" if named else ""
 
@@ -65,15 +66,25 @@ def _relation(number: float, value: float, decimals: int) -> str:
     return ""
 
 
-def _names(number: float, wanted: Wanted, decimals: int) -> Iterator[str]:
-    """Fields, and statistics of arrays, that a number stands for; the likeliest first.
+def _names(number: float, likely: Sequence[tuple[str, float]], decimals: int) -> Iterator[str]:
+    """Those that a number stands for.
 
-    One of hundreds of beams has nearly every distance, and so tells nothing. Zeros are in nearly
-    every message, and tell nothing unless they are all there is. Nor does infinity, which every
-    beam shows that meets nothing.
+    Zeros are in nearly every message, and tell nothing unless they are all there is. Nor does
+    infinity, which every beam shows that meets nothing.
     """
     if not math.isfinite(number):
         return
+    for label, value in likely:
+        if shows(number, value, decimals) and _tells(number, label):
+            yield label
+
+
+def _likely(wanted: Wanted) -> list[tuple[str, float]]:
+    """Fields of a message, and statistics of its arrays, that are shown by mistake.
+
+    The likeliest come first. One of hundreds of beams has nearly every distance, and so tells
+    nothing.
+    """
     fields = leaves(wanted.message.value)
     numeric = {
         path: float(value)
@@ -82,15 +93,12 @@ def _names(number: float, wanted: Wanted, decimals: int) -> Iterator[str]:
     }
     many = _in_long_arrays(numeric)
     few = {path: value for path, value in numeric.items() if path not in many}
-    likely = [
+    return [
         *_statistics(wanted.message.value),
         *_spokes(numeric),
         *few.items(),
         *_means_ahead(wanted.message.value),
     ]
-    for label, value in likely:
-        if shows(number, value, decimals) and _tells(number, label):
-            yield label
 
 
 def _in_long_arrays(paths: Iterable[str]) -> set[str]:
@@ -133,7 +141,9 @@ def _means_ahead(value: Mapping[str, object]) -> Iterator[tuple[str, float]]:
     ranges = value.get("ranges")
     if not isinstance(ranges, Sequence) or isinstance(ranges, str):
         return
+    # What a type of another kind calls so may be no numbers.
+    measured = [isinstance(beam, int | float) and math.isfinite(beam) for beam in ranges]
     for sides in _SIDES:
         beams = [*ranges[: sides + 1], *ranges[-sides:]]
-        if len(beams) < len(ranges) and all(map(math.isfinite, beams)):
+        if len(beams) < len(ranges) and all((*measured[: sides + 1], *measured[-sides:])):
             yield f"mean(ranges[-{sides}] ... ranges[{sides}])", mean(beams)

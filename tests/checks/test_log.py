@@ -363,6 +363,15 @@ class TestOtherValues:
         found = front(lines("front 2.278", SCAN_TIMES_S), messages=changed)
         assert "which shows `mean(ranges[-10] ... ranges[10])`" in found
 
+    def test_ranges_that_are_no_numbers(self):
+        echoes = "sensor_msgs/msg/MultiEchoLaserScan"
+        value = {"range_max": 3.5, "ranges": [{"echoes": [AHEAD]}] * 40}
+        changed = {"/scan": sent("/scan", echoes, value, SCAN_TIMES_S)}
+        log = lines("reaches 2.5", SCAN_TIMES_S)
+        asked = {**FRONT, "fields": ["range_max"]}
+        found = failing("log.follows", run(log, messages=changed), **asked)
+        assert "none shows `range_max` = 3.50" in found
+
     def test_what_is_written_at_ctrl_c_answers_no_message(self):
         log = lines("2.50", SCAN_TIMES_S) + output(traceback("KeyboardInterrupt"), time_s=4.25)
         found = front(log, stop_s=4.2)
