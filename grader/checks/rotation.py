@@ -45,8 +45,8 @@ _AT_ONCE_S = 0.05
 _SLOW_S = 0.05
 # One that publishes a first message when it is created does no harm.
 _GREETINGS = 2
-# Nor does one that says everything twice; one that does not stop answers far more often.
-_COPIES = 3
+# Nor does one that says everything twice; one that does not stop answers the last far more often.
+_MORE_COPIES = 2
 
 Tolerance = Annotated[float, QuantityOf(Dimension.ANGLE, minimum=0.0, exclusive=True)]
 
@@ -144,7 +144,8 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     if unasked > _GREETINGS:
         evidence = replace(evidence, moments=first_seen(recording, received))
         return _unasked(parameters, unasked, evidence)
-    if judged and len(judged[-1].answers) > _COPIES:
+    copies = max((len(case.answers) for case in judged[:-1]), default=1)
+    if judged and len(judged[-1].answers) > max(copies, 1) + _MORE_COPIES:
         when_s = recording.since_launch_s(received[-1].stamp_ns)
         evidence = replace(evidence, moments=(Moment("once more the same answer", when_s),))
         return _again(parameters, judged[-1], evidence)

@@ -466,6 +466,11 @@ class TestPairing:
         doubled = [[one, one] for one in self.answers]
         assert judged(self.conversion, self.asked, doubled).status is Status.PASSED
 
+    @pytest.mark.parametrize("copies", [3, 4, 10])
+    def test_however_often_everything_is_said(self, copies):
+        several = [[one] * copies for one in self.answers]
+        assert judged(self.conversion, self.asked, several).status is Status.PASSED
+
     def test_an_answer_that_is_repeated_when_nothing_is_asked(self):
         answers = [*self.answers[:-1], [self.answers[-1]] * 6]
         words = failed(self.conversion, self.asked, answers)
