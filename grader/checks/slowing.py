@@ -25,6 +25,8 @@ _MOST_POINTS = 400
 _SWITCHED = 2
 _SEVERAL = 3
 _DIGITS = 4
+# Of one with two decimals, the limit and the step below it may be all that comes.
+_STEP_M_S = 0.01
 
 
 class SlowsDown(Parameters):
@@ -43,7 +45,8 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     drive must be at most a share of the fastest. A speed in proportion to the distance is so with
     any gain and any clamp, as long as the goal's tolerance is small enough to leave the clamp.
 
-    It is no proportion either where all commands have one of two sizes, each of them several times.
+    It is no proportion either where all commands have one of two sizes, each of them several times,
+    unless these are next to each other where a command has two decimals.
 
     Explains a speed that is the same all the way, one that is switched, and the same causes as
     motion.reaches where the robot never moved.
@@ -70,7 +73,8 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     evidence = _evidence(recording, driving, last)
     seen = f"{speed(_size(last))} at the end, {speed(fastest)} at most"
     levels = Counter(round(_size(item), _DIGITS) for item in driving)
-    if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL:
+    apart = round(max(levels) - min(levels), _DIGITS)
+    if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and apart > _STEP_M_S:
         sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))
         return Finding.failed(
             expected,

@@ -327,6 +327,16 @@ class TestMistakes:
         said = failing("motion.slows_down", drive(on_odometry(switched), seconds=20))
         assert "linear.x is switched between 0.2 m/s and 0.05 m/s" in said
 
+    def test_the_last_two_steps_of_a_speed_with_two_decimals(self):
+        student = Student(GOAL, linear=1.2, top=0.05, near=0.03)
+
+        def rounded(pose):
+            speed, turn = student(pose)
+            return round(speed, 2), round(turn, 2)
+
+        finding = judge("motion.slows_down", drive(on_odometry(rounded), seconds=40))
+        assert finding.status is Status.PASSED, finding
+
     def test_turning_without_a_way_does_not_slow_down(self):
         run = drive(on_odometry(lambda _: (0.0, 0.5)), seconds=3)
         assert "no command on `/cmd_vel` has a linear.x other than 0" in failing(
