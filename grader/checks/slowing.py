@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
 
 from pydantic import Field
 
@@ -16,7 +17,7 @@ from grader.checks.measure import speed
 from grader.checks.sighting import first_seen
 from grader.checks.silence import why_silent
 from grader.checks.wording import code, counted, percent
-from grader.recording.model import Recording
+from grader.recording.model import NS, Recording
 
 # The last one alone may be of a callback that was late.
 _LAST = 5
@@ -27,6 +28,8 @@ _SEVERAL = 3
 _DIGITS = 4
 # Of one with two decimals, the limit and the step below it may be all that comes.
 _STEP_M_S = 0.01
+# One that is computed at 2 Hz may be published more often, and be the only one below the limit.
+_HELD_NS = NS
 
 
 class SlowsDown(Parameters):
@@ -46,7 +49,8 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     any gain and any clamp, as long as the goal's tolerance is small enough to leave the clamp.
 
     It is no proportion either where all commands have one of two sizes, each of them several times,
-    unless these are next to each other where a command has two decimals.
+    unless these are next to each other where a command has two decimals, or the lower one comes for
+    1 s at most.
 
     Explains a speed that is the same all the way, one that is switched, and the same causes as
     motion.reaches where the robot never moved.
@@ -73,8 +77,7 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     evidence = _evidence(recording, driving, last)
     seen = f"{speed(_size(last))} at the end, {speed(fastest)} at most"
     levels = Counter(round(_size(item), _DIGITS) for item in driving)
-    apart = round(max(levels) - min(levels), _DIGITS)
-    if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and apart > _STEP_M_S:
+    if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and _stays(driving, levels):
         sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))
         return Finding.failed(
             expected,
@@ -96,6 +99,14 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
         "linear.x = gain * distance: far from the goal the robot is fast, near it slow.",
         evidence,
     )
+
+
+def _stays(driving: list[Command], levels: Collection[float]) -> bool:
+    """Whether the lower of two sizes is no step of a proportion that was rounded or held."""
+    lower = min(levels)
+    times_ns = [item.time_ns for item in driving if round(_size(item), _DIGITS) == lower]
+    apart = round(max(levels) - lower, _DIGITS)
+    return apart > _STEP_M_S and times_ns[-1] - times_ns[0] > _HELD_NS
 
 
 def _size(item: Command) -> float:

@@ -1,5 +1,6 @@
 """Reaching a goal with a proportional controller, on runs of the real simulator core."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -24,6 +25,7 @@ from tests.checks.builder import (
     output,
     simulated,
     taken,
+    text,
     traceback,
 )
 
@@ -336,6 +338,20 @@ class TestMistakes:
 
         finding = judge("motion.slows_down", drive(on_odometry(rounded), seconds=40))
         assert finding.status is Status.PASSED, finding
+
+    @pytest.mark.parametrize(("linear", "top", "held"), [(0.8, 0.05, 15), (1.5, 0.1, 8)])
+    def test_a_command_that_comes_more_often_than_it_is_computed(self, linear, top, held):
+        student = Student(GOAL, linear=linear, angular=2 * linear, top=top, near=0.03)
+        now = itertools.count()
+        last = [(0.0, 0.0)]
+
+        def repeated(pose):
+            if next(now) % held == 0:
+                last.append(student(pose))
+            return last[-1]
+
+        found = judge("motion.slows_down", drive(on_odometry(repeated), seconds=40))
+        assert "switched" not in text(found)
 
     def test_turning_without_a_way_does_not_slow_down(self):
         run = drive(on_odometry(lambda _: (0.0, 0.5)), seconds=3)
