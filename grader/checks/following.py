@@ -193,7 +193,7 @@ def _failure(
         observed = f"the values are of different moments of {code(parameters.source)}"
         hint = "Fill all fields from one message: `msg` of the callback."
     else:
-        observed = _wrong_fields(made_of, first, row, bad, _explanation(made_of, seen, bad))
+        observed = _wrong_fields(made_of, first, row, bad, _explanation(made_of, seen, told, bad))
         hint = (
             f"Set {codes(made_of.fields[index] for index in bad)} in the callback of "
             f"{code(parameters.source)}, from {codes(made_of.values[index].text for index in bad)} "
@@ -249,7 +249,9 @@ def _lag_s(made_of: MadeOf, wrong: Sequence[Sample]) -> float | None:
     return None if still and len(wrong) > 1 else sorted(ages)[len(ages) // 2]
 
 
-def _explanation(made_of: MadeOf, seen: Sequence[Sample], bad: Sequence[int]) -> dict[int, str]:
+def _explanation(
+    made_of: MadeOf, seen: Sequence[Sample], wrong: Sequence[Sample], bad: Sequence[int]
+) -> dict[int, str]:
     """What stands in the wrong fields, as far as the data tells."""
     found = {}
     for index in bad:
@@ -259,15 +261,23 @@ def _explanation(made_of: MadeOf, seen: Sequence[Sample], bad: Sequence[int]) ->
         elif len(numbers) > 1 and spread(numbers) <= 0.0:
             found[index] = _ALWAYS_THE_SAME if numbers[0] else _NEVER_SET
         else:
-            words = _mistaken(made_of, seen, index)
+            off = [sample for sample in wrong if not made_of.fits(sample, fields=[index])]
+            words = _mistaken(made_of, seen, off, index)
             if words:
                 found[index] = words
     return found
 
 
-def _mistaken(made_of: MadeOf, seen: Sequence[Sample], index: int) -> str | None:
+def _mistaken(
+    made_of: MadeOf, seen: Sequence[Sample], wrong: Sequence[Sample], index: int
+) -> str | None:
+    """What stands in a field: in nearly all messages, and in nearly all of those that are wrong.
+
+    Of a number that is not negative, what has lost its sign is right as well, and says nothing of
+    the few that are wrong.
+    """
     value = made_of.values[index]
-    rows = sorted({row for sample in seen for row in sample.window})
+    rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
     taken = {row: list(mistakes(value, made_of.sources[row].value)) for row in rows}
     for number, (words, _) in enumerate(taken[rows[0]]):
         # Of an array in the source, not every message need have as many elements.
@@ -276,16 +286,20 @@ def _mistaken(made_of: MadeOf, seen: Sequence[Sample], index: int) -> str | None
         series = {row: entries[number][1] for row, entries in taken.items()}
         if not spread(list(series.values())) > made_of.tolerance:
             continue
-        hits = sum(
-            any(
-                abs(sample.values[index] - series[row]) <= made_of.tolerance
-                for row in sample.window
-            )
-            for sample in seen
-        )
-        if hits >= _NEARLY_ALL * len(seen):
+        if all(_hits(samples, index, series, made_of.tolerance) for samples in (seen, wrong)):
             return words
     return None
+
+
+def _hits(
+    samples: Sequence[Sample], index: int, series: Mapping[int, float], tolerance: float
+) -> bool:
+    """Whether a field of nearly all of these holds what follows from a source."""
+    hits = sum(
+        any(abs(sample.values[index] - series[row]) <= tolerance for row in sample.window)
+        for sample in samples
+    )
+    return hits >= _NEARLY_ALL * len(samples)
 
 
 def _plot(recording: Recording, made_of: MadeOf, judged: Sequence[Sample], index: int) -> Plot:

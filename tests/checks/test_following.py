@@ -200,6 +200,16 @@ class TestExplains:
         subject = replace(subject, messages={**subject.messages, ODOM: sources})
         assert verdict(subject).status is Status.PASSED
 
+    def test_what_is_right_in_most_messages_explains_no_others(self):
+        def values(time_s):
+            x, heading, speed = place(time_s)
+            off = 1.0 if time_s in (TIMES[20], TIMES[40]) else 0.0
+            return status(x + off, heading + off, speed + off)
+
+        found = told(run(values))
+        assert "2 of 60 messages wrong" in found
+        assert "it is" not in found
+
     def test_another_field_of_the_source(self):
         found = told(run(lambda t: status(-2.0 * place(t)[0], *place(t)[1:])))
         assert "it is `pose.pose.position.y`" in found
