@@ -285,6 +285,8 @@ def _at_least_threads(count: Any) -> Any:
         return max(_LEAST_THREADS, count() or 0)
 
     counted.__name__ = counted.__qualname__ = count.__name__
+    # Where to find it, for whoever gives it to another process to call.
+    counted.__module__ = "os"
     counted.__doc__ = count.__doc__
     return counted
 
