@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import atexit
 import builtins
+import os
 import sys
 
 TYPE_CHECKING = False
@@ -146,7 +147,7 @@ class Ahead:
             return False
         found = _PathFinder.find_spec(kept.spec.name, path)
         # One that is in no folder is Python's own, if it is not in a package.
-        return bool(found.origin != kept.spec.origin if found else path)
+        return not _is_same(found.origin, kept.spec.origin) if found else bool(path)
 
     def take(self, name: str) -> None:
         """It is there now; whoever throws it away and imports it again gets a new one."""
@@ -242,6 +243,19 @@ class _Watched:
     def exec_module(self, module: Any) -> None:
         module.__spec__.loader = module.__loader__ = self._loader
         self._ahead.executing(module, self._loader.exec_module)
+
+
+def _is_same(origin: Any, kept: Any) -> bool:
+    """Whether a module is of the same file, which a link may give another name.
+
+    What was loaded from it cannot always be loaded again: NumPy cannot.
+    """
+    if origin == kept:
+        return True
+    try:
+        return os.path.samefile(origin, kept)
+    except (OSError, TypeError, ValueError):
+        return False
 
 
 def _import(name: str) -> None:
