@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from grader.assignment.load import load_assignment
 from grader.checks.approach import Approach
 from grader.checks.finding import Status
 from grader.checks.law import Sample, examine
@@ -247,6 +248,27 @@ def test_to_turn_on_the_spot_towards_the_goal_is_the_first_phase():
     assert judge("motion.two_phases", run, goal=yaml(goal), position="0.1 m").status is (
         Status.PASSED
     )
+
+
+@pytest.mark.parametrize(("linear", "angular", "top"), [(0.2, 0.5, 0.22), (1.0, 2.0, 0.05)])
+def test_who_publishes_changes_only_does_so_often_enough_for_the_assignment(linear, angular, top):
+    goal = 0.6, 0.4, math.pi / 2
+    student = Student(goal, linear=linear, angular=angular, top=top)
+    control = on_timer(0.1, lambda pose: tuple(round(item, 2) for item in student(pose)))
+    said = []
+
+    def changes(senses):
+        command = control(senses)
+        if command is None or command in said[-1:]:
+            return None
+        said.append(command)
+        return command
+
+    (often,) = [
+        spec for spec in load_assignment("p_controller").assignment.checks if spec.id == "often"
+    ]
+    finding = judge(often.uses, drive(changes, seconds=30), **often.with_)
+    assert finding.status is Status.PASSED, finding
 
 
 class TestMistakes:
