@@ -404,7 +404,15 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
             "Your node sees it late, and the robot cannot stop at once. Make the angular gain "
             "smaller, or turn back where the error has become too large again.",
         )
-    if is_at_rest(last) and abs(run.heading_error_rad(last)) < _A_LITTLE_RAD:
+    error_rad = run.heading_error_rad(last)
+    if is_at_rest(last) and abs(error_rad) < _A_LITTLE_RAD:
+        turned = next((s.angular_rad_s for s in reversed(run.truth) if s.angular_rad_s), 0.0)
+        if turned * error_rad < 0.0:
+            return (
+                ": it turned a little too far",
+                "The error is goal_theta - yaw, with goal_theta as it was given: do not round it. "
+                "Where the error changes its sign, turn back.",
+            )
         return (
             ": it stopped turning a little before",
             "Compare abs(goal_theta - yaw) with angle_tolerance, in radians, and turn on until it "

@@ -457,6 +457,11 @@ class TestMistakes:
         assert "Make the angular gain smaller, or turn back" in said
         assert "angle_tolerance" not in said
 
+    def test_turns_to_a_heading_that_is_a_little_beyond(self):
+        run = drive(on_odometry(Student((*GOAL[:2], GOAL[2] + 0.08), straight=0.02)), seconds=40)
+        said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.02 rad")
+        assert "it turned a little too far" in said and "do not round it" in said
+
     def test_ends_a_little_before_the_goal(self):
         run = run_to(GOAL)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.03 m", heading="0.1 rad")
