@@ -125,7 +125,7 @@ def only_shown(result: Result) -> frozenset[str]:
 def headline(result: Result) -> str:
     """The headline of the report, from a result."""
     withheld = Withheld(result.withheld.checks, result.withheld.points)
-    full_points = result.score == result.max_score
+    full_points = result.score == result.max_score > 0
     statuses = [check.status for check in result.checks]
     return words.summary(statuses, withheld, full_points=full_points)
 

@@ -77,11 +77,12 @@ def tally(grade: Grade, status: Status) -> str:
 def headline(grade: Grade) -> str:
     """One sentence on the whole, and one on what is judged only at grading."""
     statuses = [result.status for result in grade.results]
-    return summary(statuses, grade.withheld, full_points=grade.full_points)
+    full_points = grade.full_points and grade.max_score > 0
+    return summary(statuses, grade.withheld, full_points=full_points)
 
 
 def summary(statuses: Sequence[Status], withheld: Withheld, *, full_points: bool) -> str:
-    """:func:`headline` of checks that ended so."""
+    """:func:`headline` of checks that ended so; ``full_points`` of those that there are."""
     total, passed = len(statuses), statuses.count(Status.PASSED)
     failed, skipped = statuses.count(Status.FAILED), statuses.count(Status.SKIPPED)
     if Status.ERROR in statuses:

@@ -214,3 +214,13 @@ def test_what_is_shown_without_points_is_no_reason_to_worry():
     )
     assert headline(told) == "Full points; 1 check without points failed."
     assert explanation.headline(make_result(told, recordings(), make_facts())) == headline(told)
+
+
+def test_where_nothing_has_points_none_are_full():
+    told = grade(
+        make_loaded([Told("node", points=0), Told("silence", FAIL, points=0)]),
+        make_submission(),
+        recordings(),
+    )
+    assert headline(told) == "1 check failed."
+    assert explanation.headline(make_result(told, recordings(), make_facts())) == headline(told)
