@@ -143,12 +143,20 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     unasked = sum(message.stamp_ns < sent[0].stamp_ns for message in received)
     if unasked > _GREETINGS:
         evidence = replace(evidence, moments=first_seen(recording, received))
-        return _unasked(parameters, unasked, evidence)
+        observed = (
+            f"{counted(unasked, 'message')} on {code(parameters.topic)} before anything was asked "
+            f"on {code(parameters.stimulus)}"
+        )
+        return _unprompted(parameters, observed, evidence)
     copies = max((len(case.answers) for case in judged[:-1]), default=1)
-    if judged and len(judged[-1].answers) > max(copies, 1) + _MORE_COPIES:
+    if judged and (times := len(judged[-1].answers)) > max(copies, 1) + _MORE_COPIES:
         when_s = recording.since_launch_s(received[-1].stamp_ns)
         evidence = replace(evidence, moments=(Moment("once more the same answer", when_s),))
-        return _again(parameters, judged[-1], evidence)
+        observed = (
+            f"case {judged[-1].number} was answered {counted(times, 'time')}: the same answer "
+            f"comes on {code(parameters.topic)} again and again when nothing new is asked"
+        )
+        return _unprompted(parameters, observed, evidence)
     if len(judged) < parameters.at_least:
         return _too_few(recording, parameters, found, judged).finding(expected)
     return Finding.passed(expected, _summary(judged), evidence)
@@ -312,22 +320,11 @@ def _by_kind(wrong: list[Case]) -> tuple[str, str]:
     return "", hints[group]
 
 
-def _unasked(parameters: Answers, unasked: int, evidence: Evidence) -> Finding:
+def _unprompted(parameters: Answers, observed: str, evidence: Evidence) -> Finding:
+    """What is said about a node that publishes when nothing is asked."""
     return Finding.failed(
         parameters.words,
-        f"{counted(unasked, 'message')} on {code(parameters.topic)} before anything was asked on "
-        f"{code(parameters.stimulus)}",
-        "Publish in the callback of the subscription, once for each message, and not in a timer.",
-        evidence,
-    )
-
-
-def _again(parameters: Answers, last: Case, evidence: Evidence) -> Finding:
-    """What is said about a node that goes on answering when nothing is asked any more."""
-    return Finding.failed(
-        parameters.words,
-        f"case {last.number} was answered {counted(len(last.answers), 'time')}: the same answer "
-        f"comes on {code(parameters.topic)} again and again when nothing new is asked",
+        observed,
         "Publish in the callback of the subscription, once for each message, and not in a timer.",
         evidence,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from typing import Protocol
 
 
@@ -76,6 +76,10 @@ def first_to_fix(
         same = {name for name, reason in reasons.items() if reason == reasons[check]}
         return len(same) - 1 + sum(not same.isdisjoint(one) for one in waits)
 
-    waited_for = {check for one in waits for check in one}
-    costly = [check for check in reasons if check not in without_points or check in waited_for]
-    return max(costly, key=others, default=None)
+    shown = only_shown(without_points, waits)
+    return max((check for check in reasons if check not in shown), key=others, default=None)
+
+
+def only_shown(without_points: Collection[str], waits: Iterable[Sequence[str]]) -> frozenset[str]:
+    """Those of the checks without points that nothing else waits for."""
+    return frozenset(without_points).difference(*waits)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from grader.assignment.withheld import Withheld
 from grader.checks.finding import Status
+from grader.grade import first
 from grader.report import words
 from grader.report.clean import clean, one_line
 from grader.report.result_model import CheckPart, FindingPart, PlacePart, Result
@@ -114,12 +115,8 @@ def points(check: CheckPart) -> str:
 
 def only_shown(result: Result) -> frozenset[str]:
     """Ids of the checks that failed without points, and that nothing else waits for."""
-    waited_for = {name for check in result.checks for name in check.waits_for}
-    return frozenset(
-        check.id
-        for check in result.checks
-        if check.status is Status.FAILED and not check.max_points and check.id not in waited_for
-    )
+    failed = [c.id for c in result.checks if c.status is Status.FAILED and not c.max_points]
+    return first.only_shown(failed, (check.waits_for for check in result.checks))
 
 
 def headline(result: Result) -> str:

@@ -85,15 +85,24 @@ def test_a_fork_that_ends_is_noticed_at_once_and_its_zygote_may_fork_again(
     assert nursery.recv(_ROOM) == b"0.1"
 
 
-def test_a_zygote_that_does_not_answer_is_asked_no_more(
+@pytest.fixture
+def unanswered(
     enclosure: Enclosure,
     zygote: tuple[socket.socket, socket.socket],
     monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    nursery, its_own = zygote
+) -> tuple[socket.socket, socket.socket]:
+    """One that was asked for a fork, and did not answer in time."""
+    nursery, _ = zygote
     monkeypatch.setattr(forked, "_LIMIT_S", 0.5)
     with pytest.raises(NotForked, match="timed out"):
         fork(enclosure, nursery)
+    return zygote
+
+
+def test_a_zygote_that_does_not_answer_is_asked_no_more(
+    enclosure: Enclosure, unanswered: tuple[socket.socket, socket.socket]
+) -> None:
+    nursery, its_own = unanswered
     # As every cell and the nursery itself see it, and the zygote when it goes on.
     assert nursery.recv(_ROOM) == b""
     assert its_own.recv(_ROOM)
@@ -103,14 +112,9 @@ def test_a_zygote_that_does_not_answer_is_asked_no_more(
 
 
 def test_a_fork_that_was_not_waited_for_runs_nothing(
-    enclosure: Enclosure,
-    zygote: tuple[socket.socket, socket.socket],
-    monkeypatch: pytest.MonkeyPatch,
+    unanswered: tuple[socket.socket, socket.socket],
 ) -> None:
-    nursery, its_own = zygote
-    monkeypatch.setattr(forked, "_LIMIT_S", 0.5)
-    with pytest.raises(NotForked, match="timed out"):
-        fork(enclosure, nursery)
+    _, its_own = unanswered
     _, (*_, reply), _, _ = socket.recv_fds(its_own, _ROOM, _DESCRIPTORS)
     with socket.socket(fileno=reply) as told:
         assert select.select([told], [], [], _LIMIT_S)[0]
