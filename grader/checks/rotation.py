@@ -20,6 +20,7 @@ from grader.checks.conversion import (
     Group,
     WrongMessage,
     degrees,
+    sine_of_pitch,
 )
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_not_delivered
@@ -38,11 +39,15 @@ from grader.recording.model import NS, Recording
 # An answer takes a callback of some microseconds; a question that was sent later than this
 # before the end may be unanswered.
 _TIME_TO_ANSWER_S = 0.25
+# Share of the answers that must be right on another topic to say that they are there.
+_ELSEWHERE = 0.9
 # Share of the answers that must belong to the question before to say so.
 _STALE = 0.8
 _AT_ONCE_S = 0.05
 # A callback that converts answers within some ms; one that takes longer holds up the questions.
 _SLOW_S = 0.05
+# What rounding or single precision may cost, but no mistake in a formula.
+_LITTLE_RAD = 1e-3
 # One that publishes a first message when it is created does no harm.
 _GREETINGS = 2
 # Nor does one that says everything twice; one that does not stop answers the last far more often.
@@ -92,6 +97,11 @@ class Answers(Parameters):
             f"the same rotation, within {degrees(self.tolerance)}{unit}"
         )
 
+    @property
+    def limits(self) -> Limits:
+        """What is right."""
+        return Limits(self.tolerance, self.length)
+
     def judges(self, case: Case) -> bool:
         """Whether a case is judged."""
         return not self.cases or case.group in self.cases
@@ -122,10 +132,10 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     if not sent:
         return _not_asked(recording, parameters).finding(expected)
     if not received:
-        return why_silent(recording, parameters.topic).finding(expected)
-    limits = Limits(parameters.tolerance, parameters.length)
+        cause = _elsewhere(recording, parameters) or why_silent(recording, parameters.topic)
+        return cause.finding(expected)
     try:
-        found = cases(parameters.conversion, sent, received, limits)
+        found = cases(parameters.conversion, sent, received, parameters.limits)
     except WrongMessage as error:
         return Finding.error(expected, f"the messages are not what the check converts: {error}")
     judged = [case for case in found if parameters.judges(case) and _answerable(recording, case)]
@@ -134,6 +144,9 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     evidence = evidence_of(
         recording, parameters.conversion, parameters.topic, parameters.tolerance, judged
     )
+    elsewhere = _elsewhere(recording, parameters) if wrong or missing else None
+    if elsewhere is not None:
+        return elsewhere.finding(expected)
     if _is_behind(found):
         return _behind(parameters, found, evidence)
     if wrong:
@@ -167,6 +180,31 @@ def _not_asked(recording: Recording, parameters: Answers) -> Cause:
     return cause or Cause(
         f"nothing was sent on {code(parameters.stimulus)}", ours=True, disturbed=True
     )
+
+
+def _elsewhere(recording: Recording, parameters: Answers) -> Cause | None:
+    """The right answers on another topic, as exchanged publishers give them."""
+    for topic, received in recording.messages.items():
+        if topic == parameters.topic:
+            continue
+        try:
+            found = cases(
+                parameters.conversion,
+                recording.sent[parameters.stimulus],
+                received,
+                parameters.limits,
+            )
+        except WrongMessage:
+            continue
+        if sum(bool(case.answers) and case.good for case in found) > _ELSEWHERE * len(found):
+            return Cause(
+                f"the answers to {code(parameters.stimulus)} are right, but come on {code(topic)}",
+                f"The callback of {code(parameters.stimulus)} publishes on "
+                f"{code(parameters.topic)}: look which publisher has which topic, and which "
+                "callback uses it.",
+                Evidence(moments=first_seen(recording, received)),
+            )
+    return None
 
 
 def _answerable(recording: Recording, case: Case) -> bool:
@@ -250,7 +288,7 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
     if all(case.group in (Group.GIMBAL_LOCK, Group.ZERO) for case in wrong):
         # There, several mistakes give the same: at gimbal lock the usual formula does so by
         # rounding errors, and of a zero axis nothing is left that could be normalized.
-        return _by_kind(wrong)
+        return _by_kind(parameters, wrong)
     if all(case.group is Group.SCALED and _none(case.answers[0].row) for case in wrong):
         return (
             "the answer is no rotation at all",
@@ -286,7 +324,7 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
         of = f"all {len(bad)}" if share == 1.0 else f"{round(share * len(bad))} of {len(bad)}"
         return f"{slip.words} (that gives {of} of these answers)", slip.hint
     part = wrong_part(parameters.conversion, questions, np.array([row for _, row in bad]))
-    return part or _by_kind(wrong)
+    return part or _by_kind(parameters, wrong)
 
 
 def _none(row: tuple[float, ...]) -> bool:
@@ -294,30 +332,54 @@ def _none(row: tuple[float, ...]) -> bool:
     return row in ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
 
-def _by_kind(wrong: list[Case]) -> tuple[str, str]:
-    nothing = all(case.group is Group.ZERO for case in wrong)
-    if not nothing and all(case.answers[0].error_rad < 1e-3 for case in wrong):
-        lengths = [case.answers[0].length for case in wrong if case.answers[0].length]
-        return (
-            f"the rotation is right, but the quaternion's length is not 1 (it is "
-            f"{min(lengths):.6g} to {max(lengths):.6g})"
-            if lengths
-            else "the rotation is a little off",
-            "Normalize what you compute with, and compute in double precision.",
-        )
-    hints = {
-        Group.GIMBAL_LOCK: "At a pitch of 90 deg, roll and yaw turn about the same axis, and the "
-        "usual formulas divide 0 by 0. Test for it with a margin, such as abs(sin_pitch) > "
-        "0.9999999, set roll to 0 and take the whole turn as yaw.",
-        Group.SCALED: "Divide by the length first: the axis and the quaternion need not have "
-        "length 1.",
-        Group.ZERO: "Test the length before you divide by it, and answer with no rotation "
-        "(x = y = z = 0, w = 1) or with nothing.",
-        Group.ORDINARY: "Work the first wrong case out by hand and compare term by term.",
-    }
+def _by_kind(parameters: Answers, wrong: list[Case]) -> tuple[str, str]:
+    """What can be said of wrong answers that no known mistake explains."""
     groups = {case.group for case in wrong}
-    group = groups.pop() if len(groups) == 1 else Group.ORDINARY
-    return "", hints[group]
+    answers = [case.answers[0] for case in wrong]
+    lengths = [answer.length for answer in answers if answer.length]
+    if groups != {Group.ZERO} and all(answer.error_rad < _LITTLE_RAD for answer in answers):
+        if lengths and max(abs(length - 1.0) for length in lengths) > parameters.length:
+            return (
+                f"the rotation is right, but the quaternion's length is not 1 (it is "
+                f"{min(lengths):.6g} to {max(lengths):.6g})",
+                "Normalize what you compute with, and compute in double precision.",
+            )
+        return "the rotation is a little off", "Compute in double precision, and round nothing."
+    if groups == {Group.GIMBAL_LOCK}:
+        return _at_gimbal_lock(parameters, wrong)
+    if groups == {Group.SCALED}:
+        return "", "Divide by the length first: the axis and the quaternion may have any length."
+    if groups == {Group.ZERO}:
+        return (
+            "",
+            "Answer with no rotation (x = y = z = 0, w = 1) or with nothing: test whether the "
+            "length is 0 before you divide by it.",
+        )
+    return "", "Work the first wrong case out by hand and compare term by term."
+
+
+def _at_gimbal_lock(parameters: Answers, wrong: list[Case]) -> tuple[str, str]:
+    """What is wrong at a pitch of 90 or -90 deg, as far as the answers tell."""
+    if parameters.conversion != "quaternion_to_rpy":
+        return "", "A quaternion knows no gimbal lock: the usual formula holds at every pitch."
+    rows = [case.answers[0].row for case in wrong]
+    if any(0.0 not in (row[0], row[2]) for row in rows):
+        return (
+            "",
+            "The usual formulas divide 0 by 0 there: where abs(sin_pitch) > 0.9999999, answer "
+            "with roll 0 and yaw 2 * math.atan2(z, w).",
+        )
+    pitches = (math.asin(max(-1.0, min(1.0, sine_of_pitch(case.right)))) for case in wrong)
+    if any(abs(row[1] - right) > _LITTLE_RAD for row, right in zip(rows, pitches, strict=True)):
+        return (
+            "the pitch is not that of the rotation",
+            "The pitch is asin(2 (w y - z x)), 90 deg or -90 deg: it has a sign.",
+        )
+    return (
+        "the pitch is right, roll and yaw are not",
+        "Where roll is 0, yaw is 2 * math.atan2(z, w); where yaw is 0, roll is "
+        "2 * math.atan2(x, w).",
+    )
 
 
 def _unprompted(parameters: Answers, observed: str, evidence: Evidence) -> Finding:

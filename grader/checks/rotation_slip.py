@@ -49,6 +49,7 @@ _FIXED_HINT = (
     "Fixed axes stand still while the body turns: first roll about x, then pitch about y, then yaw "
     "about z, so q = q_yaw * q_pitch * q_roll, in this order."
 )
+_HALF_ANGLES_HINT = "A quaternion holds half angles: math.sin(roll / 2)."
 _INVERSE_HINT = "The vector part of the quaternion has the wrong sign, so it turns backwards."
 _SIGN_HINT = (
     "q and -q are the same rotation, but all four numbers change their signs together: leave w "
@@ -293,18 +294,40 @@ def _mixed(order: list[int]) -> Callable[[Rows], Rows]:
     return lambda rows: rotations_of_rpy(rows[:, order])
 
 
-def _rpy_scaled(factor: float) -> Callable[[Rows], Rows]:
-    return lambda rows: rotations_of_rpy(factor * rows)
-
-
 def _intrinsic(rows: Rows) -> Rows:
     from scipy.spatial.transform import Rotation
 
     return np.asarray(Rotation.from_euler("XYZ", rows).as_quat()).reshape(-1, 4)
 
 
-def _signs(x: float, y: float, z: float) -> Callable[[Rows], Rows]:
-    return lambda rows: rotations_of_rpy(rows * np.array([x, y, z]))
+def _rpy_times(factors: Sequence[float]) -> Callable[[Rows], Rows]:
+    return lambda rows: rotations_of_rpy(rows * np.array(factors))
+
+
+def _each_angle(
+    times: Callable[[Sequence[float]], Callable[[Rows], Rows]],
+    mistakes: Sequence[tuple[str, float, str]],
+) -> tuple[Slip, ...]:
+    """A factor on all three angles, or on one of them.
+
+    Args:
+        times: The formula that multiplies roll, pitch and yaw by factors.
+        mistakes: What is wrong, to follow "the angles are"; the factor; what to try.
+    """
+    return tuple(
+        Slip(
+            f"{subject} {predicate}",
+            hint,
+            times([factor if applies else 1.0 for applies in which]),
+        )
+        for predicate, factor, hint in mistakes
+        for subject, which in (
+            ("the angles are", (True, True, True)),
+            ("only the roll is", (True, False, False)),
+            ("only the pitch is", (False, True, False)),
+            ("only the yaw is", (False, False, True)),
+        )
+    )
 
 
 _SWAPPED = (
@@ -320,17 +343,15 @@ _RPY = (
     *(Slip(words, _SWAP_HINT, _mixed(order)) for words, order in _SWAPPED),
     Slip("it turns about the axes that turn with the body (intrinsic), not about fixed ones",
          _FIXED_HINT, _intrinsic),
-    Slip("the angles are not halved", "A quaternion holds half angles: math.sin(roll / 2).",
-         _rpy_scaled(2.0)),
-    *(
-        Slip(f"the {name} is not halved", f"A quaternion holds half angles: math.sin({name} / 2).",
-             _signs(*factors))
-        for name, factors in (
-            ("roll", (2.0, 1.0, 1.0)), ("pitch", (1.0, 2.0, 1.0)), ("yaw", (1.0, 1.0, 2.0)),
-        )
+    *_each_angle(
+        _rpy_times,
+        (
+            ("not halved", 2.0, _HALF_ANGLES_HINT),
+            ("halved twice", 0.5, _HALF_ANGLES_HINT),
+            ("converted as if in degrees", np.pi / 180.0, _RADIANS_HINT),
+            ("converted to degrees", 180.0 / np.pi, _RADIANS_HINT),
+        ),
     ),
-    Slip("the angles are halved twice", "A quaternion holds half angles: math.sin(roll / 2).",
-         _rpy_scaled(0.5)),
     Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
          _w_first(rotations_of_rpy)),
     Slip("the fields are in a wrong order: x, y, z, w hold y, z, w, x", _ORDER_HINT,
@@ -339,11 +360,8 @@ _RPY = (
     Slip("w has lost its sign", _SIGN_HINT, _w_without_sign(rotations_of_rpy)),
     Slip("it is the conjugate, the inverse rotation", _INVERSE_HINT,
          _conjugate(rotations_of_rpy)),
-    Slip("the angles are converted as if they came in degrees", _RADIANS_HINT,
-         _rpy_scaled(np.pi / 180.0)),
-    Slip("the angles are converted to degrees", _RADIANS_HINT, _rpy_scaled(180.0 / np.pi)),
-    Slip("only the yaw is used", _SWAP_HINT, _signs(0.0, 0.0, 1.0)),
-    Slip("the pitch has the wrong sign", _SWAP_HINT, _signs(1.0, -1.0, 1.0)),
+    Slip("only the yaw is used", _SWAP_HINT, _rpy_times((0.0, 0.0, 1.0))),
+    Slip("the pitch has the wrong sign", _SWAP_HINT, _rpy_times((1.0, -1.0, 1.0))),
 )  # fmt: skip
 
 
@@ -371,6 +389,10 @@ def rpy_of(quaternions: Rows) -> Rows:
 
 def _right_rpy(rows: Rows) -> Rows:
     return rpy_of(unit_quaternions(rows))
+
+
+def _times(factors: Sequence[float]) -> Callable[[Rows], Rows]:
+    return lambda rows: _right_rpy(rows) * np.array(factors)
 
 
 def _intrinsic_rpy(rows: Rows) -> Rows:
@@ -405,7 +427,6 @@ _TO_RPY = (
     ),
     Slip("the angles are those about axes that turn with the body (intrinsic), not about fixed "
          "ones", _FIXED_HINT, _intrinsic_rpy),
-    Slip("the angles are in degrees", _RADIANS_HINT, lambda rows: np.degrees(_right_rpy(rows))),
     Slip("the quaternion is not scaled to length 1 before", "Divide x, y, z and w by the length "
          "of the quaternion, math.sqrt(x**2 + y**2 + z**2 + w**2), before you use them.",
          rpy_of),
@@ -419,17 +440,22 @@ _TO_RPY = (
     Slip("it is the inverse rotation", "The conjugate of a quaternion turns backwards: look for "
          "a wrong sign.", lambda rows: _right_rpy(rows * np.array([-1.0, -1.0, -1.0, 1.0]))),
     Slip("the pitch has the wrong sign", "The pitch is asin(2 (w y - z x)).",
-         lambda rows: _right_rpy(rows) * np.array([1.0, -1.0, 1.0])),
+         _times((1.0, -1.0, 1.0))),
     Slip("roll and yaw lose their quadrant", "Use math.atan2(a, b) and not math.atan(a / b): only "
          "the two signs tell the quadrant.", _tangent),
     Slip("the yaw loses its quadrant", "Use math.atan2(a, b) for the yaw: math.asin and math.atan "
          "give angles from -90 to 90 deg only.", partial(_folded, [2])),
     Slip("the roll loses its quadrant", "Use math.atan2(a, b) for the roll: math.asin and "
          "math.atan give angles from -90 to 90 deg only.", partial(_folded, [0])),
-    Slip("the angles are halved", "atan2 and asin give the whole angle here; do not halve it.",
-         lambda rows: 0.5 * _right_rpy(rows)),
-    Slip("the angles are doubled", "atan2 and asin give the whole angle here; do not double it.",
-         lambda rows: 2.0 * _right_rpy(rows)),
+    *_each_angle(
+        _times,
+        (
+            ("in degrees", 180.0 / np.pi, _RADIANS_HINT),
+            ("converted as if in degrees", np.pi / 180.0, _RADIANS_HINT),
+            ("halved", 0.5, "atan2 and asin give the whole angle here; do not halve it."),
+            ("doubled", 2.0, "atan2 and asin give the whole angle here; do not double it."),
+        ),
+    ),
 )  # fmt: skip
 
 SLIPS = {

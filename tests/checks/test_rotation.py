@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -165,7 +166,7 @@ class TestByHand:
             assert finding.status is Status.PASSED
         words = failed("quaternion_to_rpy", [asked], [[0.6, math.pi / 2, 0.0]])
         assert "roll 0 deg, pitch 90 deg, yaw 34.38 deg, or other angles" in words
-        assert "roll and yaw turn about the same axis" in words
+        assert "the pitch is right, roll and yaw are not" in words
 
     def test_a_quaternion_of_another_length_is_the_same_rotation(self):
         answered = [math.pi / 2, 0, 0]
@@ -217,7 +218,7 @@ class TestZero:
         # As of an axis that was divided by its length and a little.
         half = [0, 0, 0, math.cos(0.5)]
         words = failed("axis_angle_to_quaternion", self.CASES, self.with_zero(half))
-        assert "Test the length before you divide by it" in words
+        assert "test whether the length is 0 before you divide by it" in words
         assert "normalize" not in words.lower()
 
     def test_a_node_that_dies_of_it_is_told_why(self):
@@ -344,6 +345,53 @@ def test_the_same_answer_to_everything():
     assert "every answer is the same" in words
 
 
+def test_right_answers_on_another_topic_are_found_there():
+    conversion, asked = asked_of("rpy")
+    answered = right(conversion, asked)
+    exchanged = run(conversion, asked, answered)
+    words = failing(
+        "rotation.answers",
+        replace(
+            exchanged,
+            messages={
+                "/quaternion": exchanged.on("/orientation"),
+                "/orientation": run(conversion, asked, answered[::-1]).on("/orientation"),
+            },
+        ),
+        **parameters(conversion),
+    )
+    assert "the answers to `/rpy` are right, but come on `/quaternion`" in words
+    assert "term by term" not in words
+
+
+def test_a_pole_that_is_tested_for_already_is_not_to_be_tested_for():
+    asked = [
+        Rotation.from_euler("xyz", [0.3, side * math.pi / 2, 1.0]).as_quat() for side in (1, -1)
+    ]
+    halved = [
+        [0.0, math.copysign(math.pi / 2, -q[0] * q[2]), math.atan2(q[2], q[3])] for q in asked
+    ]
+    words = failed("quaternion_to_rpy", asked, halved)
+    assert "the pitch is right, roll and yaw are not" in words and "0.9999999" not in words
+    unsigned = [[0.0, math.pi / 2, 2.0 * math.atan2(q[2], q[3])] for q in asked]
+    words = failed("quaternion_to_rpy", asked, unsigned)
+    assert "the pitch is not that of the rotation" in words and "0.9999999" not in words
+
+
+def test_a_quaternion_has_no_pole_to_be_tested_for():
+    asked = [[0.3, math.pi / 2, 1.0], [0.2, 0.1, 0.5]]
+    answered = right("rpy_to_quaternion", asked)
+    words = failed("rpy_to_quaternion", asked, [[0.0, 0.0, 0.0, 1.0], answered[1]])
+    assert "0.9999999" not in words
+
+
+def test_a_length_of_1_is_not_blamed():
+    asked = [[0, 0, 1, 1.0], [0, 0, 1, 2.0]]
+    answered = right("axis_angle_to_quaternion", [[0, 0, 1, 1.0005], [0, 0, 1, 2.0005]])
+    words = failed("axis_angle_to_quaternion", asked, answered)
+    assert "a little off" in words and "length is not 1" not in words
+
+
 def test_answers_that_belong_to_the_message_before():
     conversion, asked = asked_of("axis_angle")
     stale = [[0, 0, 0, 1], *right(conversion, asked)[:-1]]
@@ -448,7 +496,7 @@ def test_the_usual_formula_alone_fails_at_gimbal_lock(seed):
     for limit, scale in itertools.product((math.inf, 1.0), (False, True)):
         answers = [usual(row, limit, scale) for row in asked]
         words = failed(conversion, asked, answers, {"tolerance": "0.1 deg"})
-        assert "set roll to 0 and take the whole turn as yaw" in words
+        assert "answer with roll 0 and yaw 2 * math.atan2(z, w)" in words
 
 
 # --- Pairing and silence ----------------------------------------------------------------------
