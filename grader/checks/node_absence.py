@@ -8,6 +8,7 @@ from grader.checks.death import cause_of_death, dead
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence
 from grader.checks.sighting import nodes_seen, until_the_end
+from grader.checks.unbuilt import why_not_built
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
 from grader.recording.model import Ending, Process, Recording
@@ -43,8 +44,14 @@ def why_not_node(recording: Recording, name: str) -> Cause | None:
 
 
 def _not_started(recording: Recording) -> Cause:
-    build = recording.submission.build
-    if build is not None and not build.succeeded:
+    start = next((w.what for w in recording.waits if w.what.startswith(_START)), "")
+    what, _, why = start.removeprefix(_START).partition(": ")
+    submission, build = recording.submission, recording.submission.build
+    package = what.partition("/")[0]
+    unbuilt = submission.package(package) and why_not_built(submission, package)
+    if unbuilt:
+        return unbuilt.after("nothing was launched")
+    if build is not None and not build.succeeded and not what:
         return Cause(
             "nothing was launched, because the packages did not build",
             "Mend the build first: `colcon build` names the line.",
@@ -52,8 +59,6 @@ def _not_started(recording: Recording) -> Cause:
         )
     installed = [name for package in recording.submission.packages for name in package.executables]
     there = f"; installed are {codes(installed)}" if installed else ""
-    start = next((w.what for w in recording.waits if w.what.startswith(_START)), "")
-    what, _, why = start.removeprefix(_START).partition(": ")
     return Cause(
         f"{code(what)} could not be started: {why}{there}"
         if why

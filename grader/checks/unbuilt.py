@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import replace
 
 from grader.checks.cause import Cause
 from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
-from grader.submission.buildlog import missing_cmake_packages
+from grader.submission.buildlog import modules_not_found, not_found
 from grader.submission.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
+from grader.submission.toolchain import TOOLS
 
 _LOG_LINES = 15
 _SIDE_BY_SIDE = " A package that lies inside another one is not found: put them side by side."
@@ -21,7 +21,6 @@ _COMPARED = 60
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 # What colcon says of its own doings around the tool's output.
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
-_ABORTED = re.compile(r"^Aborted +<<< (\S+)", re.MULTILINE)
 # What setuptools says of data_files, as `ros2 pkg create` writes them.
 _NO_MARKER = re.compile(r"can't copy 'resource/([\w-]+)': doesn't exist")
 _CMAKE = ("ament_cmake", "cmake")
@@ -134,23 +133,72 @@ def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
             "CMakeLists.txt.",
             _evidence(build, name),
         )
-    aborted = {found[1] for found in _ABORTED.finditer(_clean(build))}
-    others = [other for other in build.failed_packages if other not in {name, *aborted}]
-    lacking = _lacking(submission, build, [name, *others] if name in aborted else [name])
-    if lacking:
+    if _failed_itself(build, name):
+        lacking = _lacking(submission, build, name)
+        return _not_here(lacking) if lacking else _failed(_own(submission, build, name), name)
+    return _never_begun(submission, build, name)
+
+
+def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
+    """What this machine lacks for a package, or for what the package rests on; else None."""
+    for one in (name, *_rests_on(submission, name)):
+        cause = why_not_built(submission, one)
+        if cause is not None and cause.ours:
+            return cause
+    return None
+
+
+def _never_begun(submission: SubmissionRecord, build: BuildRecord, name: str) -> Cause:
+    """Why colcon did not begin a package: it rests on others that failed."""
+    failed = [one for one in build.failed_packages if one != name and _failed_itself(build, one)]
+    blamed = [one for one in _rests_on(submission, name) if one in failed] or failed
+    if not blamed:
+        return _failed(build, name)
+    broken = [one for one in blamed if not _lacking(submission, build, one)]
+    if broken:
+        why = f": {build.culprit}" if build.culprit and broken == blamed else ""
         return Cause(
-            f"it needs {codes(lacking)} to build, which ROS 2 Jazzy has, but which is not "
-            "installed where this is graded",
-            "No point is lost by it. Tell whoever runs the grader: a full ROS 2 Jazzy builds it.",
-            ours=True,
+            f"it was not built, because {codes(broken)} failed to build{why}",
+            f"Mend {codes(broken)} first: `colcon build --packages-select {broken[0]}`.",
+            _evidence(build, broken[0]),
         )
-    if name not in aborted or not others:
-        return _failed(_own(submission, build, name), name)
+    lacking = sorted({what for one in blamed for what in _lacking(submission, build, one)})
+    return _not_here(lacking).after(f"it was not built, because it rests on {codes(blamed)}")
+
+
+def _not_here(lacking: list[str]) -> Cause:
     return Cause(
-        f"it was not built, because {codes(others)} failed to build",
-        f"Mend {codes(others)} first: `colcon build --packages-select {others[0]}`.",
-        _evidence(build, others[0]),
+        f"it needs {codes(lacking)} to build, which ROS 2 Jazzy has, but which is not installed "
+        "where this is graded",
+        "No point is lost by it. Tell whoever runs the grader: a full ROS 2 Jazzy builds it.",
+        ours=True,
     )
+
+
+def _failed_itself(build: BuildRecord, name: str) -> bool:
+    """Whether colcon began to build a package that failed, and did not abort it for another."""
+    ends = rf"<<< {re.escape(name)}(?: |$)"
+    if re.search(f"^Aborted +{ends}", _clean(build), re.MULTILINE):
+        return False
+    begins = rf"^(?:Starting >>> {re.escape(name)}$|Failed +{ends})"
+    return re.search(begins, _clean(build), re.MULTILINE) is not None
+
+
+def _rests_on(submission: SubmissionRecord, name: str) -> list[str]:
+    """Other packages of the submission that a package names or imports, and those that they do."""
+    found: list[str] = []
+    ahead = [name]
+    while ahead:
+        package = submission.package(ahead.pop())
+        if package is None:
+            continue
+        named = {item.name for item in package.dependencies}
+        named |= {item.module for item in package.imports}
+        for one in sorted(named & {item.name for item in submission.packages}):
+            if one != name and one not in found:
+                found.append(one)
+                ahead.append(one)
+    return found
 
 
 def _own(submission: SubmissionRecord, build: BuildRecord, name: str) -> BuildRecord:
@@ -189,18 +237,24 @@ def _mend_marker(named: str, name: str) -> str:
     )
 
 
-def _lacking(submission: SubmissionRecord, build: BuildRecord, names: Iterable[str]) -> list[str]:
-    """What the builds of packages did not find because this machine does not have it.
+def _lacking(submission: SubmissionRecord, build: BuildRecord, name: str) -> list[str]:
+    """What the build of a package did not find because this machine does not have it.
 
-    Only CMake looks for any; what a setup.py prints may be put in the same words.
+    Only CMake looks for packages; what a setup.py prints may be put in the same words.
     """
-    found = {
-        missing
-        for name in names
-        if not _is_pure_python(submission, name)
-        for missing in missing_cmake_packages("\n".join(_written(build, name)))
-    }
-    return sorted(found & set(build.lacking))
+    missing: set[str] = set()
+    ahead, seen = [name], {name}
+    while ahead:
+        one = ahead.pop()
+        written = "\n".join(_written(build, one))
+        found = modules_not_found(written)
+        if not _is_pure_python(submission, one):
+            found |= not_found(written) | set(TOOLS.values())
+        missing |= found
+        # Another package of the submission is not there, which lacks something itself.
+        ahead += found & set(build.failed_packages) - seen
+        seen |= found
+    return sorted(missing & set(build.lacking))
 
 
 def _is_pure_python(submission: SubmissionRecord, name: str) -> bool:

@@ -53,7 +53,7 @@ def replay(
     with progress.shown():
         prepared = prepare(submission, installation, cache=cache_folder(), on_progress=progress.say)
         type_support = TypeSupport(loaded, installation, cache_folder()).prefixes(progress.say)
-    reason = why_not_run(prepared.record, loaded.assignment.packages)
+    reason = why_not_run(prepared.record, [one.name for one in loaded.assignment.packages])
     if prepared.install is None or reason is not None:
         told = reason.observed if reason else prepared.record.problem
         raise UsageError(f"{submission}: {told}")

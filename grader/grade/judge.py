@@ -20,7 +20,7 @@ from grader.checks.finding import Finding, Status
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding
 from grader.grade.order import dependency_order
 from grader.grade.points import points_for
-from grader.grade.unrun import why_not_run
+from grader.grade.unrun import why_incomplete, why_not_run
 from grader.recording.model import Ending, Recording
 from grader.submission.record import SubmissionRecord
 
@@ -129,12 +129,28 @@ def _findings(
         recording = recordings.get(scenario)
         if recording is None:
             lost = faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
-            finding = why_not_run(submission, loaded.assignment.packages) or _fault(lost)
-            yield ScenarioFinding(scenario, finding)
+            launched, others = _launched(loaded, scenario), loaded.assignment.packages
+            finding = why_incomplete(submission, launched, "a run of what was handed in")
+            finding = finding or why_not_run(submission, [*launched, *(one.name for one in others)])
+            yield ScenarioFinding(scenario, finding or _fault(lost))
         elif fault := _recording_fault(recording, scenario, submission):
             yield ScenarioFinding(scenario, _fault(fault))
         else:
-            yield _judge(bound, recording, scenario)
+            judged = _judge(bound, recording, scenario)
+            finding = judged.finding
+            if finding.status is Status.FAILED:
+                launched = _launched(loaded, scenario)
+                incomplete = why_incomplete(submission, launched, finding.expected)
+                judged = replace(judged, finding=incomplete or finding)
+            yield judged
+
+
+def _launched(loaded: LoadedAssignment, scenario: str) -> tuple[str, ...]:
+    """Packages that a scenario launches something of."""
+    assignment = loaded.assignment
+    launches = next(item.launch for item in assignment.scenarios if item.id == scenario)
+    default = assignment.packages[0].name
+    return tuple(dict.fromkeys(launch.package or default for launch in launches))
 
 
 def _recording_fault(

@@ -32,7 +32,7 @@ from grader.submission.locate import Located, only
 from grader.submission.members import MIB
 from grader.submission.record import BuildRecord
 from grader.submission.rosdistro import PACKAGES
-from grader.submission.toolchain import check_headers
+from grader.submission.toolchain import missing_here, missing_tools
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
@@ -221,7 +221,6 @@ class _Workshop:
             free = min(shutil.disk_usage(path).free for path in (scratch, install.parent))
             if free < _LEAST_FREE_BYTES:
                 raise GraderFault("the disk is full: the submission could not be built")
-        check_headers(outcome.output)
 
     def _record(
         self,
@@ -257,9 +256,19 @@ class _Workshop:
         )
 
     def _lacking(self, output: str) -> set[str]:
-        """Packages of Jazzy that are neither installed here nor handed in."""
-        missing = buildlog.missing_cmake_packages(output) & PACKAGES
-        return missing - self.ros.packages - set(self.sources.folders)
+        """What ROS 2 Jazzy has and is neither installed here nor handed in."""
+        named = buildlog.not_found(output)
+        imported = {name for name in buildlog.modules_not_found(output) if self._imports(name)}
+        missing = (named | imported) & PACKAGES - self.ros.packages - set(self.sources.folders)
+        tools = missing_tools(self.ros.environment({})["PATH"])
+        return missing | missing_here(named) | set(tools)
+
+    def _imports(self, module: str) -> bool:
+        """Whether a setup.py really imports a module, whatever it prints."""
+        statement = re.compile(rf"\s*(?:import|from)\s+{module}\b")
+        texts = self.sources.texts.items()
+        lines = (line for path, text in texts if path.endswith("setup.py") for line in text)
+        return any(statement.match(line) for line in lines)
 
 
 def _terms(limits: BuildLimits, sandbox: Sandbox | None) -> list[str]:

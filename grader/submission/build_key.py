@@ -10,8 +10,9 @@ from pathlib import Path
 
 from grader.ros import RosInstallation
 from grader.submission.installed import site_packages
+from grader.submission.toolchain import watched_folders
 
-VERSION = 3
+VERSION = 4
 """Raise it when the same submission would now be built differently."""
 
 _TOOLS = ("cc", "c++", "cmake", "ld", "make", "ninja")
@@ -29,7 +30,7 @@ def build_key(
         terms: Limits and libraries of the assignment that are not the usual ones.
     """
     watched = [prefix / "share/ament_index/resource_index/packages" for prefix in ros.prefixes]
-    watched += [ros.python, *site_packages_of(ros), *_tools(ros)]
+    watched += [ros.python, *site_packages_of(ros), *_tools(ros), *watched_folders()]
     parts = [
         VERSION,
         sha256,

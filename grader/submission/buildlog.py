@@ -17,9 +17,17 @@ _NOISE = re.compile(
 # Of a long run of them only the first one is tried.
 _RELATIVE_SCRATCH = re.compile(r"(?<!\.\./)(?:\.\./)+scratch/(?=build/)")
 _ENDED = re.compile(r"(?<!^)(?=(?:Finished|Failed  |Aborted ) <<< \S+ \[)", re.MULTILINE)
-_MISSING_CMAKE_PACKAGE = re.compile(
-    r"Could not find a package configuration file provided by\s+\"([\w-]+)\""
+_NOT_FOUND = (
+    re.compile(r"Could not find a package configuration file provided by\s+\"([\w-]+)\""),
+    re.compile(r"the\s+passed\s+package\s+name\s+'([\w-]+)'\s+was\s+not\s+found\s+before"),
+    re.compile(r"Could NOT find ([\w-]+) \(missing:"),
+    re.compile(r"required packages were not found:\s+- ([\w.+-]+)"),
 )
+"""What CMake says of a package that is not there."""
+# CMake's FindPython3 names the part of it that it did not find.
+_NO_HEADERS = "Development.Module"
+PYTHON_HEADERS = "python3-dev"
+_MISSING_MODULE = re.compile(r"^ModuleNotFoundError: No module named '(\w+)'$", re.MULTILINE)
 
 
 def clean(output: str, paths: Mapping[str, str]) -> str:
@@ -56,6 +64,12 @@ def ending(log: str) -> str:
     return cut[cut.find(b"\n") + 1 :].decode("utf-8", "ignore")
 
 
-def missing_cmake_packages(log: str) -> set[str]:
-    """Packages that ``find_package`` did not find."""
-    return set(_MISSING_CMAKE_PACKAGE.findall(log))
+def not_found(log: str) -> set[str]:
+    """Packages and libraries that CMake did not find."""
+    packages = {name for pattern in _NOT_FOUND for name in pattern.findall(log)}
+    return packages | ({PYTHON_HEADERS} if _NO_HEADERS in log else set())
+
+
+def modules_not_found(log: str) -> set[str]:
+    """Python modules that a build file or a generator of code could not import."""
+    return set(_MISSING_MODULE.findall(log))

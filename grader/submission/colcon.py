@@ -18,7 +18,6 @@ from grader.submission import buildlog
 from grader.submission.bounded import Outcome, run_bounded
 from grader.submission.build_limits import BuildLimits
 from grader.submission.installed import site_packages
-from grader.submission.toolchain import check_toolchain
 from grader.tree import MOST_DEEP, cut_deep
 
 if TYPE_CHECKING:
@@ -72,7 +71,7 @@ class Colcon:
             finished: Packages that are built already; what is built is added.
 
         Raises:
-            GraderFault: colcon or a compiler is not installed, or nobody wants the build any more.
+            GraderFault: colcon is not installed, or nobody wants the build any more.
         """
         started: set[str] = set()
 
@@ -147,7 +146,6 @@ class Colcon:
         command += ["--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"]
         command += ["--base-paths", *folders]
         if not self.only_python:
-            check_toolchain(self.environment["PATH"])
             # Linters and test frameworks are not there to be found on a small installation.
             command += ["--cmake-args", "-DBUILD_TESTING=OFF"]
             # Quicker than make, but stricter with rules that a student may have written; of these

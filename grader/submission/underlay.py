@@ -20,6 +20,7 @@ from grader.submission.build_cache import BuildCache
 from grader.submission.build_limits import BuildLimits
 from grader.submission.culprit import Sources
 from grader.submission.locate import opened
+from grader.submission.toolchain import check_toolchain, missing_tools
 
 CARRIED = carried_interfaces()
 """One folder for each package that the wheels lack."""
@@ -48,6 +49,7 @@ def install_prefix(
     Raises:
         GraderFault: They do not build on this machine.
     """
+    check_toolchain(ros.environment({})["PATH"])
     with opened(packages) as located:
         folders = {
             packages.name if folder == "." else folder.rpartition("/")[2]: folder
@@ -89,6 +91,9 @@ def completed(
     Raises:
         GraderFault: It does not build on this machine.
     """
+    if missing_tools(ros.environment({})["PATH"]):
+        # What needs them will say so, and the rest of the submission is graded.
+        return ros
     underlays = tuple(
         install_prefix(CARRIED / name, ros, cache, on_progress)
         for name in sorted(set(named) - ros.packages)

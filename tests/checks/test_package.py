@@ -1,9 +1,11 @@
 """package.found, package.builds and package.executable."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.checks.finding import Status
-from grader.submission.record import BuildRecord, SourceError
+from grader.submission.record import BuildRecord, Dependency, SourceError
 from tests.checks.builder import failing, judge, package, submission
 
 NAME = "bot_publisher"
@@ -186,6 +188,49 @@ class TestBuilds:
         finding = judge("package.builds", submission(*packages, build=build), package=NAME)
         assert finding.status is Status.ERROR
         assert "`nav2_msgs`" in finding.observed
+
+    @pytest.mark.parametrize(
+        ("other", "lacking", "words"),
+        [
+            ("ament_cmake", "nav2_msgs", NEEDS_NAV2.format("other")),
+            ("ament_cmake", "g++", "Starting >>> other\nThe CMAKE_CXX_COMPILER is not set\n"),
+            (
+                "ament_python",
+                "generate_parameter_library_py",
+                "Starting >>> other\nModuleNotFoundError: No module named "
+                "'generate_parameter_library_py'\n",
+            ),
+        ],
+    )
+    def test_what_rests_on_a_package_that_lacks_something_here_is_not_judged(
+        self, other, lacking, words
+    ):
+        log = f"{words}Failed   <<< other [1s]\n\nSummary: 0 packages finished [1s]\n"
+        build = failed_build(NAME, "other", log=log, lacking=(lacking,))
+        packages = [
+            package(dependencies=(Dependency("other", "exec_depend"),)),
+            package("other", build_type=other),
+        ]
+        for name in (NAME, "other"):
+            finding = judge("package.builds", submission(*packages, build=build), package=name)
+            assert finding.status is Status.ERROR
+            assert f"`{lacking}`" in finding.observed
+            assert "irst" not in finding.hint
+        alone = [package(), packages[1]]
+        only = replace(build, failed_packages=("other",))
+        passed = judge("package.builds", submission(*alone, build=only), package=NAME)
+        assert passed.status is Status.PASSED
+
+    def test_what_rests_on_a_mistake_is_told_to_mend_that(self):
+        log = f"{NEEDS_NAV2.format('other')}Failed   <<< other [1s]\n"
+        log += "Starting >>> wrong\nFailed   <<< wrong [1s]\n"
+        build = failed_build(NAME, "other", "wrong", log=log, lacking=("nav2_msgs",))
+        needs = tuple(Dependency(name, "depend") for name in ("other", "wrong"))
+        others = (package(name, build_type="ament_cmake") for name in ("other", "wrong"))
+        subject = submission(package(dependencies=needs), *others, build=build)
+        finding = judge("package.builds", subject, package=NAME)
+        assert finding.status is Status.FAILED
+        assert "because `wrong` failed to build" in finding.observed
 
     def test_a_setup_py_that_speaks_as_cmake_is_not_excused(self):
         log = f"{NEEDS_NAV2.format(NAME)}Failed   <<< bot_publisher [1s, exited with code 1]\n"

@@ -71,6 +71,7 @@ def make_loaded(
     scenarios: Sequence[str] = ("listen",),
     titles: Mapping[str, str] | None = None,
     title: str = "Publish a Twist every 300 ms",
+    launched: str = "bot_publisher",
 ) -> LoadedAssignment:
     bound = tuple(check.bound() for check in checks)
     assignment = Assignment(
@@ -82,7 +83,7 @@ def make_loaded(
             Scenario(
                 id=name,
                 title=(titles or {}).get(name, ""),
-                launch=(Launch(executable="bot_pub"),),
+                launch=(Launch(package=launched, executable="bot_pub"),),
                 timeout="10 s",
             )
             for name in scenarios

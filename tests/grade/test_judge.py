@@ -1,5 +1,7 @@
 """What a grade promises to a student, and what it promises to the author of an assignment."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.checks.check import Subject
@@ -7,7 +9,7 @@ from grader.checks.finding import Evidence, Finding, Moment, Status
 from grader.errors import GraderFault
 from grader.grade import grade
 from grader.recording.model import NS, Disturbance, Ending, Truth
-from grader.submission.record import BuildRecord, SourceError
+from grader.submission.record import BuildRecord, Import, PackageRecord, SourceError
 from tests.grade.sample import (
     FAIL,
     LAUNCHED_NS,
@@ -326,3 +328,27 @@ class TestNotRun:
         submission = make_submission(build=None)
         result = judge(Told("node"), submission=submission, recordings={})
         assert result.result("node").status is Status.ERROR
+
+    @pytest.mark.parametrize("recorded", [True, False])
+    def test_a_scenario_that_launches_what_cannot_be_built_here_costs_nothing(self, recorded):
+        log = (
+            "Starting >>> cpp\n  Could not find a package configuration file provided by\n"
+            '  "rclcpp" with any\nFailed   <<< cpp [1s, exited with code 1]\n'
+        )
+        lacking = BuildRecord(False, 1.0, False, False, ("cpp",), ("rclcpp",), None, log)
+        python, cpp = (
+            PackageRecord("bot_publisher", "bot_publisher"),
+            PackageRecord("cpp", "cpp", "ament_cmake"),
+        )
+        rests = replace(python, imports=(Import("cpp", "bot_publisher/bot.py", 1),))
+        for launched, other, expected in (
+            ("cpp", python, Status.ERROR),
+            ("bot_publisher", rests, Status.ERROR),
+            ("bot_publisher", python, Status.FAILED if recorded else Status.ERROR),
+        ):
+            submission = make_submission(packages=(other, cpp), build=lacking)
+            recordings = {"listen": make_recording(submission=submission)} if recorded else {}
+            loaded = make_loaded([Told("node", FAIL)], launched=launched)
+            finding = grade(loaded, submission, recordings).result("node").decisive.finding
+            assert finding.status is expected
+            assert ("`rclcpp`" in finding.observed) == (launched == "cpp" or other is rests)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.checks.unbuilt import why_not_built
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.sandbox.sandbox import Sandbox
@@ -375,19 +376,27 @@ def test_a_wrong_message_definition_is_blamed(tree: Tree, real_ros: RosInstallat
     assert "'unit8'" in culprit.message
 
 
-def test_a_package_of_jazzy_that_is_not_installed_is_no_fault_of_the_student(
+def test_a_package_of_jazzy_that_is_not_installed_keeps_only_what_rests_on_it(
     tree: Tree, real_ros: RosInstallation
 ) -> None:
     lacking = "nav2_msgs"
     if lacking in real_ros.packages:
         return
     cmake = "cmake_minimum_required(VERSION 3.8)\nproject(bot_msgs LANGUAGES NONE)\n"
+    rests = MANIFEST.replace("bot_publisher", "rests").replace("rclpy", "bot_msgs")
+    tree.package()
+    tree.package({"package.xml": rests}, "src/rests")
     tree.write(
         {**INTERFACES, "src/bot_msgs/CMakeLists.txt": f"{cmake}find_package({lacking} REQUIRED)\n"}
     )
-    build = build_of(prepared(tree, real_ros))
-    assert build.failed_packages == ("bot_msgs",)
+    found = prepared(tree, real_ros)
+    build = build_of(found)
+    assert build.failed_packages == ("bot_msgs", "rests")
     assert build.lacking == (lacking,)
+    assert package_of(found).executables == ("bot_pub",)
+    for name in build.failed_packages:
+        cause = why_not_built(found.record, name)
+        assert cause is not None and cause.ours
 
 
 def test_without_colcon_it_is_said_how_to_get_it(tree: Tree, named_ros: RosInstallation) -> None:

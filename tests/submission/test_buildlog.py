@@ -1,4 +1,4 @@
-from grader.submission.buildlog import MAX_BYTES, clean, ending, missing_cmake_packages, own_lines
+from grader.submission.buildlog import MAX_BYTES, clean, ending, not_found, own_lines
 
 
 def test_colours_and_control_characters_are_gone() -> None:
@@ -53,4 +53,4 @@ def test_packages_that_cmake_did_not_find_are_listed() -> None:
   Could not find a package configuration file provided by
   "example_interfaces" with any of the following names:
 """
-    assert missing_cmake_packages(log) == {"example_interfaces"}
+    assert not_found(log) == {"example_interfaces"}
