@@ -11,7 +11,13 @@ from grader.assignment.quantity import Duration, Frequency, Ratio
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.fields import TOLERANCE, difference_table, difference_words, unlike
+from grader.checks.fields import (
+    TOLERANCE,
+    difference_table,
+    difference_words,
+    fields_hint,
+    unlike,
+)
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Plot
 from grader.checks.goals import (
@@ -281,8 +287,8 @@ def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> C
         call = "succeed" if parameters.status == "succeeded" else "abort"
         return raised or Cause(
             seen,
-            f"Call goal_handle.{call}() before the execute callback returns its result; without "
-            "it rclpy aborts the goal.",
+            f"Call goal_handle.{call}() before the execute callback returns its result."
+            + (" Without it rclpy aborts the goal." if goal.status == "aborted" else ""),
             shown,
         )
     wrong = unlike(goal.result or {}, parameters.result, parameters.tolerance)
@@ -290,6 +296,6 @@ def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> C
         return None
     return Cause(
         f"the result of the goal ({fields_words(goal.goal)}) has {difference_words(wrong)}",
-        "Make the result with its class, set its fields, and return it from the execute callback.",
+        fields_hint("result", goal.result or {}, [item.field for item in wrong]),
         Evidence(shown.moments, tables=(difference_table("Result", wrong), *shown.tables)),
     )

@@ -19,10 +19,16 @@ from grader.submission.record import (
     SubmissionRecord,
 )
 
+INSIDE_EXPORT = "package.xml names it inside <export>, where it does not count"
 # Tags that make a package be there when the code runs or is built (REP-149).
 _COUNTING = frozenset(
     {"depend", "exec_depend", "build_depend", "build_export_depend", "run_depend"}
 )
+# What is said of a dependency that is named in a tag that does not count, by its first part.
+_IDLE = {
+    "test_depend": " (test_depend counts for tests only)",
+    "export": f" ({INSIDE_EXPORT})",
+}
 
 
 class Dependencies(Parameters):
@@ -41,7 +47,7 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     needs no entry.
 
     Explains each missing dependency with the line of the import and the tag to add, one that
-    stands under `test_depend` only, and misspelt names.
+    stands under `test_depend` or inside `export` only, and misspelt names.
     """
     expected = f"every ROS package that {code(parameters.package)} imports is in package.xml"
     cause = why_no_manifest(submission, parameters.package)
@@ -91,18 +97,20 @@ def _fault(
     package: PackageRecord, expected: str, missing: list[Import], unknown: list[Dependency]
 ) -> Finding:
     manifest = "package.xml" if package.path in ("", ".") else f"{package.path}/package.xml"
-    tests_only = {item.name for item in package.dependencies if item.kind == "test_depend"}
+    idle = {item.name: item.kind for item in package.dependencies if item.kind not in _COUNTING}
     parts, hints = [], []
     places: list[SourceError] = []
     rows: list[tuple[str, str]] = []
     for item in missing:
-        tests = " (test_depend counts for tests only)" if item.module in tests_only else ""
-        parts.append(f"{item.file}:{item.line} imports {code(item.module)}{tests}")
+        why = _IDLE.get(idle.get(item.module, "").partition("/")[0], "")
+        parts.append(f"{item.file}:{item.line} imports {code(item.module)}{why}")
         places.append(SourceError(item.file, item.line, f"imports {item.module}"))
         rows.append((f"imported in {item.file}:{item.line}", f"<depend>{item.module}</depend>"))
     if missing:
         tags = codes(f"<depend>{item.module}</depend>" for item in missing)
-        hints.append(f"Don't forget the dependencies: add {tags} to package.xml.")
+        hints.append(
+            f"Don't forget the dependencies: add {tags} to package.xml, directly below <package>."
+        )
     imported = {item.module for item in package.ros_imports}
     for entry in unknown:
         match = nearest(entry.name, imported) or meant(entry.name)

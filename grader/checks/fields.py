@@ -7,7 +7,7 @@ from typing import Any
 
 from grader.checks.finding import Table
 from grader.checks.value import Difference, differences, expected_leaves
-from grader.checks.wording import value_text
+from grader.checks.wording import codes, value_text
 
 _MOST_FIELDS = 6
 TOLERANCE = 1e-9
@@ -53,6 +53,22 @@ def _is_default(value: Any) -> bool:
     if isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray):
         return all(_is_default(item) for item in value)
     return not value
+
+
+def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> str:
+    """What to try where fields are wrong.
+
+    Args:
+        what: That has the fields: a ``response`` or a ``result``.
+        value: It, with all of its fields.
+        wrong: The wrong fields.
+    """
+    if all(_is_default(item) for _, item in _plain(value)):
+        return (
+            f"Set the fields of the {what} in the callback, and return it: it came as a new one "
+            "is, with 0, false and '' everywhere."
+        )
+    return f"Look where the callback sets {codes(wrong)} of the {what} that it returns."
 
 
 def difference_words(found: Sequence[Difference]) -> str:

@@ -15,6 +15,7 @@ from grader.checks.definition_differences import (
     constant_differences,
     field_differences,
 )
+from grader.checks.dependency import INSIDE_EXPORT
 from grader.checks.finding import Comparison, Evidence, Finding, Table
 from grader.checks.unbuilt import existing_package, why_no_manifest
 from grader.checks.ungenerated import (
@@ -212,7 +213,10 @@ def manifest(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
     if cause is not None:
         return cause.finding(expected)
     package = existing_package(submission, parameters.parts.package)
-    missing = list(_missing(package, used_packages(parameters.parts, definition)))
+    missing = [
+        (tag, f"{why}; {INSIDE_EXPORT}" if _is_misplaced(package, tag) else why)
+        for tag, why in _missing(package, used_packages(parameters.parts, definition))
+    ]
     if not missing and not package.registered:
         return _unregistered(package, expected)
     if not missing:
@@ -237,6 +241,13 @@ def _unregistered(package: PackageRecord, expected: str) -> Finding:
         Evidence(
             places=(SourceError(package.file("CMakeLists.txt"), None, "ends without it"),),
         ),
+    )
+
+
+def _is_misplaced(package: PackageRecord, tag: str) -> bool:
+    """Whether package.xml has what a tag names inside <export>."""
+    return any(
+        item.kind.startswith("export/") and f">{item.name}<" in tag for item in package.dependencies
     )
 
 

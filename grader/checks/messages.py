@@ -144,7 +144,7 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
 
     Explains fields that were swapped, a value in a wrong field, a wrong sign, a factor of 10,
     100 or 1000, degrees instead of radians, an integer in a float field, not-a-number, a message
-    that was published before its fields were set, and a value that grows from message to message.
+    that is all zero as a new one is, and a value that grows from message to message.
     If nothing was published it says why, as messages.count does.
     """
     messages = recording.on(parameters.topic)
@@ -255,7 +255,7 @@ def _hint(
     if unset:
         return (
             f"{codes(unset[:_MOST_FIELDS])} {'is' if len(unset) == 1 else 'are'} 0 {every}, as in "
-            "a new one: set the fields right before publish(msg)."
+            "a new one: look where the program sets the fields before publish(msg), and to what."
         )
     which = codes([item.field for item in found[:_MOST_FIELDS]])
     if all(len({str(each.get(item.field)) for each in values}) == 1 for item in found):

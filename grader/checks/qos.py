@@ -306,12 +306,8 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
 
 
 def _depth_hint(parameters: Depth) -> str:
-    if parameters.kind == "publisher":
-        return (
-            "The third argument of create_publisher is the depth: "
-            f"self.create_publisher(Type, 'topic', {parameters.depth})."
-        )
+    third = "third" if parameters.kind == "publisher" else "fourth"
     return (
-        "The fourth argument of create_subscription is the depth: "
-        f"self.create_subscription(Type, 'topic', callback, {parameters.depth})."
+        f"The {third} argument of create_{parameters.kind} is the depth, or a QoSProfile that has "
+        f"it beside the other policies: QoSProfile(depth={parameters.depth}, ...)."
     )

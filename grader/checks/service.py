@@ -19,6 +19,7 @@ from grader.checks.fields import (
     brief,
     difference_table,
     difference_words,
+    fields_hint,
     has_fields,
     unlike,
 )
@@ -235,8 +236,7 @@ def _first_wrong(
         when_s = recording.since_launch_s(call.requested_ns)
         return Cause(
             f"{_which(calls, call)} was answered with {' and '.join(told)}",
-            "Set the fields of the response in the callback and return it: a new response has 0, "
-            "false and '' everywhere.",
+            fields_hint("response", response, [*(item.field for item in found), *lacking]),
             Evidence(
                 moments=(Moment(f"called with {asked}", when_s),),
                 tables=((difference_table(f"Response to {asked}", found),) if found else ()),

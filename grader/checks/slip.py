@@ -138,12 +138,8 @@ def _stands_in(item: Difference, field: str) -> str:
 def _all_zero(wanted: list[Difference], observed: Mapping[str, Any], always: bool) -> str:
     numbers = [value for value in observed.values() if _is_number(value)]
     if wanted and numbers and not any(numbers):
-        if not always:
-            return (
-                "every number in it is zero, although others are right: a second publish() sends "
-                "a message whose fields nobody sets"
-            )
-        return "every number in it is zero: the message was published before its fields were set"
+        others = "" if always else ", although others are right"
+        return f"every number in it is zero, as in a new message{others}"
     return ""
 
 

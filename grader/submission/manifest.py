@@ -49,6 +49,8 @@ class Manifest:
             broken before it says.
         error: Why colcon does not accept it, or None.
         dependencies: In its order; ``known`` is not yet told.
+        misplaced: Entries that stand inside <export>, where they do not count; their ``kind`` is
+            ``export/depend`` and so on.
         groups: Groups that it is a member of (REP-149).
         asks_for_groups: Whether it depends on whatever is a member of a group.
     """
@@ -57,6 +59,7 @@ class Manifest:
     build_type: str | None
     error: SourceError | None = None
     dependencies: tuple[Dependency, ...] = ()
+    misplaced: tuple[Dependency, ...] = ()
     groups: tuple[str, ...] = ()
     asks_for_groups: bool = False
 
@@ -103,6 +106,12 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
         and element.text.strip()
         and _applies(element, environment)
     ]
+    misplaced = [
+        Dependency(element.text.strip(), element.tag, element.line)
+        for element in document.elements
+        if element.tag.removeprefix("export/") in (*DEPENDENCY_KINDS, "member_of_group")
+        and element.tag.startswith("export/")
+    ]
     error = document.error or _violation(data, document)
     if error is None and len(dependencies) > _MAX_DEPENDENCIES:
         error = (None, f"names more than {_MAX_DEPENDENCIES} dependencies")
@@ -111,6 +120,7 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
         build_type=build_types[0] if build_types else default,
         error=SourceError(file, *error) if error else None,
         dependencies=tuple(dependencies[:_MAX_DEPENDENCIES]),
+        misplaced=tuple(misplaced[:_MAX_DEPENDENCIES]),
         groups=tuple(document.texts("member_of_group")[:_MAX_DEPENDENCIES]),
         asks_for_groups=bool(document.texts("group_depend")),
     )

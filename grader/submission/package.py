@@ -200,8 +200,9 @@ def _record(
         path=shown(package.folder),
         build_type=package.build_type,
         manifest_error=package.manifest.error,
-        dependencies=tuple(
-            _told(dependency, ros, submitted) for dependency in package.manifest.dependencies
+        dependencies=(
+            *(_told(dependency, ros, submitted) for dependency in package.manifest.dependencies),
+            *package.manifest.misplaced,
         ),
         imports=tuple(imports),
         ros_imports=tuple(

@@ -57,7 +57,8 @@ class Dependency:
 
     Attributes:
         name: ROS package or rosdep key.
-        kind: The tag: ``depend``, ``exec_depend``, ``build_depend``, ``test_depend``, ...
+        kind: The tag: ``depend``, ``exec_depend``, ``build_depend``, ``test_depend``, ... An
+            ``export/depend`` stands inside <export>, where it does not count.
         line: Line in package.xml.
         known: True for a ROS package or rosdep key that exists, False for a slip of one or a
             name that is known not to exist, None where this machine cannot tell.

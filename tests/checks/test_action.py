@@ -59,6 +59,12 @@ class TestResult:
     def test_other_values(self):
         found = failing("action.result", acting(goal(sequence=(0, 1, 1, 2))), **RESULT)
         assert "sequence = [0, 1, 1, 2] instead of [0, 1, 1, 2, 3]" in found
+        assert "sets `sequence`" in found
+
+    def test_what_was_not_aborted_is_not_said_to_be(self):
+        run = acting(goal(status="succeeded"))
+        found = failing("action.result", run, **{**RESULT, "status": "aborted"})
+        assert "goal_handle.abort()" in found and "rclpy aborts" not in found
 
     def test_rejected(self):
         found = failing("action.result", acting(goal(accepted=False)), **RESULT)

@@ -54,6 +54,13 @@ def test_test_depend_alone_does_not_count():
     assert "test_depend counts for tests only" in finding.observed
 
 
+def test_what_stands_inside_export_is_said_to_stand_there():
+    finding = judged(RCLPY, Dependency("geometry_msgs", "export/exec_depend", 16))
+    assert finding.status is Status.FAILED
+    assert "names it inside <export>, where it does not count" in finding.observed
+    assert "directly below <package>" in finding.hint
+
+
 @pytest.mark.parametrize(
     "unneeded",
     [

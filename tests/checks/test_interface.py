@@ -325,6 +325,14 @@ class TestManifest:
         assert f"add to package.xml: `<{tag}>{name}</{tag}>`" in found.lower()
         assert found.count("<") == 2 * 2
 
+    def test_an_entry_inside_export_is_said_to_stand_there(self):
+        kept = self.without("geometry_msgs").packages[0].dependencies
+        inside = Dependency("geometry_msgs", "export/depend", 20)
+        found = failing(
+            "interface.manifest", handed_in(dependencies=(*kept, inside)), interface=INTERFACE
+        )
+        assert "names it inside <export>, where it does not count" in found
+
     def test_a_package_that_ros_does_not_find(self):
         found = failing("interface.manifest", handed_in(registered=False), interface=INTERFACE)
         assert "installed, but not registered" in found

@@ -195,7 +195,17 @@ class TestDepth:
         run = recording(declarations=declarations(depth=1))
         found = failing("qos.depth", run, topic="/cmd_vel", depth=10)
         assert "depth 1, declared by the process" in found
-        assert "self.create_publisher(Type, 'topic', 10)" in found
+        assert "third argument of create_publisher" in found
+
+    def test_the_way_to_a_depth_keeps_the_other_policies(self):
+        item = declared("subscription", topic="/scan", history="keep_last", depth=5)
+        latched = replace(RELIABLE, durability="transient_local")
+        run = recording(
+            endpoints=(endpoint("/scan", kind=Kind.SUBSCRIPTION, qos=latched),),
+            declarations=(item,),
+        )
+        found = failing("qos.depth", run, topic="/scan", depth=10, kind="subscription")
+        assert "QoSProfile(depth=10, ...)" in found and "callback, 10)" not in found
 
     def test_keep_all(self):
         item = declared("publisher", topic="/cmd_vel", history="keep_all", depth=10)
@@ -219,7 +229,7 @@ class TestDepth:
             endpoints=(endpoint("/scan", kind=Kind.SUBSCRIPTION),), declarations=(item,)
         )
         found = failing("qos.depth", run, topic="/scan", depth=10, kind="subscription")
-        assert "create_subscription(Type, 'topic', callback, 10)" in found
+        assert "fourth argument of create_subscription" in found
 
     def test_no_publisher(self):
         run = recording(messages={}, endpoints=(endpoint("/cmdvel"),), declarations=())

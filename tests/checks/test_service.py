@@ -101,6 +101,13 @@ class TestResponds:
         found = failing("service.responds", serving(asked()), **TRUE, contains={"message": "range"})
         assert "message = 'enabled' without “range”" in found
 
+    def test_only_a_response_of_zeros_is_like_a_new_one(self):
+        wrong = serving(asked(response={"success": False, "message": "range"}))
+        assert "new one" not in failing("service.responds", wrong, **TRUE)
+        assert "sets `success`" in failing("service.responds", wrong, **TRUE)
+        zeros = serving(asked(response={"success": False, "message": ""}))
+        assert "as a new one is" in failing("service.responds", zeros, **TRUE)
+
     def test_the_process_died_of_the_call(self):
         run = serving(
             asked(answer_s=None), processes=(died(1, 1.1),), ending=Ending.EXITED,

@@ -36,6 +36,14 @@ def test_name_build_type_and_dependencies_are_read() -> None:
     )
 
 
+def test_an_entry_inside_export_is_told_apart() -> None:
+    found = changed("<export>", "<export>\n<exec_depend>std_msgs</exec_depend>")
+    assert [entry.name for entry in found.dependencies] == ["rclpy", "geometry_msgs"]
+    assert [(entry.name, entry.kind) for entry in found.misplaced] == [
+        ("std_msgs", "export/exec_depend")
+    ]
+
+
 def test_the_groups_of_a_package_are_read() -> None:
     tag = "<member_of_group>rosidl_interface_packages</member_of_group>"
     found = changed("</license>", f"</license>{tag}")
