@@ -131,7 +131,8 @@ class Publish(Model):
 class Join(Model):
     """Join late: a further subscription of the probe, created in the middle of the run.
 
-    Its messages are recorded under its own name, apart from those of `record`.
+    Its messages are recorded under its own name, apart from those of `record`. Where `record`
+    leaves the topic out, it is the first subscription to it.
     """
 
     join: TopicName = Field(description="Topic to subscribe to.")

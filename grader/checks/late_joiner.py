@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from pydantic import Field
 
@@ -13,6 +14,7 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import compatibility_table, refusals
 from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.messages import published
 from grader.checks.silence import why_few
 from grader.checks.wording import code, counted
 from grader.recording.model import NS, Join, Kind, Message, Recording
@@ -28,7 +30,10 @@ _ONE_PUBLISHER_HINT = (
 class LateJoiner(Parameters):
     """Parameters of qos.late_joiner."""
 
-    topic: TopicName = Field(description="Fully qualified topic name; it is recorded, too.")
+    topic: TopicName = Field(
+        description="Fully qualified topic name. Where the scenario does not record it, the late "
+        "joiner is the only subscription to it."
+    )
     joiner: Id = Field(description="The `name` of a `join` among the stimuli.")
     last: int = Field(
         ge=0, description="So many of the messages before it joined it must get, and no more."
@@ -44,24 +49,34 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     and depth of the publisher make it. Messages that were published just while it was matched
     may count on either side.
 
+    A scenario that records the topic subscribes to it from the start. In one that does not, there
+    is no subscription until the late joiner's; how many messages came before tell the numbers
+    that the publisher's middleware gives them. So a publisher is found out that publishes only
+    while there is a subscription.
+
     Explains a publisher that is volatile, a queue that is too short or too long, a history of
-    keep_all, a lifespan that is over, publishers that are made anew for each message, and a
-    publisher that had not published enough.
+    keep_all, a lifespan that is over, publishers that are made anew for each message, a publisher
+    that had not published enough, and one that waits for a subscription.
     """
     expected = _expected_words(parameters)
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)
-    before = [] if join is None else _before(recording.on(parameters.topic), join.joined_ns)
-    if join is None or len(before) <= parameters.last:
-        return _not_judged(recording, parameters, join, before, expected)
+    if join is None:
+        return _not_judged(recording, parameters, join, 0, expected)
     got = recording.joined.get(parameters.joiner, ())
     history = _before(got, join.joined_ns)
-    evidence = _evidence(recording, join, before, history)
+    heard = recording.on(parameters.topic)
+    before = _Before.heard(heard, join) if heard else _Before.told_by(got, history)
+    if before.number <= parameters.last:
+        if heard or not got:
+            return _not_judged(recording, parameters, join, before.number, expected)
+        return _waited(recording, parameters, join, before, expected)
+    evidence = _evidence(recording, join, before.messages, history)
     meanwhile = sum(
         join.joined_ns < item.stamp_ns <= (join.matched_ns or join.joined_ns) + _NOTED_NS
-        for item in recording.on(parameters.topic)
+        for item in heard or got
     )
     least = max(0, parameters.last - meanwhile)
-    if least <= len(history) <= parameters.last and _is_newest(history, before):
+    if least <= len(history) <= parameters.last and _is_newest(history, before.messages):
         return Finding.passed(expected, _seen(history, before), evidence)
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
     if len(history) > parameters.last and len(publishers) > 1:
@@ -79,13 +94,39 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
             _hint(parameters),
             evidence,
         )
-    if not _is_newest(history, before):
+    if not _is_newest(history, before.messages):
         return Finding.error(
             expected,
             f"{_seen(history, before)}, but not the newest ones: some were lost on their way",
             disturbed=True,
         )
     return _too_few(recording, parameters, join, history, before, evidence, expected)
+
+
+@dataclass(frozen=True)
+class _Before:
+    """What was published before a late joiner was there.
+
+    Attributes:
+        messages: As far as they were received, oldest first.
+        number: How many there were.
+    """
+
+    messages: list[Message]
+    number: int
+
+    @classmethod
+    def heard(cls, messages: tuple[Message, ...], join: Join) -> _Before:
+        """Of a topic that was recorded from the start."""
+        found = _before(messages, join.joined_ns)
+        return cls(found, len(found))
+
+    @classmethod
+    def told_by(cls, got: tuple[Message, ...], history: list[Message]) -> _Before:
+        """Of a topic that only the late joiner subscribed to: the messages are numbered."""
+        if history:
+            return cls(history, published(tuple(history)))
+        return cls([], published(got[:1]) - 1 if got else 0)
 
 
 def _expected_words(parameters: LateJoiner) -> str:
@@ -113,15 +154,15 @@ def _is_newest(history: list[Message], before: list[Message]) -> bool:
     return stamps == expected
 
 
-def _seen(history: list[Message], before: list[Message]) -> str:
-    return f"it got {len(history)} of the {counted(len(before), 'message')} before it"
+def _seen(history: list[Message], before: _Before) -> str:
+    return f"it got {len(history)} of the {counted(before.number, 'message')} before it"
 
 
 def _not_judged(
     recording: Recording,
     parameters: LateJoiner,
     join: Join | None,
-    before: list[Message],
+    number: int,
     expected: str,
 ) -> Finding:
     """Nobody joined, or too little had been published to see what is kept of it."""
@@ -131,7 +172,7 @@ def _not_judged(
     seen = (
         "the run ended before it joined"
         if join is None
-        else f"when it joined, only {counted(len(before), 'message')} had been published of the "
+        else f"when it joined, only {counted(number, 'message')} had been published of the "
         f"{needed} that are needed to judge"
     )
     ended = dead(recording)
@@ -140,8 +181,46 @@ def _not_judged(
     return Finding.error(expected, seen)
 
 
+def _waited(
+    recording: Recording, parameters: LateJoiner, join: Join, before: _Before, expected: str
+) -> Finding:
+    """Until the late joiner was there, little or nothing was published to no subscription."""
+    seen = f"before it, {counted(before.number, 'message')} had been published to no subscription"
+    evidence = _evidence(recording, join, before.messages, before.messages)
+    begin_ns = recording.matched_ns or recording.launched_ns
+    span_s = (join.joined_ns - begin_ns) / NS
+    taken_s = recording.taken_s(begin_ns, join.joined_ns)
+    made_anew = _made_anew(recording, parameters, join)
+    if made_anew:
+        return Finding.failed(expected, f"{seen}: {made_anew}", _ONE_PUBLISHER_HINT, evidence)
+    # With the time that was taken from it, the node may have come to as many as are needed.
+    if before.number * span_s > parameters.last * (span_s - taken_s):
+        return Finding.error(
+            expected, f"{seen}; the machine took {format_duration(taken_s)}", disturbed=True
+        )
+    return Finding.failed(
+        expected,
+        f"{seen} in {format_duration(span_s)}",
+        "Publish from the start, whether or not there is a subscription: leave out conditions such "
+        "as get_subscription_count() > 0. What comes before the late joiner is kept for it.",
+        evidence,
+    )
+
+
+def _made_anew(recording: Recording, parameters: LateJoiner, join: Join) -> str:
+    """That earlier publishers took along what they kept, or nothing."""
+    publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
+    gone = [item for item in publishers if (item.vanished_ns or math.inf) <= join.joined_ns]
+    if not gone or len(gone) == len(publishers):
+        return ""
+    return (
+        "what a publisher keeps is lost with it, and "
+        f"{counted(len(gone), 'publisher was', 'publishers were')} destroyed before it joined"
+    )
+
+
 def _why_many(
-    recording: Recording, parameters: LateJoiner, history: list[Message], before: list[Message]
+    recording: Recording, parameters: LateJoiner, history: list[Message], before: _Before
 ) -> str:
     queues = testimony.queues(recording, Kind.PUBLISHER, parameters.topic)
     if any(queue.history == "keep_all" for queue in queues):
@@ -149,7 +228,7 @@ def _why_many(
     depths = [queue.depth for queue in queues if queue.depth is not None]
     if depths and depths[0] != parameters.last:
         return f": the publisher's depth is {depths[0]}, declared by the process"
-    if len(history) == len(before):
+    if len(history) == before.number:
         return ": all that there were"
     return f": the publisher keeps {len(history)}"
 
@@ -159,7 +238,7 @@ def _too_few(
     parameters: LateJoiner,
     join: Join,
     history: list[Message],
-    before: list[Message],
+    before: _Before,
     evidence: Evidence,
     expected: str,
 ) -> Finding:
@@ -178,7 +257,9 @@ def _too_few(
                 ),
             )
     lifespans = [item.qos.lifespan_s for item in publishers if item.qos.lifespan_s is not None]
-    age_s = (join.joined_ns - before[-parameters.last].stamp_ns) / NS
+    known = len(before.messages) >= parameters.last
+    oldest_ns = before.messages[-parameters.last].stamp_ns if known else recording.launched_ns
+    age_s = (join.joined_ns - oldest_ns) / NS
     if lifespans and min(lifespans) < age_s:
         return Finding.failed(
             expected,
@@ -203,14 +284,10 @@ def _too_few(
         if queue.depth is not None
     ]
     why = f": the publisher's depth is {depths[0]}, declared by the process" if depths else ""
-    gone = [item for item in publishers if (item.vanished_ns or math.inf) <= join.joined_ns]
-    if gone and len(publishers) > len(gone):
+    made_anew = _made_anew(recording, parameters, join)
+    if made_anew:
         return Finding.failed(
-            expected,
-            f"{_seen(history, before)}: what a publisher keeps is lost with it, and "
-            f"{counted(len(gone), 'publisher was', 'publishers were')} destroyed before it joined",
-            _ONE_PUBLISHER_HINT,
-            evidence,
+            expected, f"{_seen(history, before)}: {made_anew}", _ONE_PUBLISHER_HINT, evidence
         )
     if depths and depths[0] >= parameters.last:
         return Finding.error(

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 from grader.checks.finding import Status
 from grader.recording.model import NS
 from tests.checks.builder import (
@@ -16,6 +18,7 @@ from tests.checks.builder import (
     messages,
     reader,
     recording,
+    taken,
 )
 
 LATCHED = replace(RELIABLE, durability="transient_local")
@@ -151,3 +154,44 @@ def test_the_node_had_ended():
     assert "the run ended before it joined: the process" in failing(
         "qos.late_joiner", run, **LAST_10
     )
+
+
+def unheard(kept, published, **changes):
+    """Nothing was subscribed to the topic until the join: so many had been published by then."""
+    times = every(PERIOD_S, published + 3, first_s=JOINED_S - PERIOD_S * published + 0.3)
+    sent = messages(times)["/cmd_vel"]
+    got = sent[max(published - kept, 0) :]
+    return joined(0, messages={}, joined={"late": got}, **changes)
+
+
+def test_where_nothing_is_subscribed_before_the_messages_numbers_tell_how_many_came():
+    finding = judge("qos.late_joiner", unheard(10, 12), **LAST_10)
+    assert finding.status is Status.PASSED
+    assert finding.observed == "it got 10 of the 12 messages before it"
+    assert "got 9 of the 12 messages" in failing(
+        "qos.late_joiner", unheard(9, 12, depth=9), **LAST_10
+    )
+    assert "got 12 of the 12 messages" in failing(
+        "qos.late_joiner", unheard(12, 12, depth=100), **LAST_10
+    )
+
+
+@pytest.mark.parametrize("published", [0, 1, 10])
+def test_a_publisher_that_waits_for_a_subscription_fails(published):
+    found = failing("qos.late_joiner", unheard(published, published), **LAST_10)
+    assert f"before it, {published} message" in found
+    assert "whether or not there is a subscription" in found
+
+
+def test_a_publisher_that_the_machine_held_up_is_not_the_student_s_fault():
+    run = unheard(10, 10, disturbance=taken(1.0, 3.0, waited_s=1.0))
+    finding = judge("qos.late_joiner", run, **LAST_10)
+    assert finding.status is Status.ERROR and finding.disturbed
+
+
+def test_where_nothing_is_subscribed_before_a_publisher_made_anew_is_named():
+    own = [endpoint(qos=LATCHED, appeared_s=0.3 + PERIOD_S * n) for n in range(12)]
+    gone = [replace(item, vanished_ns=item.appeared_ns + NS // 2) for item in own[:-1]]
+    run = unheard(1, 1, endpoints=(*gone, own[-1], reader()))
+    found = failing("qos.late_joiner", run, **LAST_10)
+    assert "11 publishers were destroyed before it joined" in found
