@@ -21,13 +21,16 @@ from grader.checks.measure import metres, speed
 from grader.checks.scan import misreading
 from grader.checks.sighting import until_the_end
 from grader.checks.track import (
+    MOVED_M,
+    REST_M_S,
+    REST_RAD_S,
     departure,
     final_rest,
     gone_ahead_m,
     speed_plot,
     way_m,
 )
-from grader.checks.wording import percent
+from grader.checks.wording import counted, percent
 from grader.recording.model import NS, Recording, Scene, Truth
 
 _LEAST_SHARE = 0.9
@@ -35,7 +38,12 @@ _LEAST_STEPS = 30
 # The simulated robots need a quarter of a second to their full speed.
 _SPEEDING_UP_NS = NS // 2
 _WAY_TOLERANCE_M = 2e-3
+_TURN_HINT = "The speed ahead is linear.x, the turn is angular.z."
 _SPEED_HINT = "linear.x is the speed in metres per second."
+_IN_BETWEEN_HINT = (
+    "Log what makes it stop: a range that is not measured (inf, 0.0) may count as an obstacle, and "
+    "a second place that publishes, such as a timer, may contradict the callback."
+)
 _BACKWARDS_HINT = "Forward is a positive linear.x (REP-103)."
 
 
@@ -134,28 +142,23 @@ def _wrong_speed(
     if abs(middle) < 1e-3 and any(abs(step.angular_rad_s) > 0.01 for step in steps):
         return (
             "the robot turns on the spot instead of driving",
-            "The speed ahead is linear.x, the turn is angular.z.",
+            _TURN_HINT,
         )
-    pauses = sum(1 for rests, _ in groupby(steps, key=lambda s: abs(s.linear_m_s) < 1e-3) if rests)
-    if pauses >= 2:
-        return (
-            f"the robot drives on and off, it stood still {pauses} times",
-            "Two places that publish contradict each other, or a range that is not measured "
-            "(inf, 0.0) counts as an obstacle now and then.",
-        )
+    pauses = [
+        list(pause)
+        for rests, pause in groupby(steps, key=lambda step: abs(step.linear_m_s) < REST_M_S)
+        if rests
+    ]
     if pauses:
-        return (
-            "the robot stood still in between",
-            "Which message made it stop? Log what the callback compares.",
-        )
+        turned = any(abs(step.angular_rad_s) > REST_RAD_S for pause in pauses for step in pause)
+        did = "turned on the spot" if turned else "stood still"
+        return f"the robot {did} in between, {counted(len(pauses), 'time')}", _IN_BETWEEN_HINT
     told = groupby(steps, key=lambda step: step.command_m_s == 0.0)
     halts = sum(1 for stops, _ in told if stops)
     if halts >= 2:
         return (
             f"the robot was told {halts} times to stop, and to drive on before it stood",
-            "Two places that publish contradict each other, such as a timer that stops the robot "
-            "after less than the time between two scans; or a range that is not measured (inf, "
-            "0.0) counts as an obstacle now and then.",
+            _IN_BETWEEN_HINT,
         )
     if middle * wanted < 0.0:
         return "the robot drives backwards", _BACKWARDS_HINT
@@ -219,6 +222,8 @@ def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
             _BACKWARDS_HINT,
             _since_departure(recording),
         )
+    if way_m(recording.truth) < MOVED_M:
+        return Cause("the robot only turned on the spot", _TURN_HINT, _since_departure(recording))
     rest = final_rest(recording.truth)
     seen = f"{metres(gone_m)} in all"
     return _too_slow(recording, seen) if rest is None else _stopped(recording, rest, seen)
@@ -231,7 +236,7 @@ def _stopped(recording: Recording, rest: int, seen: str) -> Cause:
         moments=(Moment("the robot stopped", when_s),), plots=(speed_plot(recording),)
     )
     around = nearest(recording.scene, step) if recording.scene is not None else None
-    misread = misreading(recording, step.time_ns, around, None)
+    misread = misreading(recording, step.time_ns, around)
     if misread is not None:
         return Cause(f"stopped after {seen}: {misread.words}", misread.hint, evidence)
     return Cause(

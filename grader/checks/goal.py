@@ -12,18 +12,20 @@ from grader.assignment.unit import format_duration
 from grader.checks.approach import Approach, approach
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.contact import why_touched
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.immobility import why_cut_short, why_not_moved
+from grader.checks.immobility import why_not_moved
 from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
 from grader.checks.missed_goal import why_not_aligned, why_not_there
+from grader.checks.off_course import why_off_course
 from grader.checks.reference import GoalPose
 from grader.checks.sighting import until_the_end
 from grader.checks.track import final_rest, is_at_rest, speed_plot, way_m
-from grader.checks.wording import code, percent
+from grader.checks.wording import percent
 from grader.recording.model import NS, Recording
 
+# Who looks at the goal comes nearer by most of what it drives.
+_ASTRAY_RAD = math.radians(45.0)
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 
 
@@ -73,7 +75,7 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
 
 
 def _restless(run: Approach) -> Cause:
-    deeper = why_cut_short(run.recording) or why_touched(run.recording)
+    deeper = why_off_course(run.recording)
     if deeper is not None:
         return deeper
     last = run.truth[-1]
@@ -118,7 +120,7 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     took_s = (end.time_ns - truth[0].time_ns) / NS
     if rest is not None and took_s <= parameters.within:
         return Finding.passed(expected, f"after {format_duration(took_s)}", evidence)
-    deeper = why_cut_short(recording) or why_touched(recording)
+    deeper = why_off_course(recording)
     if deeper is not None:
         return deeper.finding(expected)
     lost_s = taken_s(recording, truth[0].time_ns, end.time_ns)
@@ -191,12 +193,24 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
     late = _why_far(run, seen, gone_m - allowed_m)
     if late is not None:
         return late.finding(expected)
+    astray_m = _astray_m(run, parameters.position)
     return Finding.failed(
         expected,
-        seen,
-        "It drives while it still looks elsewhere: a larger angular gain, or turn on the spot "
-        "first and drive when the heading error is small.",
+        f"{seen}; {metres(astray_m)} of it with the goal more than {degrees(_ASTRAY_RAD)} to the "
+        "side",
+        "Look at its heading on the way: the larger the angular gain is against the speed, the "
+        "sooner it looks at the goal.",
         Evidence(moments=(_farthest(run),), plots=evidence.plots),
+    )
+
+
+def _astray_m(run: Approach, position_m: float) -> float:
+    """Way that was driven before the arrival while the robot did not look at the goal."""
+    before = run.truth[: run.arrival(position_m)]
+    return sum(
+        math.hypot(b.x_m - a.x_m, b.y_m - a.y_m)
+        for a, b in pairwise(before)
+        if abs(run.bearing_error_rad(a)) > _ASTRAY_RAD
     )
 
 
@@ -286,14 +300,14 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     )
     if good:
         return Finding.passed(expected, " and ".join(seen), evidence)
-    deeper = why_cut_short(recording) or why_touched(recording)
+    deeper = why_off_course(recording)
     if deeper is not None:
         return deeper.finding(expected)
     return Finding.failed(
         expected,
         " and ".join(seen),
-        "Speed in proportion to the error slows down before the goal: a smaller gain, and "
-        f"{code('linear.x')} not at its limit until the end.",
+        "What is in proportion to the error slows down before the goal, with a gain that is not "
+        "too large: look at the commands of the last second before it.",
         Evidence(
             moments=(Moment("at the goal", recording.since_launch_s(run.truth[arrival].time_ns)),),
             plots=evidence.plots,

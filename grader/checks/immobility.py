@@ -149,7 +149,7 @@ def _asks_nothing(recording: Recording, sent: tuple[Command, ...]) -> Cause | No
     seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
     last = recording.truth[-1]
     around = None if recording.scene is None else nearest(recording.scene, last)
-    misread = misreading(recording, last.time_ns, around, None)
+    misread = misreading(recording, last.time_ns, around)
     if misread is not None:
         return Cause(f"{seen}; {misread.words}", misread.hint, evidence)
     return Cause(seen, "Which branch of the callback publishes? Log what it compares.", evidence)

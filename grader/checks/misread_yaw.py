@@ -82,6 +82,19 @@ _READINGS = (
 )
 
 
+def _shifted(offset_deg: int) -> Reading:
+    """Yaw with something added to it."""
+    words = f"about {abs(offset_deg)}° {'more' if offset_deg > 0 else 'less'} than it is"
+    return Reading(
+        f"{words}, or as if so much were taken from the direction of the goal",
+        f"Neither yaw nor math.atan2(dy, dx) needs an offset: {_FORMULA}.",
+        lambda yaw_rad: yaw_rad + math.radians(offset_deg),
+    )
+
+
+_OFFSETS = tuple(_shifted(degrees) for degrees in range(-175, 181, 5) if degrees)
+
+
 def misread_yaw(run: Approach, position_m: float) -> Reading | None:
     """How yaw was read wrongly, if that alone explains the turns on the way to a goal.
 
@@ -94,17 +107,22 @@ def misread_yaw(run: Approach, position_m: float) -> Reading | None:
     """
     scene = run.recording.scene
     limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
-    fits: list[tuple[float, Reading]] = []
-    for behind in range(MOST_BEHIND + 1):
-        way = before_arrival(run, answers(run.recording, behind), position_m)
+    ways = [
+        before_arrival(run, answers(run.recording, behind), position_m)
+        for behind in range(MOST_BEHIND + 1)
+    ]
+    for way in ways:
         yaws = [answer.pose.yaw_rad for answer in way]
         if len(way) < _LEAST_COMMANDS or max(yaws) - min(yaws) < _TURNED_RAD:
             return None
         if _r2(run, way, lambda yaw_rad: yaw_rad, limit_rad_s) > _RIGHT_R2:
             return None
-        fits += [(_r2(run, way, one.of, limit_rad_s), one) for one in _READINGS]
-    best = max(fits, key=lambda item: item[0])
-    return best[1] if best[0] >= _GOOD_R2 else None
+    for readings in (_READINGS, _OFFSETS):
+        fits = [(_r2(run, way, one.of, limit_rad_s), one) for way in ways for one in readings]
+        best = max(fits, key=lambda item: item[0])
+        if best[0] >= _GOOD_R2:
+            return best[1]
+    return None
 
 
 def _r2(

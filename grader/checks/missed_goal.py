@@ -12,13 +12,12 @@ from grader.assignment.unit import format_duration
 from grader.checks.approach import NO_SPEED_M_S, Approach
 from grader.checks.blockage import stuck_callback
 from grader.checks.cause import Cause
-from grader.checks.contact import why_touched
 from grader.checks.detour import WRAP_HINT, away
 from grader.checks.finding import Evidence, Moment
-from grader.checks.immobility import why_cut_short
 from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
 from grader.checks.misread_yaw import misread_yaw
+from grader.checks.off_course import why_off_course
 from grader.checks.sighting import until_the_end
 from grader.checks.track import is_at_rest, turned_rad, turns_one_way
 from grader.recording.model import NS, Ending, Truth
@@ -37,6 +36,8 @@ _AT_LIMIT = 0.98
 # So long after it was there a node may see it at the latest: odometry, a timer of 10 Hz, and some
 # of the machine's doing.
 _SEEN_LATE_NS = 300 * NS // 1000
+# How far from the heading that it was sent to a robot rests: the default of angle_tolerance.
+_AS_SENT_RAD = 0.06
 # An error of angle that a proportional controller has done away with.
 _EXACTLY_RAD = 3e-3
 # One that turns the long way of an error comes to the goal after that, or after the next one.
@@ -58,7 +59,7 @@ def why_not_there(run: Approach, position_m: float) -> Cause | None:
     left_m = run.distance_m(last)
     if left_m <= position_m:
         return None
-    deeper = why_cut_short(run.recording) or why_touched(run.recording)
+    deeper = why_off_course(run.recording)
     if deeper is not None:
         return deeper
     nearest = min(range(len(truth)), key=lambda i: run.distance_m(truth[i]))
@@ -111,8 +112,8 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
     stuck = stuck_callback(recording)
     if stuck is not None:
         return Cause(
-            f"{seen}, {moving}: a callback did not return, it was at {stuck.file}:{stuck.line} "
-            "when it was interrupted",
+            f"{seen}, {moving}: a callback was at {stuck.file}:{stuck.line} when it was "
+            "interrupted",
             "A loop in a callback never sees newer odometry, because the next message waits for "
             "its end: compute one command for each, publish it and return.",
             Evidence(evidence.moments, (stuck,), plots=evidence.plots),
@@ -323,7 +324,7 @@ def why_not_aligned(run: Approach, position_m: float, heading_rad: float) -> Cau
     off_rad = run.heading_error_rad(last)
     if abs(off_rad) <= heading_rad:
         return None
-    deeper = why_cut_short(run.recording) or why_touched(run.recording)
+    deeper = why_off_course(run.recording)
     if deeper is not None:
         return deeper
     evidence = Evidence(
@@ -344,8 +345,8 @@ def why_not_aligned(run: Approach, position_m: float, heading_rad: float) -> Cau
             + (f": {_circling(circles)}" if circles else ""),
             f"{_YAW_HINT} {WRAP_HINT}"
             if circles
-            else "Normalise the error to [-pi, pi] with atan2(sin(e), cos(e)), and make the gain "
-            "smaller if it oscillates.",
+            else "angular.z is a gain times goal_theta - yaw, both in radians and wrapped, and 0 "
+            "where that is within angle_tolerance: print all three while it turns.",
             evidence,
         )
     words, hint = _wrong_heading(run, heading_rad)
@@ -356,8 +357,8 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
     theta, last = run.goal.yaw_rad, run.truth[-1]
     radians = "Angles in ROS are radians (REP-103), and so is goal_theta already."
     headings = (
-        (math.radians(theta), ": goal_theta was taken for degrees", radians),
-        (math.degrees(theta), ": goal_theta was converted to degrees", radians),
+        (math.radians(theta), ": as if goal_theta were taken for degrees", radians),
+        (math.degrees(theta), ": as if goal_theta were converted to degrees", radians),
         (
             -theta,
             ": that is the goal's heading with its sign changed",
@@ -368,13 +369,11 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
             ": that is the opposite of the goal's heading",
             "Look at how you normalise the angle, and at the arguments of atan2(y, x).",
         ),
-        (
-            2.0 * math.asin(max(-1.0, min(1.0, theta / 2.0))),
-            ": as if z of the quaternion were the angle",
-            "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z)): z alone is the sine of half the angle.",
-        ),
     )
-    if abs(last.yaw_rad) <= heading_rad and abs(wrap_angle(headings[0][0])) <= heading_rad:
+    if (
+        abs(last.yaw_rad) <= min(heading_rad, _AS_SENT_RAD)
+        and abs(wrap_angle(headings[0][0])) <= heading_rad
+    ):
         # Of a few radians so few degrees are left that nobody can tell them from 0.
         headings = (
             (
@@ -387,14 +386,15 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
         )
     for heading, words, hint in headings:
         if abs(wrap_angle(heading - theta)) > 2.0 * heading_rad and (
-            abs(wrap_angle(heading - last.yaw_rad)) <= heading_rad
+            abs(wrap_angle(heading - last.yaw_rad)) <= min(heading_rad, _AS_SENT_RAD)
         ):
             return words, hint
     driven = run.driven(math.inf)
     if driven is not None and abs(turned_rad(run.truth[driven:])) < heading_rad:
         return (
             ": it has not turned since it arrived",
-            "After the position is reached, turn on the spot by the error goal_theta - yaw.",
+            "Once the position is reached, angular.z is a gain times goal_theta - yaw: is this "
+            "part of the code reached, and which command does it publish?",
         )
     passing_rad_s = _turning_past_rad_s(run)
     if passing_rad_s is not None:
@@ -404,21 +404,11 @@ def _wrong_heading(run: Approach, heading_rad: float) -> tuple[str, str]:
             "Your node sees it late, and the robot cannot stop at once. Make the angular gain "
             "smaller, or turn back where the error has become too large again.",
         )
-    error_rad = run.heading_error_rad(last)
-    if is_at_rest(last) and abs(error_rad) < _A_LITTLE_RAD:
-        turned = next((s.angular_rad_s for s in reversed(run.truth) if s.angular_rad_s), 0.0)
-        if turned * error_rad < 0.0:
-            return (
-                ": it turned a little too far",
-                "The error is goal_theta - yaw, with goal_theta as it was given: do not round it. "
-                "Where the error changes its sign, turn back.",
-            )
-        return (
-            ": it stopped turning a little before",
-            "Compare abs(goal_theta - yaw) with angle_tolerance, in radians, and turn on until it "
-            "is smaller. It is not goal_tolerance, and no number of your own.",
-        )
-    return "", "The error is goal_theta - yaw in radians; yaw comes from the quaternion."
+    return (
+        "",
+        "Turn on until abs(goal_theta - yaw) is within angle_tolerance, in radians and as they "
+        "were given, and print yaw: it comes from the quaternion, and nothing is added to it.",
+    )
 
 
 def _turning_past_rad_s(run: Approach) -> float | None:

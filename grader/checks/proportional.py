@@ -18,11 +18,11 @@ from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.command import command_topic, commands
 from grader.checks.finding import Evidence, Finding, Moment, Plot
-from grader.checks.immobility import why_cut_short
 from grader.checks.law import Law, Sample, Verdict, examine
 from grader.checks.measure import metres
 from grader.checks.misread_yaw import misread_yaw
 from grader.checks.missed_goal import why_not_there
+from grader.checks.off_course import why_off_course
 from grader.checks.reference import GoalPose
 from grader.checks.silence import why_silent
 from grader.checks.steering import LEAST_SAMPLES, at_the_goal, on_the_way
@@ -98,7 +98,7 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     evidence = Evidence(moments=(moment,), plots=(_plot(samples, phase),))
     if good:
         return _judge_gain(verdict, parameters, expected, evidence)
-    deeper = why_cut_short(recording)
+    deeper = why_off_course(recording)
     if deeper is not None and len(samples) < LEAST_SAMPLES:
         return deeper.finding(expected)
     if verdict.law is Law.NOTHING_TO_DO:

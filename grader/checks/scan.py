@@ -14,8 +14,6 @@ from grader.checks.measure import metres, side
 from grader.checks.wording import code
 from grader.recording.model import NS, Message, Recording, Truth
 
-# As near as this is "the same distance" for an explanation.
-_SAME_M = 0.06
 _CONE_RAD = math.radians(20.0)
 # What the robot drove on with for longer than this is not what stopped it: a filter of some
 # scans and a slow timer have decided by then.
@@ -26,7 +24,7 @@ _STRIDE = 10
 
 @dataclass(frozen=True)
 class Misreading:
-    """How a scan was probably misread.
+    """What may have been read wrongly in a scan.
 
     Attributes:
         words: A clause to follow what was seen.
@@ -58,21 +56,20 @@ def front(scan: Message, lidar_rad: float = 0.0) -> float | None:
     return float(ranges[round((-start - lidar_rad) / step) % len(ranges)])
 
 
-def misreading(
-    recording: Recording, time_ns: int, nearest: Sight | None, distance_m: float | None
-) -> Misreading | None:
+def misreading(recording: Recording, time_ns: int, nearest: Sight | None) -> Misreading | None:
     """Why the robot may have seen an obstacle ahead where there is none.
 
     Args:
         recording: The run.
         time_ns: When it stopped, or did not start.
         nearest: The nearest thing then, in any direction.
-        distance_m: At which it should stop, or None where that is not known.
     """
     scan = newest(recording, time_ns)
+    if scan is None:
+        return None
     turned_rad = 0.0 if recording.scene is None else recording.scene.lidar.yaw_rad
-    seen = None if scan is None else front(scan, turned_rad)
-    beside = _beside(recording, time_ns, nearest, distance_m)
+    seen = front(scan, turned_rad)
+    beside = _beside(recording, scan, time_ns, nearest)
 
     def reported_zero(step: Truth) -> bool:
         before = newest(recording, step.time_ns)
@@ -83,8 +80,7 @@ def misreading(
         return Misreading(
             "the beam straight ahead reported 0.0 then, which means that nothing came back",
             "A range below range_min is no obstacle: ignore ranges outside of range_min to "
-            "range_max."
-            + (f" If you do: {beside.hint[0].lower()}{beside.hint[1:]}" if beside else ""),
+            "range_max." + (f" {beside.hint}" if beside else ""),
         )
     if beside is not None:
         return beside
@@ -98,12 +94,11 @@ def misreading(
 
 
 def _beside(
-    recording: Recording, time_ns: int, nearest: Sight | None, distance_m: float | None
+    recording: Recording, scan: Message, time_ns: int, nearest: Sight | None
 ) -> Misreading | None:
-    """Whether something beside the robot may have stopped it."""
-    if nearest is None or abs(nearest.bearing_rad) <= _CONE_RAD:
-        return None
-    if nearest.distance_m > (1.0 if distance_m is None else distance_m + _SAME_M):
+    """Whether something beside the robot, nearer than anything before, may have stopped it."""
+    range_max_m = number(scan.value, "range_max") or math.inf
+    if nearest is None or abs(nearest.bearing_rad) <= _CONE_RAD or nearest.distance_m > range_max_m:
         return None
     scene = recording.scene
 
@@ -114,10 +109,10 @@ def _beside(
     if _drove_on(recording, time_ns, as_near):
         return None
     return Misreading(
-        f"{code(nearest.name)} was then {metres(nearest.distance_m)} away, "
-        f"{side(nearest.bearing_rad)}, as if the nearest of all beams counted",
-        "Look at the beam straight ahead only, not at min(ranges): its index is "
-        "round(-angle_min / angle_increment).",
+        f"the nearest thing, {code(nearest.name)}, was then {metres(nearest.distance_m)} away, "
+        f"{side(nearest.bearing_rad)}",
+        "Which range does the callback compare? min(ranges) is the nearest one anywhere. The beam "
+        "straight ahead has the index round(-angle_min / angle_increment).",
     )
 
 

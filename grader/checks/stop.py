@@ -22,7 +22,7 @@ from grader.checks.measure import metres, speed
 from grader.checks.node_absence import why_no_node
 from grader.checks.scan import misreading
 from grader.checks.sighting import until_the_end
-from grader.checks.track import first_rest, over_time, speed_plot, way_m
+from grader.checks.track import REST_M_S, first_rest, over_time, speed_plot, way_m
 from grader.checks.wording import code, counted
 from grader.recording.model import NS, Recording, Scene, Truth
 
@@ -135,7 +135,7 @@ def _early(
             "Ranges are measured from the LiDAR: compare them with the distance as they are.",
             evidence,
         )
-    misread = misreading(recording, step.time_ns, nearest(scene, step), parameters.distance)
+    misread = misreading(recording, step.time_ns, nearest(scene, step))
     if misread is not None:
         return Cause(f"{seen}: {misread.words}", misread.hint, evidence)
     return Cause(seen, _EARLY_HINT, evidence)
@@ -258,7 +258,7 @@ def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding:
     fastest = max(abs(item.linear_m_s) for item in truth[again:])
     return Finding.failed(
         expected,
-        f"set off again{_backwards(step)} {when_s:.2f} s after launch{where}: "
+        f"{_began(step, ' again')} {when_s:.2f} s after launch{where}: "
         f"{metres(way_m(truth[rest:]))} at up to {speed(fastest)}",
         "Remember that the robot has stopped, or compare the same range in every callback: two "
         "places that publish contradict each other.",
@@ -290,20 +290,22 @@ def _from_start(recording: Recording, parameters: StaysAtRest) -> Finding:
         "Publish no speed before the first scan: until then nobody knows what is ahead."
         if blind
         else "Stand still near an obstacle: linear.x = 0.0, not less."
-        if _backwards(step)
+        if step.linear_m_s < 0.0
         else "Compare the range before you drive, in the first callback already."
     )
     return Finding.failed(
         expected,
-        f"set off{_backwards(step)} {when_s:.2f} s after launch{words}{where}: "
-        f"{metres(way_m(truth))} in all",
+        f"{_began(step)} {when_s:.2f} s after launch{words}{where}: {metres(way_m(truth))} in all",
         hint,
         Evidence(moments=(Moment("set off", when_s),), plots=(speed_plot(recording),)),
     )
 
 
-def _backwards(step: Truth) -> str:
-    return " backwards" if step.linear_m_s < 0.0 else ""
+def _began(step: Truth, again: str = "") -> str:
+    """What a robot that was at rest began to do."""
+    if abs(step.linear_m_s) < REST_M_S:
+        return "turned on the spot"
+    return f"set off{again}{' backwards' if step.linear_m_s < 0.0 else ''}"
 
 
 def _moves_from(recording: Recording, begin: int, tolerance_m_s: float) -> int | None:

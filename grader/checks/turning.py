@@ -12,12 +12,11 @@ from grader.assignment.quantity import Angle, PositiveLength, Speed
 from grader.checks.approach import Approach, approach
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.contact import why_touched
 from grader.checks.detour import WRAP_HINT, Detour, away
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.immobility import why_cut_short
 from grader.checks.measure import degrees, metres, speed
 from grader.checks.missed_goal import why_not_there
+from grader.checks.off_course import why_off_course
 from grader.checks.reference import GoalPose
 from grader.checks.track import speed_plot
 from grader.checks.wording import counted
@@ -66,7 +65,7 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     way = sum(_way_m(before, after) for before, after in stray)
     if way <= _RUN_OUT_M:
         return Finding.passed(expected, f"{metres(way)} after it had begun to turn", evidence)
-    deeper = why_cut_short(recording) or why_touched(recording)
+    deeper = why_off_course(recording)
     if deeper is not None:
         return deeper.finding(expected)
     first = stray[0][1]
@@ -151,6 +150,9 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
         if cause is not None:
             return cause.finding(expected)
         return Finding.passed(expected, "no long way", evidence)
+    deeper = why_off_course(recording)
+    if deeper is not None:
+        return deeper.finding(expected)
     first = detours[0]
     when_s = recording.since_launch_s(first.step.time_ns)
     long_rad = math.tau - abs(first.error_rad)

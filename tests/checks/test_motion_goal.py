@@ -12,6 +12,7 @@ from grader.assignment.load import load_assignment
 from grader.checks.approach import Approach
 from grader.checks.finding import Status
 from grader.checks.law import Sample, examine
+from grader.checks.measure import degrees
 from grader.checks.misread_yaw import misread_yaw
 from sim.motion import Pose
 from tests.checks.builder import (
@@ -418,7 +419,7 @@ class TestMistakes:
         run = drive(lambda _: (0.2, 1.0), seconds=30)
         run = replace(run, log=output(interrupted, time_s=30.0))
         said = failing("motion.path_length", run, goal=yaml(GOAL), most="40 %")
-        assert f"a callback did not return, it was at {SOURCE}:14" in said
+        assert f"a callback was at {SOURCE}:14 when it was interrupted" in said
         assert "compute one command for each" in said
 
     def test_a_command_that_is_computed_once(self):
@@ -447,7 +448,7 @@ class TestMistakes:
     def test_turns_a_little_too_little(self):
         run = run_to(GOAL, straight=0.08)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.03 rad")
-        assert "it stopped turning a little before" in said and "angle_tolerance" in said
+        assert "angle_tolerance" in said and "print yaw" in said
 
     @pytest.mark.parametrize(("gain", "period_s"), [(4.0, None), (4.0, 0.05), (3.0, 0.1)])
     def test_turns_too_fast_to_stop_where_it_sees_the_goal_s_heading(self, gain, period_s):
@@ -460,7 +461,7 @@ class TestMistakes:
     def test_turns_to_a_heading_that_is_a_little_beyond(self):
         run = drive(on_odometry(Student((*GOAL[:2], GOAL[2] + 0.08), straight=0.02)), seconds=40)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.02 rad")
-        assert "it turned a little too far" in said and "do not round it" in said
+        assert "angle_tolerance" in said and "print yaw" in said
 
     def test_ends_a_little_before_the_goal(self):
         run = run_to(GOAL)
@@ -525,7 +526,28 @@ class TestMistakes:
     def test_a_detour(self):
         run = run_to((-0.8, 0.1, 0.0), angular=0.5, linear=0.3, seconds=60)
         said = failing("motion.path_length", run, goal=yaml((-0.8, 0.1, 0.0)), most="20 %")
-        assert "longer" in said
+        assert "longer" in said and "with the goal more than 45° to the side" in said
+
+    def test_a_callback_that_sleeps_while_the_robot_turns(self):
+        student, until_s = Student(GOAL), [0.0]
+
+        def law(senses):
+            if senses.odometry is None or senses.time_s < until_s[0]:
+                return None
+            said = student(senses.odometry.pose)
+            if student.arrived and said[1]:
+                until_s[0] = senses.time_s + 10.0
+            return said
+
+        run = drive(law, seconds=30)
+        for check, parameters in (
+            ("motion.reaches", {"goal": yaml(GOAL), **REACHES}),
+            ("motion.settles", {"within": "20 s"}),
+            ("motion.short_way", {"goal": yaml(GOAL)}),
+        ):
+            said = failing(check, run, **parameters)
+            assert "no command came for 10" in said and "time.sleep()" in said
+            assert "quaternion" not in said and "atan2" not in said
 
     def test_limits_missing(self):
         run = run_to(BEHIND, top=9.0, spin=9.0, linear=2.0, angular=2.5)
@@ -604,6 +626,8 @@ def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_th
         (lambda yaw: math.sin(yaw / 2), "as if yaw were z of the quaternion", "half the angle"),
         (lambda yaw: -yaw, "with its sign changed", "Counter-clockwise"),
         (abs, "as if yaw were never negative", "acos loses the sign"),
+        (lambda yaw: yaw + 0.35, "as if yaw were about 20° more than it is", "needs an offset"),
+        (lambda yaw: yaw - 1.57, "as if yaw were about 90° less than it is", "needs an offset"),
     ],
 )
 @pytest.mark.parametrize("style", [{}, {"wrap": lambda error: error}, {"spin": 1.0}])
@@ -613,6 +637,15 @@ def test_a_yaw_that_was_read_wrongly_is_named(yaw, words, hint, style):
     assert finding.status is Status.FAILED
     assert words in finding.observed
     assert hint in finding.hint
+
+
+def test_an_offset_at_the_goal_is_not_said_to_be_another_mistake():
+    for offset in (0.15, 0.25, -0.25):
+        run = run_to(GOAL, wrap_theta=lambda error, offset=offset: wrap(error + offset))
+        finding = judge("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="4 deg")
+        assert finding.status is Status.FAILED
+        assert finding.observed.endswith(f"instead of {degrees(GOAL[2])}")
+        assert "nothing is added to it" in finding.hint
 
 
 def test_a_yaw_that_knows_half_of_the_circle_is_named():

@@ -1,5 +1,6 @@
 """Driving ahead and stopping in front of an obstacle, on runs of the real simulator core."""
 
+import itertools
 import math
 import re
 from dataclasses import replace
@@ -149,7 +150,22 @@ class TestDrives:
     def test_on_and_off(self):
         ticks = iter(range(10_000))
         run = drive(on_scan(lambda _: (0.1 * (next(ticks) % 4 < 2), 0.0)), seconds=8)
-        assert "on and off" in failing("motion.drives", run, speed="0.1 m/s")
+        assert "stood still in between, 9 times" in failing("motion.drives", run, speed="0.1 m/s")
+
+    def test_a_robot_that_turned_is_not_said_to_have_stood_still(self):
+        ticks = itertools.count()
+        law = on_scan(lambda _: (0.1, 0.0) if next(ticks) % 8 < 4 else (0.0, 0.5))
+        said = failing("motion.drives", drive(law, seconds=8), speed="0.1 m/s")
+        assert "turned on the spot in between" in said and "stood still" not in said
+        around = drive(on_scan(lambda _: (0.0, 0.5)), seconds=5)
+        assert "only turned on the spot" in failing("motion.keeps_driving", around, distance="1 m")
+
+    def test_what_turns_after_it_had_stopped_has_not_set_off(self):
+        def law(senses: Senses):
+            return (0.1, 0.0) if senses.time_s < 2 else (0.0, 0.5 * (senses.time_s > 4))
+
+        said = failing("motion.stays_at_rest", drive(law, seconds=6, rest_s=None))
+        assert "turned on the spot" in said and "set off" not in said
 
     def test_turning_instead(self):
         run = drive(on_scan(lambda _: (0.0, 0.1)), seconds=5)
@@ -220,9 +236,20 @@ class TestStops:
         world = "{segments: [[2, -1, 2, 1]], boxes: [{centre: [0.6, 0.28], size: [0.2, 0.2]}]}"
         run = drive(on_scan(nearest_of_all), world=world, seconds=20)
         said = failing("motion.stops", run, **STOPS)
-        assert "`boxes[0]` was then" in said and "min(ranges)" in said
+        assert "the nearest thing, `boxes[0]`, was then" in said and "min(ranges)" in said
         run = drive(on_scan(nearest_of_all), world=BESIDE, seconds=20)
         assert "on its left" in failing("motion.keeps_driving", run, distance="1 m")
+
+    @pytest.mark.parametrize("threshold_m", [0.5, 1.0, 1.6])
+    def test_the_nearest_of_all_beams_at_any_threshold(self, threshold_m):
+        def law(ranges):
+            return (0.1 if min(ranges) > threshold_m else 0.0, 0.0)
+
+        off_m = threshold_m + 0.05
+        world = f"{{boxes: [{{centre: [0.9, {off_m}], size: [0.2, 0.2]}}]}}"
+        run = drive(on_scan(law), world=world, seconds=20)
+        said = failing("motion.keeps_driving", run, distance="1.5 m")
+        assert "the nearest thing, `boxes[0]`, was then" in said and "min(ranges)" in said
 
     def test_from_its_edge(self):
         run = drive(by_front(stop=0.3), world=WALL, seconds=20)
@@ -253,7 +280,7 @@ class TestStops:
         world = "{boxes: [{centre: [0.6, 0.21], size: [0.2, 0.1]}]}"
         run = drive(on_scan(law), world=world, seconds=9, options={"lidar": {"no_return": "zero"}})
         said = failing("motion.keeps_driving", run, distance="1 m")
-        assert "`boxes[0]` was then" in said and "reported 0.0" not in said
+        assert "the nearest thing, `boxes[0]`, was then" in said and "reported 0.0" not in said
 
     def test_what_it_drove_along_is_not_what_stopped_it(self):
         def law(senses: Senses):
@@ -339,7 +366,7 @@ class TestStops:
 
         said = failing("motion.drives", drive(law, world=WALL, seconds=6), **DRIVES)
         assert "times to stop, and to drive on before it stood" in said
-        assert "contradict each other" in said
+        assert "may contradict the callback" in said
 
     def test_a_command_that_is_held_until_it_touches(self):
         def slow(senses: Senses):
