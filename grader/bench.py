@@ -34,10 +34,11 @@ from grader.batch.rendering import render_all
 from grader.grade import grade
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import NS, Recording
+from grader.report.class_row import ClassRow
 from grader.report.facts import Clock, RunFacts
 from grader.report.files import write_whole
 from grader.report.html import render_report
-from grader.report.overview import OverviewRow, render_overview
+from grader.report.overview import render_overview
 from grader.report.result import make_result
 from grader.run.admission import Admission
 from grader.run.domain import lock_domain
@@ -328,7 +329,7 @@ def _class(samples: Samples, folder: Path, _: int) -> None:
     graded = regrade(loaded, found)
     facts = RunFacts(Clock().started, 0.0)
     result = make_result(graded.grade, graded.recordings, facts)
-    rows = [OverviewRow(f"student {i}", "", f"{i}/report.html", result) for i in range(SUBMISSIONS)]
+    rows = [ClassRow(f"student {i}", "", f"{i}/report.html", result) for i in range(SUBMISSIONS)]
 
     def render() -> None:
         for _ in rows:

@@ -10,12 +10,19 @@
     const mark = cell && cell.firstElementChild;
     return mark ? mark.className.split(" ").pop() : "";
   };
+  // "muller" and "mueller" find Müller, "strasse" finds Straße, "lukasz" finds Łukasz.
+  const letters = { ß: "ss", æ: "ae", œ: "oe", ø: "o", ł: "l", đ: "d", ð: "d", þ: "th", ħ: "h", ı: "i", ŋ: "n", ŧ: "t", ĸ: "k", ə: "e", ς: "σ" };
+  const plain = (text) => text.normalize("NFKD").replace(/\p{M}/gu, "").toLowerCase()
+    .replace(/[^\x00-\x7f]/gu, (letter) => letters[letter] ?? letter).replace(/[\u02b9-\u02bf\u2018\u2019`´']/gu, "");
+  const spelt = (text) => text.normalize("NFC").toLowerCase()
+    .replace(/[äöüøå]/gu, (letter) => ({ ä: "ae", ö: "oe", ü: "ue", ø: "oe", å: "aa" })[letter]);
+  const forms = (text) => [plain(text), plain(spelt(text))];
   const name = (row) => row.cells[0].textContent.trim().toLowerCase();
   const score = (row) => {
     const value = parseFloat(row.cells[1].textContent);
     return Number.isNaN(value) ? -1 : value;
   };
-  const said = rows.map((row) => ({ row, text: row.textContent.toLowerCase(), name: name(row), states: row.dataset.is.split(" ") }));
+  const said = rows.map((row) => ({ row, names: forms(row.cells[0].textContent), states: row.dataset.is.split(" ") }));
 
   const form = document.getElementById("filters");
   const search = document.getElementById("search");
@@ -23,11 +30,11 @@
   const failed = document.getElementById("failed");
   const shown = document.getElementById("shown");
   const filter = () => {
-    const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const words = search.value.split(/\s+/).filter(Boolean).map(forms);
     let count = 0;
     for (const one of said) {
       const cell = failed.value && one.row.cells[fixed + Number(failed.value)];
-      const fits = words.every((word) => one.name.includes(word))
+      const fits = words.every((word) => one.names.some((text) => word.some((form) => text.includes(form))))
         && (!state.value || one.states.includes(state.value))
         && (!failed.value || ["failed", "partial"].includes(kind(cell)));
       one.row.hidden = !fits;

@@ -58,6 +58,13 @@ class LoadedAssignment:
         """Where it lies: worlds, own checks and the handout are beside the YAML."""
         return self.file.parent
 
+    @property
+    def location(self) -> str | None:
+        """Its absolute path; None for an assignment of rosgrade's own, which its id finds."""
+        place = self.folder if self.file.name == ASSIGNMENT_FILE else self.file
+        own = place.resolve().parent == resources.assignments().resolve()
+        return None if own else str(place.absolute())
+
     def scenarios_of(self, bound: BoundCheck) -> tuple[Scenario, ...]:
         """The scenarios that a check judges: those that it names, or all.
 
@@ -192,7 +199,9 @@ def folder_sha256(folder: Path, besides: Path | None = None) -> str:
     digest = sha256()
     for file in sorted(folder.rglob("*"), key=lambda path: path.relative_to(folder).as_posix()):
         inside = file.relative_to(folder)
-        ignored = any(part.startswith(".") or part == "__pycache__" for part in inside.parts)
+        # Or grading a submission from within an assignment's folder would change the assignment.
+        tools = {"__pycache__", "rosgrade-report"}
+        ignored = any(part.startswith(".") or part in tools for part in inside.parts)
         if ignored or not file.is_file():
             continue
         if besides is not None and file.is_relative_to(besides):

@@ -16,7 +16,7 @@ from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.intake import HandedIn
 from grader.batch.ledger import Entry, Ledger
-from grader.batch.regrading import find, regrade
+from grader.batch.regrading import find, regrade, regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError
 from grader.nearest import did_you_mean
 from grader.recording.fact import to_json
@@ -191,8 +191,8 @@ class Batch:
         named = ", ".join(changed[:_MOST_NAMED]) + (", …" if len(changed) > _MOST_NAMED else "")
         raise UsageError(
             f"{self.ledger.out}: {len(changed)} ({named}) graded with another version of "
-            f"{self.loaded.assignment.id}; `rosgrade regrade {self.ledger.out}` judges their "
-            "recordings again, `--retry all` runs everything again, `--retry NAME` one"
+            f"{self.loaded.assignment.id}; {regrade_command(self.ledger.out, self.loaded)} judges "
+            "their recordings again, `--retry all` runs everything again, `--retry NAME` one"
         )
 
     def _is_of_this_version(self, key: str) -> bool:
@@ -253,8 +253,10 @@ class Batch:
         self.ledger.put(twin.key, partial)
 
     def _write(self) -> None:
-        assignment = self.loaded.assignment.id
-        self.ledger.write(self._entries.values(), assignment, self.loaded.sha256)
+        loaded = self.loaded
+        self.ledger.write(
+            self._entries.values(), loaded.assignment.id, loaded.sha256, loaded.location
+        )
 
 
 def _unknown(name: str, rows: Sequence[HandedIn]) -> str:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from grader.batch.batch import Done
@@ -13,14 +12,16 @@ from grader.batch.files import REPORT_FILE
 from grader.batch.ledger import Entry, Ledger
 from grader.checks.finding import Status
 from grader.checks.wording import listing
+from grader.report.class_row import ClassRow
 from grader.report.clean import one_line
 from grader.report.files import write_whole
-from grader.report.gradebook import cell, plain_csv
-from grader.report.overview import OverviewRow, render_overview
+from grader.report.gradebook import grades_csv
+from grader.report.overview import render_overview
 from grader.report.result_model import Result
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"
+NO_RESULT = "there is no result of it; run the batch again"
 _MOST_TWINS = 5
 _LONGEST_WHY = 200
 
@@ -94,27 +95,53 @@ def _why_not_graded(result: Result) -> str:
     return f"{why[: _LONGEST_WHY - 1]}…" if len(why) > _LONGEST_WHY else why
 
 
-def grades_csv(done: Sequence[Done]) -> str:
-    """The gradebook: a row for everybody, graded or not.
+def standing(ledger: Ledger) -> list[Done]:
+    """The rows of a batch as its folder has them.
 
-    Returns:
-        The columns of :func:`grader.report.gradebook.plain_csv`, with name, late and note.
+    Raises:
+        UsageError: It is no folder of a batch, or damaged.
     """
-    results = [item.result for item in done if item.result is not None]
-    rows = list(csv.reader(io.StringIO(plain_csv(results)))) if results else [["submission"]]
-    header, *graded = rows
-    by_key = {row[0]: row for row in graded}
+    _, entries = ledger.read()
+    return [_standing(ledger, entry) for entry in entries]
+
+
+def _standing(ledger: Ledger, entry: Entry) -> Done:
+    result = ledger.result(entry.key) if not entry.fault else None
+    if result is not None and entry.sha256 in ("", result.submission.sha256):
+        return Done(entry, result, fresh=False)
+    if entry.sha256 and not entry.fault:
+        told = "; ".join(part for part in (entry.problem, NO_RESULT) if part)
+        entry = replace(entry, problem=told)
+    return Done(entry, None, fresh=False)
+
+
+def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[ClassRow]:
+    """What is shown of a class, sorted by key.
+
+    Args:
+        done: Every row.
+        ledger: The folder of the batch, for links to reports; None where there is none.
+    """
     said = notes(done)
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([header[0], "name", "late", *header[1:], "note"])
-    for item in done:
-        entry = item.entry
-        row = by_key.get(cell(entry.key)) if item.result is not None else None
-        rest = row[1:] if row else [""] * (len(header) - 1)
-        late = "yes" if entry.late else ""
-        writer.writerow([cell(entry.key), cell(entry.name), late, *rest, cell(said[entry.key])])
-    return stream.getvalue()
+    rows = sorted(done, key=lambda item: item.entry.key)
+    return [
+        ClassRow(
+            id=item.entry.key,
+            name=item.entry.name,
+            report=_report(item, ledger),
+            result=item.result,
+            note=said[item.entry.key],
+            late=item.entry.late,
+            missing=not (item.entry.sha256 or item.entry.fault),
+        )
+        for item in rows
+    ]
+
+
+def _report(done: Done, ledger: Ledger | None) -> str | None:
+    if ledger is None or done.result is None:
+        return None
+    return os.path.relpath(ledger.folder(done.entry.key) / REPORT_FILE, ledger.out)
 
 
 def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
@@ -127,22 +154,8 @@ def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
     Returns:
         The overview.
     """
-    rows = sorted(done, key=lambda item: item.entry.key)
+    rows = class_rows(done, ledger)
     write_whole(ledger.out / GRADES_FILE, grades_csv(rows))
     overview = ledger.out / OVERVIEW_FILE
-    said = notes(rows)
-    shown = [
-        OverviewRow(
-            id=item.entry.key,
-            name=item.entry.name,
-            note=said[item.entry.key],
-            late=item.entry.late,
-            report=os.path.relpath(ledger.folder(item.entry.key) / REPORT_FILE, ledger.out)
-            if item.result is not None
-            else None,
-            result=item.result,
-        )
-        for item in rows
-    ]
-    write_whole(overview, render_overview(shown))
+    write_whole(overview, render_overview(rows))
     return overview

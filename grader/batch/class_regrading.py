@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.batch.batch import Done
+from grader.batch.class_files import NO_RESULT
 from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
 from grader.batch.regrading import compare, find, refuse_other, regrade
@@ -71,10 +73,32 @@ def regrade_class(loaded: LoadedAssignment, ledger: Ledger) -> Iterator[Regraded
         elif before is not None and entry.sha256 in ("", before.submission.sha256):
             yield _regrade(loaded, ledger, entry, before)
         elif entry.sha256:
-            yield _not_judged(entry, None, "there is no result of it; run the batch again")
+            yield _not_judged(entry, None, NO_RESULT)
         else:
             yield Regraded(Done(entry, None, fresh=False), None)
-    ledger.write(entries, loaded.assignment.id, loaded.sha256)
+    ledger.write(entries, loaded.assignment.id, loaded.sha256, loaded.location)
+
+
+def regrade_row(loaded: LoadedAssignment, ledger: Ledger, folder: Path) -> list[Regraded]:
+    """Judge one row of a batch again, and the rows that have the same submission.
+
+    Args:
+        loaded: The assignment.
+        ledger: The batch, opened.
+        folder: Of the row's report.
+
+    Returns:
+        What was judged again; nothing where the batch does not have that row any more.
+    """
+    _, entries = ledger.read()
+    named = [entry for entry in entries if ledger.folder(entry.key).name == folder.resolve().name]
+    same = {entry.same_as or entry.key for entry in named}
+    rows = [(entry, ledger.result(entry.key)) for entry in entries]
+    return [
+        _regrade(loaded, ledger, entry, before)
+        for entry, before in rows
+        if before is not None and (entry.same_as or entry.key) in same
+    ]
 
 
 def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Result) -> Regraded:

@@ -56,6 +56,7 @@ def write_graded(
         environment=first.environment if first else {},
         rosgrade_version=__version__,
         recordings={name: os.path.relpath(file, folder) for name, file in graded.files.items()},
+        runs=graded.runs,
     )
     report = write_report(graded, folder, facts)
     # Last: where it says what the grade is, the report beside it says the same.

@@ -117,6 +117,13 @@ class Ledger:
                 "what is missing"
             )
 
+    @classmethod
+    def around(cls, report: Path) -> Ledger | None:
+        """The folder of the batch that a report lies in; None for a report of its own."""
+        submissions = report.resolve().parent
+        found = submissions.name == SUBMISSIONS and (submissions.parent / BATCH_FILE).is_file()
+        return cls(submissions.parent) if found else None
+
     def folder(self, key: str) -> Path:
         """Folder of a row's result."""
         return self.out / SUBMISSIONS / folder_name(key)
@@ -163,15 +170,27 @@ class Ledger:
         except RosgradeError:
             return None
 
-    def write(self, entries: Iterable[Entry], assignment: str, assignment_sha256: str) -> None:
+    def write(
+        self,
+        entries: Iterable[Entry],
+        assignment: str,
+        assignment_sha256: str,
+        location: str | None = None,
+    ) -> None:
         """Write down what the batch consists of.
+
+        Args:
+            entries: The rows.
+            assignment: Its id.
+            assignment_sha256: Hash of its files, as hex.
+            location: Where it lies; None for one of rosgrade's own.
 
         Raises:
             UsageError: The folder is not there any more, or cannot be written.
         """
         self.refuse_lost()
         data = {
-            "assignment": {"id": assignment, "sha256": assignment_sha256},
+            "assignment": {"id": assignment, "sha256": assignment_sha256, "location": location},
             "rows": [asdict(entry) for entry in entries],
         }
         write_whole(self.out / BATCH_FILE, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
@@ -182,10 +201,24 @@ class Ledger:
         Raises:
             UsageError: It is no folder of a batch, or damaged.
         """
+        name, _, entries = self._read()
+        return name, entries
+
+    def location(self) -> str | None:
+        """Where the assignment lay; None for one of rosgrade's own, or where it is not known.
+
+        Raises:
+            UsageError: As :meth:`read`.
+        """
+        return self._read()[1]
+
+    def _read(self) -> tuple[str, str | None, tuple[Entry, ...]]:
         file = self.out / BATCH_FILE
         try:
             data = json.loads(file.read_text(encoding="utf-8"))
-            return str(data["assignment"]["id"]), tuple(Entry(**row) for row in data["rows"])
+            assignment = data["assignment"]
+            entries = tuple(Entry(**row) for row in data["rows"])
+            return str(assignment["id"]), assignment.get("location"), entries
         except FileNotFoundError as error:
             raise UsageError(f"{self.out}: is not the folder of a batch") from error
         except (OSError, ValueError, KeyError, TypeError) as error:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.assignment.load import LoadedAssignment
+from grader import resources
+from grader.assignment.load import LoadedAssignment, list_assignments
 from grader.assignment.selection import visible_part
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
@@ -55,6 +57,16 @@ class Found:
                 return recording.environment["assignment"]
         raise UsageError(f"{self.folder}: it does not say for which assignment; name it")
 
+    @property
+    def location(self) -> str | None:
+        """Where that assignment lay; None for one of rosgrade's own, or where it is not known."""
+        result = self.result
+        beside = self.folder.parent / RESULT_FILE
+        if result is None and self.folder.name == RECORDINGS_FOLDER and beside.is_file():
+            # One recording of a report was named.
+            result = read_result(beside)
+        return result.assignment.location if result is not None else None
+
 
 def find(path: Path) -> Found:
     """Find the recordings at a path.
@@ -90,6 +102,36 @@ def find(path: Path) -> Found:
     return Found(report, recordings, files, submission, result)
 
 
+def stored_assignment(path: Path, name: str, location: str | None, command: str) -> str:
+    """Name the assignment that something was graded with, to load it again.
+
+    Args:
+        path: What was graded.
+        name: The assignment's id.
+        location: Where it lay; None for one of rosgrade's own, or where it is not known.
+        command: Of rosgrade, for the message.
+
+    Raises:
+        UsageError: It is not there.
+    """
+    if location is None and name in list_assignments():
+        # And not one of that name in the current folder.
+        return str(resources.assignments() / name)
+    if location is not None and Path(location).exists():
+        return location
+    lay = f" in {location}, which is not there any more" if location else ""
+    raise UsageError(
+        f"{path}: was graded with the assignment {name!r}{lay}; name its folder: "
+        f"`rosgrade {command} {shlex.quote(str(path))} FOLDER`"
+    )
+
+
+def regrade_command(path: Path, loaded: LoadedAssignment) -> str:
+    """The command that judges something again with an assignment."""
+    words = ["rosgrade", "regrade", str(path), *([loaded.location] if loaded.location else [])]
+    return f"`{shlex.join(words)}`"
+
+
 def refuse_other(folder: Path, name: str, loaded: LoadedAssignment) -> None:
     """Let nobody lose all points because a recording is judged as of another assignment.
 
@@ -117,7 +159,7 @@ def regrade(loaded: LoadedAssignment, found: Found) -> Graded:
         prepared=Prepared(record=found.submission, install=None),
         recordings=found.recordings,
         files=found.files,
-        runs={},
+        runs={one.id: one.runs for one in found.result.scenarios} if found.result else {},
         faults={},
         references=read_references(loaded),
     )

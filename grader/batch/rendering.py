@@ -10,11 +10,14 @@ from pathlib import Path
 
 from grader.assignment.load import load_assignment
 from grader.assignment.selection import select, visible_part
+from grader.batch.batch import Done
+from grader.batch.class_files import class_rows, standing
 from grader.batch.files import RESULT_FILE, Written, write_report
-from grader.batch.ledger import BATCH_FILE, Ledger
-from grader.batch.regrading import find, regrade
+from grader.batch.ledger import BATCH_FILE, Entry, Ledger
+from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
 from grader.errors import UsageError
 from grader.grade import Grade
+from grader.report.class_row import ClassRow
 from grader.report.facts import RunFacts
 from grader.report.result import read_result
 from grader.report.result_model import Result
@@ -65,13 +68,16 @@ def _of_batch(ledger: Ledger) -> tuple[Path, ...]:
     return tuple(sorted(found))
 
 
-def read_results(out: Path) -> tuple[Result, ...]:
-    """The results at a path: one, or those of a class.
+def read_class(out: Path) -> list[ClassRow]:
+    """The rows of the class at a path; of a folder of single reports, a row for each.
 
     Raises:
-        UsageError: There is none, or one cannot be read.
+        UsageError: There is no result, or one cannot be read.
     """
-    return tuple(read_result(folder / RESULT_FILE) for folder in find_reports(out))
+    results = [read_result(folder / RESULT_FILE) for folder in find_reports(out)]
+    if (out / BATCH_FILE).is_file():
+        return class_rows(standing(Ledger(out)), Ledger(out))
+    return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])
 
 
 def render_all(folders: Sequence[Path], assignment: str | None = None) -> Iterator[Path]:
@@ -92,7 +98,7 @@ def render_all(folders: Sequence[Path], assignment: str | None = None) -> Iterat
         yield from map(render, folders)
         return
     # What a fork of this process needs is imported and loaded before.
-    _load(assignment or read_result(folders[0] / RESULT_FILE).assignment.id)
+    _load(assignment or _stored(folders[0], read_result(folders[0] / RESULT_FILE)))
     pool = ProcessPoolExecutor(cpu_count(), multiprocessing.get_context("fork"))
     try:
         yield from pool.map(render, folders)
@@ -117,11 +123,11 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
     """
     found = find(folder)
     result = found.result or read_result(folder / RESULT_FILE)
-    loaded = _load(assignment or result.assignment.id)
+    loaded = _load(assignment or _stored(folder, result))
     if loaded.sha256 != result.assignment.sha256:
         raise UsageError(
-            f"{folder}: the assignment has changed since this was graded: `rosgrade regrade "
-            f"{folder}` judges again with it as it is now"
+            f"{folder}: the assignment has changed since this was graded: "
+            f"{regrade_command(folder, loaded)} judges again with it as it is now"
         )
     shown = visible_part(loaded) if result.withheld.checks else loaded
     graded = regrade(select(shown, tuple(check.id for check in result.checks)), found)
@@ -129,7 +135,7 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
     if changed:
         raise UsageError(
             f"{folder}: judged again it is not what the result says ({', '.join(changed)}): "
-            f"`rosgrade regrade {folder}` writes both anew"
+            f"{regrade_command(folder, loaded)} writes both anew"
         )
     facts = RunFacts(
         started=result.started,
@@ -137,8 +143,13 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
         environment=result.environment,
         rosgrade_version=result.rosgrade_version,
         recordings={one.id: one.recording for one in result.scenarios if one.recording},
+        runs=graded.runs,
     )
     return Written(write_report(graded, folder, facts), result)
+
+
+def _stored(folder: Path, result: Result) -> str:
+    return stored_assignment(folder, result.assignment.id, result.assignment.location, "report")
 
 
 def _changed(result: Result, grade: Grade) -> list[str]:

@@ -43,15 +43,17 @@ def show(
     """
     from grader.assignment.load import load_assignment
     from grader.errors import UsageError
-    from grader.report.files import write_whole
+    from grader.report.files import refuse_inputs, write_whole
     from grader.report.handout import Handout, make_handout, render_handout
 
     if out is not None and not html:
         raise UsageError("--out is for the page: add --html")
-    handout: Handout = make_handout(load_assignment(assignment))
+    loaded = load_assignment(assignment)
+    handout: Handout = make_handout(loaded)
     console = output_console()
     if html:
         file = out or Path(f"{handout.id}.html")
+        refuse_inputs([file], [loaded.folder])
         write_whole(file, render_handout(handout))
         console.print(f"Handout: {file}", soft_wrap=True)
         return

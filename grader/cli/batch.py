@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from grader.cli.console import output_console
-from grader.cli.options import AssignmentName, Quiet, Seed
+from grader.cli.options import AssignmentName, Quiet, Seed, assignment_places
 from grader.cli.progress import ClassProgress
 from grader.cli.sandbox import Choice, SandboxChoice
 from grader.errors import UsageError
@@ -70,54 +72,56 @@ def batch(
     from grader.batch.crew import CrewLost, DaskCrew, LocalCrew
     from grader.batch.ledger import Ledger
     from grader.batch.worker import Order, make_grading
+    from grader.report.files import check_folder, refuse_inputs
     from grader.run.admission import Admission
 
     at_once = _at_once(jobs)
     _refuse_more(submissions, context.args)
     refuse_swapped(assignment, submissions)
+    check_folder(out)
+    refuse_inputs([out], [*assignment_places(assignment), submissions, roster])
     loaded = load_assignment(assignment)
+    _refuse_part(out, loaded.folder, f"the assignment in {loaded.folder}")
     order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
     admission = Admission(cells=at_once)
     # Before anything is read or written: without a sandbox there is no batch.
     grading = make_grading(order, loaded, admission) if scheduler is None else None
     began_s = time.monotonic()
-    with (
-        Scratch("batch") as staging,
-        Ledger(out).opened() as ledger,
-        ClassProgress(quiet) as progress,
-    ):
+    with Scratch("batch") as staging, ClassProgress(quiet) as progress:
         if grading is not None:
             progress.say(f"sandbox: {grading.enclosure}")
         names, rows = _rows(submissions, roster, out, staging, progress)
         for problem in names.problems if names else ():
             progress.note(f"{roster or submissions}: {problem}")
-        work = Batch(loaded, ledger, frozenset(retry or ()))
-        progress.begin("reading", len(rows))
-        entries, to_do = work.read(rows, progress.advance)
-        crew: Crew | None = None
-        if to_do and scheduler is not None:
-            crew = DaskCrew(scheduler, order)
-        elif to_do and grading is not None:
-            crew = LocalCrew(grading, admission.most)
-        done: list[Done] = []
-        known = [e for e in entries if e.key not in to_do and ledger.result(e.key) is not None]
-        progress.begin("grading", len(entries), already=len(known))
-        try:
-            for item in work.grade(to_do, crew):
-                done.append(item)
-                progress.advance(item.entry.key, _said(item), fresh=item.fresh)
-        except (KeyboardInterrupt, CrewLost):
-            with _undisturbed():
-                progress.note(
-                    f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same "
-                    "command goes on with the others"
-                )
-                write_class([*done, *work.left(done)], ledger)
-            raise
-        finally:
-            if crew is not None:
-                crew.close()
-        overview = write_class(done, ledger)
+        _refuse_within(out, rows)
+        with Ledger(out).opened() as ledger:
+            work = Batch(loaded, ledger, frozenset(retry or ()))
+            progress.begin("reading", len(rows))
+            entries, to_do = work.read(rows, progress.advance)
+            crew: Crew | None = None
+            if to_do and scheduler is not None:
+                crew = DaskCrew(scheduler, order)
+            elif to_do and grading is not None:
+                crew = LocalCrew(grading, admission.most)
+            done: list[Done] = []
+            known = [e for e in entries if e.key not in to_do and ledger.result(e.key) is not None]
+            progress.begin("grading", len(entries), already=len(known))
+            try:
+                for item in work.grade(to_do, crew):
+                    done.append(item)
+                    progress.advance(item.entry.key, _said(item), fresh=item.fresh)
+            except (KeyboardInterrupt, CrewLost):
+                with _undisturbed():
+                    progress.note(
+                        f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same "
+                        "command goes on with the others"
+                    )
+                    write_class([*done, *work.left(done)], ledger)
+                raise
+            finally:
+                if crew is not None:
+                    crew.close()
+            overview = write_class(done, ledger)
     console = output_console()
     console.print(_summary(done, time.monotonic() - began_s), soft_wrap=True)
     console.print(f"Overview: {overview}", soft_wrap=True)
@@ -158,6 +162,24 @@ def _rows(
     return read, take_in(submissions, staging, read, left_out, out)
 
 
+def _refuse_within(out: Path, rows: Sequence[HandedIn]) -> None:
+    """Let no results be written into what is graded: they would be a part of it.
+
+    Raises:
+        UsageError: They would.
+    """
+    around = {folder.name for folder in (out.absolute(), *out.absolute().parents)}
+    for row in rows:
+        # To resolve each path of a class takes long.
+        if row.path is not None and (row.path.name in around or row.path.is_symlink()):
+            _refuse_part(out, row.path, f"the submission of {row.key}")
+
+
+def _refuse_part(out: Path, folder: Path, what: str) -> None:
+    if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(folder)):
+        raise UsageError(f"{out}: would be a part of {what}; name another folder")
+
+
 def _refuse_more(submissions: Path, others: Sequence[str]) -> None:
     """Say what to name instead of several submissions, which is what a shell makes of `class/*`.
 
@@ -192,6 +214,8 @@ def _said(done: Done) -> str:
     """What came of a row, in a few words."""
     if done.result is None:
         return done.entry.fault or done.entry.problem or "not graded"
+    if done.result.submission.problem:
+        return f"unreadable: {done.result.submission.problem}"
     if done.result.score is None:
         return "not graded"
     return f"{done.result.score:g} of {done.result.max_score:g} points"
@@ -199,22 +223,22 @@ def _said(done: Done) -> str:
 
 def _summary(done: Sequence[Done], wall_s: float) -> str:
     """The class in one line."""
-    from grader.batch.class_files import copies
+    from grader.batch.class_files import class_rows, copies
+    from grader.report.class_row import RowStatus
 
-    results = [item.result for item in done if item.result is not None]
-    scores = [result.score for result in results if result.score is not None]
+    rows = class_rows(done)
+    scores = [row.score for row in rows if row.score is not None]
+    count = Counter(row.status for row in rows)
     fresh = sum(item.fresh for item in done)
     parts = [f"{len(scores)} of {len(done)} graded ({fresh} now, in {wall_s:.0f} s)"]
     if scores:
-        parts.append(f"median {median(scores):g} of {results[0].max_score:g} points")
-        parts.append(f"{sum(r.score == r.max_score for r in results)} with full points")
-    same = copies(done)
-    if same:
-        parts.append(f"{same} the same as another")
-    errors = len(results) - len(scores) + sum(bool(item.entry.fault) for item in done)
-    if errors:
-        parts.append(f"{errors} could not be graded (again with --retry errors)")
-    nothing = sum(item.result is None and not item.entry.fault for item in done)
-    if nothing:
-        parts.append(f"{nothing} handed in nothing")
-    return "; ".join(parts)
+        most = next(row.result.max_score for row in rows if row.graded and row.result is not None)
+        parts.append(f"median {median(scores):g} of {most:g} points")
+        parts.append(f"{sum(row.full for row in rows)} with full points")
+    told = {
+        "the same as another": copies(done),
+        "could not be graded (again with --retry errors)": count[RowStatus.NOT_GRADED],
+        "unreadable, without a score": count[RowStatus.UNREADABLE],
+        "handed in nothing": count[RowStatus.MISSING],
+    }
+    return "; ".join([*parts, *(f"{number} {what}" for what, number in told.items() if number)])

@@ -31,6 +31,7 @@ from grader.cli.options import (
     Scenarios,
     Seed,
     Verbose,
+    assignment_places,
 )
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.resources import cache_folder
@@ -74,11 +75,16 @@ def check(
     """
     from grader import ros
     from grader.report.facts import Clock
+    from grader.report.files import refuse_inputs
     from grader.run.runner import Runner
 
     clock = Clock()
     formats = Formats(
         junit, junit_family, markdown, gradescope, gradescope_metadata, github, classroom50
+    )
+    refuse_inputs(
+        (report, report / "report.html", json_file, *formats.files),
+        (*assignment_places(assignment), submission, gradescope_metadata),
     )
     with formats.grading():
         progress = GradingProgress(quiet, verbose)

@@ -2,18 +2,39 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from grader.cli.console import output_console, print_error, print_warning
 from grader.cli.options import AssignmentName
 
+if TYPE_CHECKING:
+    from grader.report.class_row import RowStatus
+
 Assignment = AssignmentName
 Folder = Annotated[Path, typer.Option("--out", help="Where to.")]
 Results = Annotated[Path, typer.Argument(help="Folder with the reports of a class.")]
 File = Annotated[Path, typer.Option("--output", "-o", help="File to write.")]
+
+
+class Zero(str, Enum):
+    """What was never run."""
+
+    UNREADABLE = "unreadable"
+    MISSING = "missing"
+
+
+ZeroFor = Annotated[
+    list[Zero] | None,
+    typer.Option(
+        "--zero",
+        help="Give 0 points for what cannot be read, or to who handed in nothing; else they have "
+        "no score. May be repeated.",
+    ),
+]
 
 app = typer.Typer(
     help="Write what other systems take, such as autograders.",
@@ -58,15 +79,20 @@ def classroom50(assignment: Assignment, out: Folder = Path()) -> None:
 
 
 @app.command()
-def csv(out: Results, output: File = Path("grades.csv")) -> None:
-    """Write a CSV with a row for each submission and a column for each check."""
-    from grader.batch.rendering import read_results
-    from grader.report.files import write_whole
-    from grader.report.gradebook import plain_csv
+def csv(out: Results, output: File = Path("grades.csv"), zero: ZeroFor = None) -> None:
+    """Write a CSV with a row for each submission and a column for each check.
 
-    results = read_results(out)
-    write_whole(output, plain_csv(results))
-    _say(f"{output}: {len(results)} submissions")
+    Of the folder of a batch it has the columns and the rows of its grades.csv.
+    """
+    from grader.batch.rendering import read_class
+    from grader.report.files import refuse_inputs, write_whole
+    from grader.report.gradebook import grades_csv
+
+    refuse_inputs([output], _read_of(out))
+    rows = read_class(out)
+    write_whole(output, grades_csv(rows, _statuses(zero)))
+    graded = sum(row.graded for row in rows)
+    _say(f"{output}: {len(rows)} submissions, {graded} of them graded")
 
 
 @app.command()
@@ -80,23 +106,26 @@ def canvas(
         str | None,
         typer.Option(help="Title of the assignment in Canvas; by default the assignment's id."),
     ] = None,
+    zero: ZeroFor = None,
 ) -> None:
     """Fill a Canvas gradebook, to import in Canvas under Grades.
 
     Ends with 1 if somebody has no score in it; who and why is said.
     """
-    from grader.batch.rendering import read_results
+    from grader.batch.rendering import read_class
     from grader.errors import UsageError
-    from grader.report.files import write_whole
+    from grader.report.files import refuse_inputs, write_whole
     from grader.report.gradebook import canvas_csv, read_canvas
 
+    refuse_inputs([output], [canvas, *_read_of(out)])
     try:
         text = canvas.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise UsageError(f"{canvas}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise UsageError(f"{canvas}: is not UTF-8: name the file as Canvas exports it") from error
-    filled = canvas_csv(read_results(out), read_canvas(text, str(canvas)), column)
+    export = read_canvas(text, str(canvas))
+    filled = canvas_csv(read_class(out), export, column, _statuses(zero))
     write_whole(output, filled.text)
     _say(f"{output}: {filled.filled} scores")
     for doubt in filled.doubts:
@@ -105,6 +134,21 @@ def canvas(
         print_error(problem)
     if filled.problems:
         raise typer.Exit(1)
+
+
+def _read_of(out: Path) -> list[Path]:
+    """The files that hold the grades of a class."""
+    from grader.batch.files import RESULT_FILE
+    from grader.batch.ledger import BATCH_FILE
+    from grader.batch.rendering import find_reports
+
+    return [out / BATCH_FILE, *(folder / RESULT_FILE for folder in find_reports(out))]
+
+
+def _statuses(zero: list[Zero] | None) -> set[RowStatus]:
+    from grader.report.class_row import RowStatus
+
+    return {RowStatus(one.value) for one in zero or ()}
 
 
 def _say(text: str) -> None:

@@ -75,6 +75,11 @@ class Formats:
     github: bool = False
     classroom50: bool = False
 
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """What is written by name; None for a format that is not asked for."""
+        return (self.junit, self.markdown, self.gradescope)
+
     @contextmanager
     def grading(self) -> Iterator[None]:
         """While this lasts, what a student's code prints cannot command whoever reads along.

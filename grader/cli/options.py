@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from grader import resources
+
 AssignmentName = Annotated[str, typer.Argument(help="Id of the assignment, or its folder.")]
 ReportFolder = Annotated[
     Path, typer.Option(help="Folder for report.html, result.json and the recordings.")
@@ -33,3 +35,8 @@ Verbose = Annotated[
         "--verbose", "-v", help="Show the build's log and what your nodes print, as it comes."
     ),
 ]
+
+
+def assignment_places(name: str) -> tuple[Path, Path]:
+    """Where an assignment may lie: at that path, or among those of rosgrade's own."""
+    return Path(name), resources.assignments() / name

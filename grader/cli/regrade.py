@@ -24,14 +24,15 @@ def regrade(
     ],
     assignment: Annotated[
         str | None,
-        typer.Argument(help="Id or folder; by default the one that the result names."),
+        typer.Argument(help="Id or folder; by default the one that it was graded with."),
     ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Judge again from the recordings, with the YAML as it is now. Nothing is run.
 
     Says what changed and why, and writes reports and results anew where there were some; of a
-    class, the results until now are kept beside them.
+    class, the results until now are kept beside them, and the gradebook and the overview follow,
+    also where only one submission of it is named.
     """
     from grader.batch.ledger import BATCH_FILE
 
@@ -43,25 +44,61 @@ def regrade(
 
 def _one(path: Path, assignment: str | None) -> None:
     from grader.assignment.load import load_assignment
+    from grader.batch.class_files import GRADES_FILE, standing, write_class
+    from grader.batch.class_regrading import regrade_row
     from grader.batch.files import write_graded
-    from grader.batch.regrading import compare, find, refuse_other
+    from grader.batch.ledger import Ledger, keep_earlier
+    from grader.batch.regrading import (
+        compare,
+        find,
+        refuse_other,
+        regrade_command,
+        stored_assignment,
+    )
     from grader.batch.regrading import regrade as judge_again
     from grader.report.facts import Clock
     from grader.report.terminal import print_grade
 
     found = find(path)
-    loaded = load_assignment(assignment or found.assignment)
+    name = assignment or stored_assignment(path, found.assignment, found.location, "regrade")
+    loaded = load_assignment(name)
     if found.result is not None:
         refuse_other(found.folder, found.result.assignment.id, loaded)
     clock = Clock()
     graded = judge_again(loaded, found)
     console = output_console()
+    console.print(f"Assignment: {loaded.file}", soft_wrap=True)
     print_grade(console, graded.grade, graded.recordings)
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
             console.print(line, markup=False)
-        written = write_graded(graded, found.folder, clock)
-        console.print(f"Report: {written.report}", soft_wrap=True)
+        batch = Ledger.around(found.folder)
+        if batch is None:
+            report = write_graded(graded, found.folder, clock).report
+            console.print(f"Report: {report}", soft_wrap=True)
+        else:
+            with batch.opened() as ledger:
+                rows = regrade_row(loaded, ledger, found.folder)
+                if not rows:
+                    write_graded(graded, found.folder, clock)
+                if any(row.changes for row in rows):
+                    keep_earlier(ledger.out / GRADES_FILE)
+                done = standing(ledger)
+                overview = write_class(done, ledger)
+            for row in rows:
+                console.print(f"Report: {ledger.folder(row.done.entry.key)}", soft_wrap=True)
+            console.print(f"Overview: {overview}", soft_wrap=True)
+            console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
+            others = sum(
+                item.result is not None and item.result.assignment.sha256 != loaded.sha256
+                for item in done
+            )
+            if others:
+                console.print(
+                    f"{others} of the class are still graded with another version of the "
+                    f"assignment: {regrade_command(batch.out, loaded)} judges all of them",
+                    soft_wrap=True,
+                )
     grade = graded.grade
     raise typer.Exit(NOT_GRADED if not grade.graded else 0 if grade.full_points else 1)
 
@@ -71,14 +108,18 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.class_regrading import regrade_class
     from grader.batch.ledger import Ledger, keep_earlier
+    from grader.batch.regrading import stored_assignment
 
     console = output_console()
     began_s = time.monotonic()
     rows = []
     with Ledger(path).opened() as ledger, ClassProgress(quiet) as progress:
         name, entries = ledger.read()
+        stored = assignment or stored_assignment(path, name, ledger.location(), "regrade")
+        loaded = load_assignment(stored)
+        console.print(f"Assignment: {loaded.file}", soft_wrap=True)
         progress.begin("judging", len(entries))
-        for row in regrade_class(load_assignment(assignment or name), ledger):
+        for row in regrade_class(loaded, ledger):
             rows.append(row)
             progress.advance(row.done.entry.key)
         if any(row.changes for row in rows):

@@ -22,6 +22,7 @@ from grader.cli.options import (
     Scenarios,
     Seed,
     Verbose,
+    assignment_places,
 )
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.resources import cache_folder
@@ -73,7 +74,7 @@ def watch(
     from grader.cli.browser import open_page
     from grader.cli.page import ReportPage
     from grader.errors import UsageError
-    from grader.report.files import check_folder
+    from grader.report.files import check_folder, refuse_inputs
     from grader.run.runner import Runner
     from grader.submission.locate import check_path
 
@@ -83,6 +84,8 @@ def watch(
         return select(shown, tuple(only or ()), tuple(scenario or ()))
 
     refuse_swapped(assignment, submission)
+    outputs = [report, report / "report.html"]
+    refuse_inputs(outputs, [*assignment_places(assignment), submission])
     loaded = load()
     check_path(submission)
     check_folder(report)

@@ -65,7 +65,9 @@ def grade(
         )
         results[name] = _result(bound[name], loaded, findings, roots)
     ordered = tuple(results[name] for name in bound)
-    return Grade(loaded.assignment, loaded.sha256, submission, ordered, loaded.withheld)
+    return Grade(
+        loaded.assignment, loaded.sha256, submission, ordered, loaded.withheld, loaded.location
+    )
 
 
 def _result(

@@ -85,6 +85,7 @@ class Grade:
         submission: What was handed in.
         results: One per check, in the author's order.
         withheld: Checks that were not judged because a student does not get to see them yet.
+        assignment_location: Where the assignment lies; None for one of rosgrade's own.
     """
 
     assignment: Assignment
@@ -92,6 +93,7 @@ class Grade:
     submission: SubmissionRecord
     results: tuple[CheckResult, ...]
     withheld: Withheld = NOTHING_WITHHELD
+    assignment_location: str | None = None
 
     @property
     def graded(self) -> bool:

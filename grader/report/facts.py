@@ -18,6 +18,7 @@ class RunFacts:
         environment: ``ros_distro``, ``rmw``, ``python``, ``sandbox``, ...
         rosgrade_version: Version of rosgrade that judged.
         recordings: Scenario id -> its recording, as a path relative to the report.
+        runs: Scenario id -> how often it was run, where that is known.
     """
 
     started: str
@@ -25,6 +26,7 @@ class RunFacts:
     environment: Mapping[str, str] = field(default_factory=dict)
     rosgrade_version: str = ""
     recordings: Mapping[str, str] = field(default_factory=dict)
+    runs: Mapping[str, int] = field(default_factory=dict)
 
 
 class Clock:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import secrets
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from grader.errors import GraderFault, UsageError
 
 _OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
+# How JSON, JUnit XML, pages and Markdown of ours begin.
+_WRITTEN = re.compile(
+    rb'\{\s*"(schema|score)"|(<\?xml[^>]*>\s*)?<testsuites\b|<!doctype html>|## \S+: ',
+    re.IGNORECASE,
+)
 
 
 def write_whole(file: Path, content: str | bytes) -> None:
@@ -42,6 +48,51 @@ def write_whole(file: Path, content: str | bytes) -> None:
     except OSError as error:
         kind = GraderFault if error.errno in _OF_THE_DISK else UsageError
         raise kind(f"{file} cannot be written: {_why(file, error)}") from error
+
+
+def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
+    """See that no output takes the place of an input, or of another output.
+
+    Args:
+        outputs: Files and folders that the command writes; None for an option that is not used.
+        inputs: Files and folders that it reads. A new file may be written into a folder among
+            them, and one that an earlier run wrote there may be replaced.
+
+    Raises:
+        UsageError: One does.
+    """
+    written: list[Path] = []
+    read = [one for one in inputs if one is not None]
+    for output in (one for one in outputs if one is not None):
+        for other in read:
+            if _is_same(output, other):
+                raise UsageError(f"{output}: this command reads it, so it is not overwritten")
+            if _is_of(output, other):
+                raise UsageError(
+                    f"{output}: is a file of {other}, which this command reads, so it is not "
+                    "overwritten"
+                )
+        if any(_is_same(output, other) for other in written):
+            raise UsageError(f"{output}: is named for two outputs")
+        written.append(output)
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one file or folder, also by a symbolic or a hard link."""
+    try:
+        return one.samefile(other)
+    except OSError:
+        return os.path.realpath(one) == os.path.realpath(other)
+
+
+def _is_of(file: Path, folder: Path) -> bool:
+    """Whether a file belongs to a folder, and was not written there by an earlier run."""
+    if not (file.is_file() and folder.is_dir()):
+        return False
+    if not Path(os.path.realpath(file)).is_relative_to(os.path.realpath(folder)):
+        return False
+    with file.open("rb") as stream:
+        return _WRITTEN.match(stream.read(200)) is None
 
 
 def check_folder(folder: Path) -> None:

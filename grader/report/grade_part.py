@@ -24,7 +24,7 @@ _CHECK = _FINDING | {
     "waits_for",
 }
 GRADE: dict[str, Any] = {
-    "assignment": True,
+    "assignment": {"id", "sha256"},
     # Its name is not among it: the same submission of somebody else gets the same grade.
     "submission": {"sha256", "problem"},
     "score": True,

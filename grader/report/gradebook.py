@@ -11,13 +11,14 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from grader.checks.finding import Status
 from grader.errors import UsageError
 from grader.nearest import did_you_mean
 from grader.report import words
+from grader.report.class_row import ClassRow, RowStatus
 from grader.report.clean import one_line
 from grader.report.result_model import Result
 
@@ -33,6 +34,9 @@ _CANVAS_ID = re.compile(r"\((\d+)\)\s*$")
 _DOWNLOAD = re.compile(r"^[^_]+_(?:LATE_)?(\d+)_\d+_")
 # What `rosgrade batch` calls whoever handed that in: name and user.
 _DOWNLOADED = re.compile(r"^([^_]+)_(\d+)$")
+# Canvas adds it to every course.
+_TEST_STUDENT = "Student, Test"
+_NEVER_RUN = (RowStatus.UNREADABLE, RowStatus.MISSING)
 _OPTIONAL = ("SIS User ID", "SIS Login ID", "Integration ID", "Root Account")
 
 
@@ -72,41 +76,62 @@ class CanvasFile:
     doubts: tuple[str, ...]
 
 
-def plain_csv(results: Sequence[Result]) -> str:
-    """A row for each submission, a column for each check.
+def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> str:
+    """The gradebook of a class: a row for everybody, a column for each check.
 
     Args:
-        results: All of one assignment.
+        rows: All of one assignment.
+        zero: What gets 0 points of the rows without a grade.
 
     Returns:
-        CSV. What could not be judged is an empty cell, and so is the score of a submission that
-        is not graded.
+        CSV. What could not be judged is an empty cell, and so is the score of a row that has no
+        grade.
 
     Raises:
-        UsageError: There are none, or they are of several assignments.
+        UsageError: The results are of several assignments.
     """
-    _one_assignment(results)
+    results = [row.result for row in rows if row.result is not None]
+    if results:
+        _one_assignment(results)
     checks: dict[str, float] = {}
     for result in results:
         for check in result.checks:
             checks.setdefault(check.id, check.max_points)
     header = [f"{name} ({words.number(most)})" for name, most in checks.items()]
-    rows = [["submission", "score", "max_score", "graded", *header]]
-    for result in results:
+    table = [
+        [
+            *("submission", "name", "late", "status", "score", "max_score", "graded"),
+            *header,
+            "note",
+        ]
+    ]
+    for row in rows:
+        judged = row.result.checks if row.result is not None else ()
         earned = {
-            check.id: "" if check.status is Status.ERROR else words.number(check.points)
-            for check in result.checks
+            check.id: words.number(check.points)
+            for check in judged
+            if check.status is not Status.ERROR and row.status is not RowStatus.UNREADABLE
         }
-        rows.append(
+        score = _score(row, zero)
+        table.append(
             [
-                cell(result.submission.id),
-                _score(result),
-                words.number(result.max_score),
-                "yes" if result.graded else "no",
+                cell(row.id),
+                cell(row.name),
+                "yes" if row.late else "",
+                row.status.value,
+                "" if score is None else words.number(score),
+                words.number(row.result.max_score) if row.result is not None else "",
+                "yes" if row.graded else "no",
                 *(earned.get(name, "") for name in checks),
+                cell(row.note),
             ]
         )
-    return _csv(rows)
+    return _csv(table)
+
+
+def _score(row: ClassRow, zero: Collection[RowStatus]) -> float | None:
+    """Points of a row: those that it was given, else 0 only where the instructor wants that."""
+    return 0.0 if row.score is None and row.status in zero else row.score
 
 
 def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
@@ -144,25 +169,31 @@ def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
 
 
 def canvas_csv(
-    results: Sequence[Result], export: CanvasExport, column: str | None = None
+    rows: Sequence[ClassRow],
+    export: CanvasExport,
+    column: str | None = None,
+    zero: Collection[RowStatus] = (),
 ) -> CanvasFile:
     """Fill a Canvas gradebook.
 
     Args:
-        results: All of one assignment.
+        rows: All of one assignment.
         export: The course's own gradebook.
         column: Title of the assignment in Canvas, with or without its number; by default the
             title of the column that the export has for the assignment's id.
+        zero: What gets 0 points of the rows without a grade. Students of the gradebook that no
+            row fits handed in nothing too.
 
     Raises:
-        UsageError: Canvas would drop the column or skip it, or no result fits a student.
+        UsageError: Canvas would drop the column or skip it, or no row fits a student.
     """
+    results = [row.result for row in rows if row.result is not None]
     assignment = _one_assignment(results)
     title = _column(export, column or assignment)
     ours = max(result.max_score for result in results)
     # Canvas takes this row for a change of the assignment, so what it says itself is kept.
     points = export.points.get(title) or words.number(ours)
-    rows = [
+    table = [
         [*export.identity, title],
         [f"    {_POINTS_POSSIBLE}", *[""] * (len(export.identity) - 1), points],
     ]
@@ -181,27 +212,34 @@ def canvas_csv(
             f"it.{did_you_mean(title, known) or listed}",
         )
     problems: list[str] = []
+    filled = 0
     taken: dict[int, str] = {}
-    for result in results:
-        who = one_line(result.submission.id)
-        found = _students(export, result.submission.id)
+    for who, row, found in _assigned(rows, export):
         if len(found) != 1:
             why = "no student of that name or number" if not found else "several students"
             problems.append(f"{who}: not matched, {why} in the gradebook")
-        elif found[0] in taken:
-            problems.append(f"{who}: the same student as {taken[found[0]]}, left out")
-        elif result.score is None:
-            problems.append(f"{who}: not graded, so the cell is left as it is")
-        elif title in export.excused[found[0]]:
-            problems.append(f"{who}: excused in Canvas, so the cell is left as it is")
+            continue
+        if found[0] in taken:
+            if row.status is not RowStatus.MISSING:
+                problems.append(f"{who}: the same student as {taken[found[0]]}, left out")
+            continue
+        score = _score(row, zero)
+        if title in export.excused[found[0]]:
+            # Who is excused owes nothing.
+            if row.status is not RowStatus.MISSING:
+                problems.append(f"{who}: excused in Canvas, so the cell is left as it is")
+                taken[found[0]] = who
+        elif score is None:
+            problems.append(f"{who}: {_why_no_score(row)}, so the cell is left as it is")
         else:
+            filled += 1
             taken[found[0]] = who
             name, *rest = export.students[found[0]]
             # Names are free text; the numbers after them are what Canvas matches by.
-            rows.append([cell(name), *rest[:-1], cell(rest[-1]), _score(result)])
-    if not taken:
+            table.append([cell(name), *rest[:-1], cell(rest[-1]), words.number(score)])
+    if not filled:
         raise UsageError("\n".join(["no score could be filled in:", *problems]))
-    return CanvasFile(_csv(rows), len(taken), tuple(problems), doubts)
+    return CanvasFile(_csv(table), filled, tuple(problems), doubts)
 
 
 def cell(text: str) -> str:
@@ -213,8 +251,30 @@ def cell(text: str) -> str:
     return f"'{shown}" if shown.lstrip().startswith(_FORMULA) else shown
 
 
-def _score(result: Result) -> str:
-    return "" if result.score is None else words.number(result.score)
+def _assigned(
+    rows: Sequence[ClassRow], export: CanvasExport
+) -> Iterator[tuple[str, ClassRow, list[int]]]:
+    """Each row with the students of the gradebook that it may belong to.
+
+    Behind them come the students that no row belongs to.
+    """
+    known: set[int] = set()
+    # A grade goes before what has none, such as what somebody handed in before.
+    for row in sorted(rows, key=lambda row: row.status in _NEVER_RUN):
+        found = _students(export, row.id)
+        known.update(found)
+        yield one_line(row.id), row, found
+    for number, student in enumerate(export.students):
+        if number not in known and student[0] != _TEST_STUDENT:
+            who = f"{one_line(student[0])} ({one_line(student[1])})"
+            yield who, ClassRow(student[1], missing=True), [number]
+
+
+def _why_no_score(row: ClassRow) -> str:
+    if row.status is RowStatus.MISSING:
+        return "handed in nothing"
+    problem = row.result.submission.problem if row.result is not None else None
+    return "not graded" if problem is None else f"unreadable ({one_line(problem)})"
 
 
 def _excused(columns: Sequence[str], cells: Sequence[str]) -> Iterator[str]:

@@ -7,6 +7,7 @@ style by their hashes.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
@@ -15,69 +16,17 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from grader.checks.finding import Status
+from grader.report.class_row import ClassRow, RowStatus
 from grader.report.clean import one_line
 from grader.report.distribution import draw_distribution
 from grader.report.html import asset, environment
 from grader.report.policy import content_security_policy
-from grader.report.result_model import CheckPart, Result
+from grader.report.result_model import CheckPart
 from grader.report.svg import element
 from grader.report.words import STATUS, number
 
-DISTURBED_S = 0.1
-"""So much taken by the host from one run is worth a look."""
 MOST_DISTURBED = 50
-
-
-@dataclass(frozen=True)
-class OverviewRow:
-    """One row of a class.
-
-    Attributes:
-        id: Key of the submission, unique.
-        name: Of whoever handed it in; may be empty.
-        report: The HTML report, relative to the overview, or None where there is none.
-        result: As in ``result.json``, or None where nothing could be graded at all.
-        note: What an instructor should know, in a few words; empty for an ordinary one.
-        late: Whether it was handed in late.
-    """
-
-    id: str
-    name: str = ""
-    report: str | None = None
-    result: Result | None = None
-    note: str = ""
-    late: bool = False
-
-    @property
-    def graded(self) -> bool:
-        """Whether it has a score."""
-        return self.result is not None and self.result.graded
-
-    @property
-    def full(self) -> bool:
-        """Whether it got all points."""
-        return (
-            self.result is not None and self.graded and self.result.score == self.result.max_score
-        )
-
-    @property
-    def disturbed(self) -> bool:
-        """Whether the host took noticeably from one of its runs."""
-        return self.result is not None and any(
-            run.disturbance.taken_s >= DISTURBED_S or run.faults for run in self.result.scenarios
-        )
-
-    @property
-    def states(self) -> str:
-        """Words that the page filters by."""
-        found = {
-            "full": self.full,
-            "lost": self.graded and not self.full,
-            "ungraded": not self.graded,
-            "disturbed": self.disturbed,
-            "late": self.late,
-        }
-        return " ".join(word for word, holds in found.items() if holds)
+_UNGRADED = (RowStatus.NOT_GRADED, RowStatus.UNREADABLE, RowStatus.MISSING)
 
 
 @dataclass(frozen=True)
@@ -104,16 +53,17 @@ class Column:
 
 @dataclass(frozen=True)
 class Disturbed:
-    """A run from which the host took time."""
+    """A scenario that was run again because the machine disturbed it."""
 
-    row: OverviewRow
+    row: ClassRow
     scenario: str
+    runs: int
     taken_s: float
     worst_late_s: float
     faults: tuple[str, ...]
 
 
-def render_overview(rows: Sequence[OverviewRow]) -> str:
+def render_overview(rows: Sequence[ClassRow]) -> str:
     """Render the overview of a class.
 
     Args:
@@ -124,7 +74,7 @@ def render_overview(rows: Sequence[OverviewRow]) -> str:
         the folder that it is written to.
     """
     columns = _columns(rows)
-    scores = [row.result.score or 0.0 for row in rows if row.result is not None and row.graded]
+    scores = [row.score for row in rows if row.score is not None]
     most = max((row.result.max_score for row in rows if row.result is not None), default=0.0)
     style, script = asset("report.css") + asset("overview.css"), asset("overview.js")
     return (
@@ -141,7 +91,9 @@ def render_overview(rows: Sequence[OverviewRow]) -> str:
             mean=sum(scores) / len(scores) if scores else 0.0,
             most=most,
             distribution=draw_distribution(scores, most, "distribution"),
-            ungraded=[row for row in rows if not row.graded],
+            ungraded=[row for status in _UNGRADED for row in rows if row.status is status],
+            counts=Counter(row.status for row in rows),
+            RowStatus=RowStatus,
             why=_why_ungraded,
             disturbed=_disturbed(rows),
             link=_link,
@@ -152,11 +104,11 @@ def render_overview(rows: Sequence[OverviewRow]) -> str:
     )
 
 
-def _columns(rows: Sequence[OverviewRow]) -> tuple[Column, ...]:
+def _columns(rows: Sequence[ClassRow]) -> tuple[Column, ...]:
     """Every check of the class, in the order of the assignment."""
     found: dict[str, Column] = {}
     for row in rows:
-        for check in row.result.checks if row.result is not None else ():
+        for check in _checks(row):
             column = found.setdefault(
                 check.id,
                 Column(check.id, check.title, check.max_points, dict.fromkeys(Status, 0)),
@@ -165,18 +117,25 @@ def _columns(rows: Sequence[OverviewRow]) -> tuple[Column, ...]:
     return tuple(found.values())
 
 
+def _checks(row: ClassRow) -> Sequence[CheckPart]:
+    """What was judged of a row: of what cannot be read, nothing was."""
+    if row.result is None or row.status is RowStatus.UNREADABLE:
+        return ()
+    return row.result.checks
+
+
 def _failed_most(columns: Sequence[Column]) -> list[Column]:
     """Checks that somebody failed, the most failed first."""
     failed = [column for column in columns if column.counts[Status.FAILED]]
     return sorted(failed, key=lambda column: -column.counts[Status.FAILED])
 
 
-def _line(row: OverviewRow, columns: Sequence[Column]) -> Markup:
+def _line(row: ClassRow, columns: Sequence[Column]) -> Markup:
     """The cells of a row, each a link to the check in the report.
 
     Made by hand and not by the template: a class has tens of thousands of them.
     """
-    checks = {check.id: check for check in row.result.checks} if row.result is not None else {}
+    checks = {check.id: check for check in _checks(row)}
     page = _link(row)
     return Markup("").join(_cell(checks.get(column.id), page) for column in columns)
 
@@ -194,7 +153,7 @@ def _cell(check: CheckPart | None, page: str) -> Markup:
     return element("td", element("a", said, class_=kind, href=anchor))
 
 
-def _link(row: OverviewRow) -> str:
+def _link(row: ClassRow) -> str:
     """Where the report of a row is; nothing where it has none.
 
     Quoted, so that a name never becomes a scheme or another host.
@@ -204,24 +163,31 @@ def _link(row: OverviewRow) -> str:
     return "./" + quote(row.report.lstrip("/").encode("utf-8", "surrogateescape"))
 
 
-def _why_ungraded(row: OverviewRow) -> str:
+def _why_ungraded(row: ClassRow) -> str:
     """Why a row has no score, in the words of the first error."""
     if row.result is not None:
+        if row.result.submission.problem:
+            return row.result.submission.problem
         for check in row.result.checks:
             if check.status is Status.ERROR:
                 return f"{one_line(check.title)}: {one_line(check.observed)}"
-        if row.result.submission.problem:
-            return row.result.submission.problem
     return row.note or "nothing was graded"
 
 
-def _disturbed(rows: Sequence[OverviewRow]) -> list[Disturbed]:
-    """The most disturbed runs of the class, the worst first."""
+def _disturbed(rows: Sequence[ClassRow]) -> list[Disturbed]:
+    """The runs that were repeated or could not be used, the most repeated first."""
     found = [
-        Disturbed(row, run.id, run.disturbance.taken_s, run.disturbance.worst_late_s, run.faults)
+        Disturbed(
+            row,
+            run.id,
+            run.runs,
+            run.disturbance.taken_s,
+            run.disturbance.worst_late_s,
+            run.faults,
+        )
         for row in rows
         if row.result is not None
         for run in row.result.scenarios
-        if run.disturbance.taken_s >= DISTURBED_S or run.faults
+        if run.disturbed
     ]
-    return sorted(found, key=lambda item: -item.taken_s)[:MOST_DISTURBED]
+    return sorted(found, key=lambda item: (-item.runs, -item.taken_s))[:MOST_DISTURBED]

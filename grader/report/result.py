@@ -19,12 +19,12 @@ from grader.report.files import write_whole
 from grader.report.remarks import remarks
 from grader.report.result_model import (
     SCHEMA,
+    AssignmentPart,
     BuildPart,
     CheckPart,
     DisturbancePart,
     EvidencePart,
     FindingPart,
-    Identity,
     Result,
     ScenarioPart,
     SubmissionPart,
@@ -45,7 +45,11 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
     return Result(
         schema_=SCHEMA,
         rosgrade_version=facts.rosgrade_version,
-        assignment=Identity(id=grade.assignment.id, sha256=grade.assignment_sha256),
+        assignment=AssignmentPart(
+            id=grade.assignment.id,
+            sha256=grade.assignment_sha256,
+            location=grade.assignment_location,
+        ),
         submission=SubmissionPart(
             id=submission.id, sha256=submission.sha256, problem=submission.problem
         ),
@@ -56,7 +60,11 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
         checks=tuple(_check(result) for result in grade.results),
         withheld=WithheldPart(checks=grade.withheld.checks, points=grade.withheld.points),
         scenarios=tuple(
-            _scenario(recordings[scenario.id], facts.recordings.get(scenario.id))
+            _scenario(
+                recordings[scenario.id],
+                facts.recordings.get(scenario.id),
+                facts.runs.get(scenario.id, 1),
+            )
             for scenario in grade.assignment.scenarios
             if scenario.id in recordings
         ),
@@ -156,7 +164,7 @@ def _finding(item: ScenarioFinding) -> FindingPart:
     )
 
 
-def _scenario(recording: Recording, file: str | None) -> ScenarioPart:
+def _scenario(recording: Recording, file: str | None, runs: int) -> ScenarioPart:
     begin, end = recording.launched_ns, recording.end_ns
     return ScenarioPart(
         id=recording.scenario,
@@ -171,4 +179,5 @@ def _scenario(recording: Recording, file: str | None) -> ScenarioPart:
         faults=recording.faults,
         breaches=tuple(str(breach) for breach in recording.breaches),
         remarks=remarks(recording),
+        runs=runs,
     )

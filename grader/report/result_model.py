@@ -57,6 +57,12 @@ class Identity(_Part):
     sha256: Text
 
 
+class AssignmentPart(Identity):
+    """The assignment; ``location`` is its path where it is not one of rosgrade's own."""
+
+    location: Text | None = None
+
+
 class SubmissionPart(Identity):
     """What was handed in; ``problem`` says why nothing of it could be read."""
 
@@ -193,7 +199,8 @@ class ScenarioPart(_Part):
     """One run; ``recording`` is relative to the folder of the result.
 
     ``breaches`` are limits of the sandbox that were reached, ``remarks`` what else an instructor
-    should know although it costs nothing by itself.
+    should know although it costs nothing by itself, ``runs`` how often it was run because the
+    machine disturbed it.
     """
 
     id: Text
@@ -205,6 +212,12 @@ class ScenarioPart(_Part):
     faults: tuple[Text, ...]
     breaches: tuple[Text, ...] = ()
     remarks: tuple[Text, ...] = ()
+    runs: int = 1
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether it was run again, or could not be used."""
+        return self.runs > 1 or bool(self.faults)
 
 
 class BuildPart(_Part):
@@ -229,7 +242,7 @@ class Result(_Part):
 
     schema_: Literal[1]
     rosgrade_version: Text
-    assignment: Identity
+    assignment: AssignmentPart
     submission: SubmissionPart
     score: Number | None
     max_score: Number

@@ -77,11 +77,12 @@ def test_a_class_is_graded_and_nobody_is_forgotten(
     assert rows["cai"]["score"] == "10"
     assert rows["cai"]["note"] == "the same submission as ana"
     assert rows["cai"]["name"] == "'=cmd()"
-    assert rows["dee"]["score"] == "0"
+    assert (rows["dee"]["status"], rows["dee"]["score"]) == ("unreadable", "")
     assert rows["dee"]["note"].startswith("not in the roster; dee.zip: is broken")
     assert rows["fay"]["score"] == "" and rows["fay"]["note"] == "handed in nothing"
     assert len(rows) == 6
-    assert "5 of 6 graded" in ended.stdout and "1 handed in nothing" in ended.stdout
+    assert "3 of 6 graded" in ended.stdout
+    assert "2 unreadable, without a score; 1 handed in nothing" in ended.stdout
     overview = (out / "index.html").read_text(encoding="utf-8")
     assert "submissions/ana/report.html" in overview
     twin = json.loads((out / "submissions" / "cai" / "result.json").read_text())

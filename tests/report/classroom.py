@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from grader.report.overview import OverviewRow
+from grader.report.class_row import ClassRow
 from grader.report.result import make_result
 from grader.report.result_model import Result
 from tests.report.sample import full_points, lost_points, not_built, not_graded
@@ -16,15 +16,15 @@ def _results() -> tuple[Result, ...]:
     return tuple(make_result(item.grade, item.recordings, item.facts) for item in samples)
 
 
-def classroom(size: int) -> list[OverviewRow]:
+def classroom(size: int) -> list[ClassRow]:
     """Rows of a class; every tenth is not graded, and one of these has no result at all."""
     full, lost, broken, error = _results()
     rows = []
     for index in range(size):
         name = f"student {index:02}"
         if index == 9:
-            rows.append(OverviewRow(name, note="the archive is damaged"))
+            rows.append(ClassRow(name, note="the archive is damaged"))
             continue
         result = error if index % 10 == 9 else (full, lost, lost, broken, full)[index % 5]
-        rows.append(OverviewRow(name, "", f"{name}/report.html", result, late=index % 7 == 3))
+        rows.append(ClassRow(name, "", f"{name}/report.html", result, late=index % 7 == 3))
     return rows

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.errors import GraderFault, UsageError
-from grader.report.files import check_folder, write_whole
+from grader.report.files import check_folder, refuse_inputs, write_whole
 
 
 def test_folders_are_made_and_text_is_utf_8(tmp_path):
@@ -72,3 +72,36 @@ def test_a_full_disk_is_no_wrong_use(tmp_path, monkeypatch):
     with pytest.raises(GraderFault, match=r"result\.json cannot be written: No space left"):
         write_whole(tmp_path / "result.json", "text")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("how", ["itself", "symbolic link", "hard link", "other path", "in it"])
+def test_an_output_never_takes_the_place_of_an_input(tmp_path, how):
+    read = tmp_path / "work" / "canvas.csv"
+    read.parent.mkdir()
+    read.write_text("Student,ID,Section\n")
+    output = {
+        "itself": read,
+        "in it": read,
+        "other path": tmp_path / "work/../work/canvas.csv",
+    }.get(how, tmp_path / "link.csv")
+    if how == "symbolic link":
+        output.symlink_to(read)
+    if how == "hard link":
+        os.link(read, output)
+    with pytest.raises(UsageError, match="this command reads"):
+        refuse_inputs([None, output], [None, read.parent if how == "in it" else read])
+
+
+@pytest.mark.parametrize(
+    "before", ['{\n  "schema": 1', "<testsuites name=", "## lesson: 3 of 4 points", None]
+)
+def test_an_output_of_an_earlier_run_is_replaced_also_within_a_submission(tmp_path, before):
+    output = tmp_path / "out.txt"
+    if before is not None:
+        output.write_text(before)
+    refuse_inputs([output], [tmp_path])
+
+
+def test_two_outputs_do_not_take_each_other_s_place(tmp_path):
+    with pytest.raises(UsageError, match="is named for two outputs"):
+        refuse_inputs([tmp_path / "a", tmp_path / "b" / ".." / "a"], [])

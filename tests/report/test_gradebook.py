@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from grader.errors import UsageError
 from grader.grade import grade
-from grader.report.gradebook import canvas_csv, cell, plain_csv, read_canvas
+from grader.report.class_row import ClassRow, RowStatus
+from grader.report.gradebook import canvas_csv, cell, grades_csv, read_canvas
 from grader.report.result import make_result
 from tests.grade.sample import Told, make_loaded, make_recording, make_submission
 from tests.report.sample import full_points, lost_points, make_facts, not_graded
@@ -30,6 +31,20 @@ def result(name, make=full_points):
     sample = make()
     found = make_result(sample.grade, sample.recordings, sample.facts)
     return found.model_copy(update={"submission": found.submission.model_copy(update={"id": name})})
+
+
+def row(key, make=full_points, **changes):
+    return ClassRow(key, result=result(key, make), **changes)
+
+
+def unreadable(name):
+    found = result(name, lost_points)
+    part = found.submission.model_copy(update={"problem": "a.zip: is broken"})
+    return ClassRow(name, result=found.model_copy(update={"submission": part, "score": 0.0}))
+
+
+def missing(name):
+    return ClassRow(name, missing=True)
 
 
 def rows(text):
@@ -51,8 +66,8 @@ def canvas_reads(text):
     }
 
 
-def fill(results, export=EXPORT, column="ROS 2 Publisher"):
-    return canvas_csv(results, read_canvas(export), column)
+def fill(class_rows, export=EXPORT, column="ROS 2 Publisher", zero=()):
+    return canvas_csv(class_rows, read_canvas(export), column, zero)
 
 
 @pytest.mark.parametrize(
@@ -69,14 +84,15 @@ def fill(results, export=EXPORT, column="ROS 2 Publisher"):
     ],
 )
 def test_a_student_is_found_by_what_canvas_knows(name):
-    filled = fill([result(name)])
+    filled = fill([row(name)])
     assert canvas_reads(filled.text) == {"90211": {"ROS 2 Publisher (48211)": "3"}}
-    assert filled.problems == ()
+    # The other student of the gradebook handed in nothing.
+    assert [problem.partition(":")[0] for problem in filled.problems] == ["Ng, Wei (90212)"]
 
 
 def test_a_number_behind_another_name_is_nobody():
     with pytest.raises(UsageError, match="team_90211: not matched"):
-        fill([result("team_90211")])
+        fill([row("team_90211")])
 
 
 def test_a_quote_that_never_ends_is_told():
@@ -85,11 +101,11 @@ def test_a_quote_that_never_ends_is_told():
 
 
 def test_a_late_download_is_found_too():
-    assert fill([result("lopezana_LATE_90211_77_hw.zip")]).filled == 1
+    assert fill([row("lopezana_LATE_90211_77_hw.zip")]).filled == 1
 
 
 def test_identity_is_kept_and_others_are_not_touched():
-    filled = fill([result("90212")])
+    filled = fill([row("90212")])
     header, points, student = rows(filled.text)
     assert header == [*EXPORT.splitlines()[0].split(",")[:5], "ROS 2 Publisher (48211)"]
     assert points == ["    Points Possible", "", "", "", "", "10"]
@@ -98,40 +114,40 @@ def test_identity_is_kept_and_others_are_not_touched():
 
 def test_the_points_of_canvas_are_kept_and_others_are_told():
     # With another number in this row Canvas changes the assignment.
-    filled = fill([result("90212")], EXPORT)
+    filled = fill([row("90212")], EXPORT)
     assert rows(filled.text)[1][-1] == "10"
     assert filled.doubts == (
         "ROS 2 Publisher (48211) has 10 points in Canvas and 3 here; the scores are filled in as "
         "they are",
     )
-    assert fill([result("90212")], EXPORT.replace(",10,", ',"3,00",')).doubts == ()
+    assert fill([row("90212")], EXPORT.replace(",10,", ',"3,00",')).doubts == ()
 
 
 def test_a_column_that_is_new_to_canvas_is_told():
-    filled = fill([result("90212")], column="ROS2 Publisher")
+    filled = fill([row("90212")], column="ROS2 Publisher")
     assert filled.doubts == (
         "the gradebook has no column 'ROS2 Publisher': Canvas will offer to make a new assignment "
         "of it. Did you mean 'ROS 2 Publisher'?",
     )
-    (told,) = fill([result("90212")], EXPORT.replace("ROS 2 Publisher (48211)", "Essay")).doubts
+    (told,) = fill([row("90212")], EXPORT.replace("ROS 2 Publisher (48211)", "Essay")).doubts
     assert told.endswith("a new assignment of it. There are: Essay.")
 
 
 def test_a_column_that_canvas_would_skip_is_refused():
     locked = EXPORT.replace(",10,", ",(read only),")
     with pytest.raises(UsageError, match=r"Canvas skips the column 'ROS 2 Publisher \(48211\)'"):
-        fill([result("90212")], locked)
+        fill([row("90212")], locked)
 
 
 def test_whoever_has_no_score_is_listed_with_the_reason():
     filled = fill(
         [
-            result("90211", lost_points),
-            result("90212", not_graded),
-            result("nobody"),
-            result("Ng, Wei"),
-            result("alopez"),
-            result("90213"),
+            row("90211", lost_points),
+            row("90212", not_graded),
+            row("nobody"),
+            row("Ng, Wei"),
+            row("alopez"),
+            row("90213"),
         ]
     )
     assert canvas_reads(filled.text) == {"90211": {"ROS 2 Publisher (48211)": "3.02"}}
@@ -146,11 +162,11 @@ def test_whoever_has_no_score_is_listed_with_the_reason():
 
 def test_where_nobody_fits_nothing_is_written():
     with pytest.raises(UsageError, match="no score could be filled in:\nnobody: not matched"):
-        fill([result("nobody")])
+        fill([row("nobody")])
 
 
 def test_a_column_that_canvas_does_not_know_is_made():
-    filled = fill([result("90211")], column=None)
+    filled = fill([row("90211")], column=None)
     assert canvas_reads(filled.text) == {"90211": {"timed_publisher": "3"}}
 
 
@@ -160,20 +176,20 @@ def test_a_column_that_canvas_does_not_know_is_made():
 )
 def test_a_title_that_canvas_would_drop_is_refused(title):
     with pytest.raises(UsageError, match="Canvas drops a column called"):
-        fill([result("90211")], column=title)
+        fill([row("90211")], column=title)
 
 
 def test_a_title_that_stands_twice_must_be_named_whole():
     twice = EXPORT.replace("Final Score", "ROS 2 Publisher (5)").replace("(read only)", "10")
     with pytest.raises(UsageError, match=r"several times: .*\(48211\), ROS 2 Publisher \(5\)"):
-        fill([result("90211")], twice)
-    assert fill([result("90211")], twice, "ROS 2 Publisher (5)").filled == 1
+        fill([row("90211")], twice)
+    assert fill([row("90211")], twice, "ROS 2 Publisher (5)").filled == 1
 
 
 def test_semicolons_and_a_byte_order_mark_are_read():
     lines = [row.replace(",", ";") for row in EXPORT.splitlines() if '"' not in row]
     text = "\ufeff" + "\n".join([*lines, '"Lopez, Ana";90211;s1001;alopez;Sec 1;9,5;'])
-    assert canvas_reads(fill([result("alopez")], text).text)["90211"]
+    assert canvas_reads(fill([row("alopez")], text).text)["90211"]
 
 
 @pytest.mark.parametrize(
@@ -206,26 +222,75 @@ def test_what_canvas_accepts_is_accepted(header):
 
 
 def test_the_plain_csv_has_a_column_for_each_check():
-    text = plain_csv([result("ada", lost_points), result("bob", lost_points)])
-    assert rows(text)[:2] == [
+    text = grades_csv([row("ada", lost_points, name="Ada", late=True, note="n")])
+    assert rows(text) == [
         [
-            *("submission", "score", "max_score", "graded"),
-            *("builds (1)", "period (3)", "steady (2)", "ends (1)"),
+            *("submission", "name", "late", "status", "score", "max_score", "graded"),
+            *("builds (1)", "period (3)", "steady (2)", "ends (1)", "note"),
         ],
-        ["ada", "3.02", "7", "yes", "1", "1.02", "0", "1"],
+        ["ada", "Ada", "yes", "graded", "3.02", "7", "yes", "1", "1.02", "0", "1", "n"],
     ]
 
 
 def test_what_is_not_graded_has_no_score_in_it():
-    header, row = rows(plain_csv([result("ada", not_graded)]))
-    assert dict(zip(header, row, strict=True)) == {
+    header, cells = rows(grades_csv([row("ada", not_graded)]))
+    assert dict(zip(header, cells, strict=True)) == {
         "submission": "ada",
+        "name": "",
+        "late": "",
+        "status": "not graded",
         "score": "",
         "max_score": "4",
         "graded": "no",
         "node (2)": "2",
         "depth (1)": "",
         "period (1)": "",
+        "note": "",
+    }
+
+
+def test_no_zero_is_written_for_what_was_never_run_unless_the_instructor_says_so():
+    never_run = [unreadable("90211"), missing("wng"), row("90213")]
+    export = EXPORT.replace("EX", "")
+    found = [dict(zip(*pair, strict=True)) for pair in by_row(grades_csv(never_run))]
+    assert [(one["status"], one["score"], one["graded"]) for one in found] == [
+        ("unreadable", "", "no"),
+        ("missing", "", "no"),
+        ("graded", "3", "yes"),
+    ]
+    filled = fill(never_run, export)
+    assert list(canvas_reads(filled.text)) == ["90213"]
+    assert filled.problems == (
+        "90211: unreadable (a.zip: is broken), so the cell is left as it is",
+        "wng: handed in nothing, so the cell is left as it is",
+    )
+    zero = (RowStatus.UNREADABLE, RowStatus.MISSING)
+    found = [dict(zip(*pair, strict=True)) for pair in by_row(grades_csv(never_run, zero))]
+    assert [(one["status"], one["score"]) for one in found][:2] == [
+        ("unreadable", "0"),
+        ("missing", "0"),
+    ]
+    scores = canvas_reads(fill(never_run, export, zero=zero).text)
+    assert [one["ROS 2 Publisher (48211)"] for one in scores.values()] == ["3", "0", "0"]
+    assert fill(never_run, export, zero=[RowStatus.MISSING]).filled == 2
+
+
+def by_row(text):
+    header, *cells = rows(text)
+    return [(header, one) for one in cells]
+
+
+def test_students_of_the_gradebook_without_any_row_handed_in_nothing():
+    filled = fill([row("90212")])
+    # The test student is nobody, and who is excused owes nothing.
+    (problem,) = filled.problems
+    assert problem == "Lopez, Ana (90211): handed in nothing, so the cell is left as it is"
+
+
+def test_a_grade_goes_before_what_could_not_be_read():
+    both = [unreadable("90211"), row("alopez")]
+    assert canvas_reads(fill(both, zero=[RowStatus.UNREADABLE]).text)["90211"] == {
+        "ROS 2 Publisher (48211)": "3"
     }
 
 
@@ -235,9 +300,9 @@ def test_results_of_two_assignments_are_not_mixed():
         update={"assignment": other.assignment.model_copy(update={"id": "qos"})}
     )
     with pytest.raises(UsageError, match="several assignments: qos, timed_publisher"):
-        plain_csv([result("ada"), other])
+        grades_csv([row("ada"), ClassRow("bob", result=other)])
     with pytest.raises(UsageError, match="there is no result"):
-        plain_csv([])
+        fill([missing("ada")])
 
 
 @settings(deadline=None)
@@ -249,6 +314,7 @@ def test_no_cell_is_a_formula(text):
     found = make_result(
         grade(loaded, make_submission(id=text), {"listen": make_recording()}), {}, make_facts()
     )
-    read = rows(plain_csv([found]))
+    read = rows(grades_csv([ClassRow(text, name=text, result=found, note=text)]))
     assert len(read) == 2 and len({len(row) for row in read}) == 1
-    assert not read[1][0].lstrip().startswith(("=", "+", "-", "@"))
+    for said in (*read[1][:2], read[1][-1]):
+        assert not said.lstrip().startswith(("=", "+", "-", "@"))

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from grader.report.overview import OverviewRow, render_overview
+from grader.report.class_row import ClassRow
+from grader.report.overview import render_overview
 from tests.report.classroom import classroom
 from tests.report.page import Page
 from tests.report.test_html import ATTACKS, sha256
@@ -26,7 +27,7 @@ def test_median_and_mean_are_of_those_who_were_graded():
     full = classroom(1)[0]
     rows = [replace(full, id=str(i), result=full.result.model_copy(update={"score": score}))
             for i, score in enumerate((0.0, 1.0, 3.0))]  # fmt: skip
-    text = squeezed(render_overview([*rows, OverviewRow("x", note="empty")]))
+    text = squeezed(render_overview([*rows, ClassRow("x", note="empty")]))
     assert "Median 1 / 3 points" in text and "Mean 1.33 / 3 points" in text
     assert "Full points 1" in text
 
@@ -54,15 +55,37 @@ def test_without_a_report_there_are_no_links():
     assert links == ["#matrix"]
 
 
-def test_a_disturbed_run_is_listed_with_what_was_taken():
+def test_only_what_was_run_again_is_listed_as_disturbed():
     row = classroom(1)[0]
     run = row.result.scenarios[0]
     disturbance = run.disturbance.model_copy(update={"taken_s": 0.25})
-    scenario = run.model_copy(update={"disturbance": disturbance})
-    row = replace(row, result=row.result.model_copy(update={"scenarios": (scenario,)}))
-    assert "Disturbed runs" in squeezed(render_overview([row]))
-    assert "student 00 listen 250 ms 0 ms" in squeezed(render_overview([row]))
+    once = run.model_copy(update={"disturbance": disturbance})
+
+    def page(scenario):
+        return squeezed(
+            render_overview(
+                [replace(row, result=row.result.model_copy(update={"scenarios": (scenario,)}))]
+            )
+        )
+
+    assert "Disturbed runs" not in page(once)
+    assert "student 00 listen 2 250 ms 0 ms" in page(once.model_copy(update={"runs": 2}))
+    assert "the disk is full" in page(once.model_copy(update={"faults": ("the disk is full",)}))
     assert "Disturbed runs" not in squeezed(render_overview(classroom(1)))
+
+
+def test_what_cannot_be_read_counts_neither_as_a_score_nor_as_failed_checks():
+    full, lost = classroom(2)
+    part = lost.result.submission.model_copy(update={"problem": "a.zip: is broken"})
+    broken = lost.result.model_copy(update={"submission": part, "score": 0.0})
+    rows = [full, replace(lost, result=broken), ClassRow("eve", missing=True)]
+    html = render_overview(rows)
+    text = squeezed(html)
+    assert "Submissions 3 Graded 1 Unreadable 1 Handed in nothing 1 Median 3" in text
+    assert "No check failed." in text
+    assert "student 01 : a.zip: is broken" in text
+    states = re.findall(r'<tr data-is="([^"]*)">', html)
+    assert [state.split()[0] for state in states] == ["full", "unreadable", "missing"]
 
 
 def test_an_empty_class():
@@ -93,8 +116,8 @@ def test_only_its_own_style_and_script_may_run():
 @pytest.mark.parametrize("attack", [*ATTACKS, "//example.org/x", "javascript:alert(1)"])
 def test_hostile_names_add_nothing_and_lead_nowhere(attack):
     row = classroom(2)[1]
-    rows = [OverviewRow(attack, attack, attack, row.result, attack)]
-    harmless = Page(render_overview([OverviewRow("a", "a", "a", row.result, "a")]))
+    rows = [ClassRow(attack, attack, attack, row.result, attack)]
+    harmless = Page(render_overview([ClassRow("a", "a", "a", row.result, "a")]))
     found = Page(render_overview(rows))
     assert found.problems == []
     assert [tag for tag, _ in found.elements] == [tag for tag, _ in harmless.elements]

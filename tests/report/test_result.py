@@ -5,12 +5,22 @@ import re
 
 import pytest
 
+from grader.assignment.load import load_assignment
 from grader.checks.finding import Evidence, Finding, Plot
 from grader.errors import UsageError
 from grader.grade import grade
 from grader.report.result import make_result, read_result, result_json, result_schema, write_result
+from tests.assignment.lessons import GOOD
 from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
-from tests.report.sample import Sample, everywhere, full_points, lost_points, not_built, not_graded
+from tests.report.sample import (
+    Sample,
+    everywhere,
+    full_points,
+    lost_points,
+    make_facts,
+    not_built,
+    not_graded,
+)
 
 
 def written(sample: Sample):
@@ -55,7 +65,16 @@ def test_the_score_and_what_to_fix():
     data = written(lost_points())
     assert (data["schema"], data["score"], data["max_score"]) == (1, 3.02, 7.0)
     assert (data["graded"], data["first_to_fix"]) == (True, "period")
-    assert data["assignment"] == {"id": "timed_publisher", "sha256": "ab" * 32}
+    assert data["assignment"]["id"] == "timed_publisher"
+    assert data["assignment"]["sha256"] == "ab" * 32
+
+
+def test_where_the_assignment_lies_is_known_unless_it_is_one_of_rosgrade_s_own(tmp_path):
+    (tmp_path / "lesson").mkdir()
+    (tmp_path / "lesson" / "assignment.yaml").write_text(GOOD, encoding="utf-8")
+    for name, location in ((tmp_path / "lesson", str(tmp_path / "lesson")), ("qos", None)):
+        judged = grade(load_assignment(name), make_submission(), {})
+        assert make_result(judged, {}, make_facts()).assignment.location == location
 
 
 def test_a_check_with_its_evidence():
@@ -90,6 +109,7 @@ def test_a_run():
         "faults": [],
         "breaches": [],
         "remarks": [],
+        "runs": 1,
     }
 
 

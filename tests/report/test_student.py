@@ -16,8 +16,9 @@ from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Status, Table
 from grader.grade import grade
 from grader.report import classroom50, explanation, github
+from grader.report.class_row import ClassRow
 from grader.report.foxglove import render_layout
-from grader.report.gradebook import plain_csv
+from grader.report.gradebook import grades_csv
 from grader.report.gradescope import render_gradescope
 from grader.report.html import render_report
 from grader.report.junit import render_junit
@@ -114,7 +115,7 @@ def formats_of(result):
     yield render_junit(copy)
     yield render_junit(copy, xunit1=True)
     yield render_markdown(copy)
-    yield plain_csv([copy])
+    yield grades_csv([ClassRow(copy.submission.id, result=copy)])
     yield from github.annotation_lines(result)
     yield github.summary(result)
     yield github.outputs(result, "EOF")

@@ -1,0 +1,222 @@
+"""`rosgrade regrade`, `report` and `export` on a class that was graded: all of it stays one."""
+
+from __future__ import annotations
+
+import csv
+import io
+import shutil
+from pathlib import Path
+
+import pytest
+
+from grader.assignment.load import LoadedAssignment, load_assignment
+from grader.batch.class_files import standing, write_class
+from grader.batch.files import write_graded
+from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
+from grader.batch.ledger import Entry, Ledger
+from grader.grade import grade
+from grader.recording.fact import to_json
+from grader.report.facts import Clock
+from grader.submission.prepare import Prepared
+from grader.submission.record import SubmissionRecord
+from tests.cli.conftest import Rosgrade
+
+YAML = """\
+rosgrade: 1
+id: lesson
+title: Test
+packages: [{name: bot, executables: [bot]}]
+scenarios:
+  - {id: run, launch: [{executable: bot}], timeout: 5 s}
+checks:
+  - {id: package, uses: package.found, with: {package: bot}, points: 1}
+  - {id: other, uses: package.found, with: {package: bot}, points: 1}
+"""
+BROKEN = "zed.zip: is broken"
+
+
+def graded(loaded: LoadedAssignment, name: str, sha256: str, problem: str | None) -> Graded:
+    """A submission without any package, judged."""
+    record = SubmissionRecord(name, sha256, problem)
+    return Graded(grade(loaded, record, {}), Prepared(record, None), {}, {}, {}, {})
+
+
+@pytest.fixture
+def lesson(tmp_path: Path) -> Path:
+    folder = tmp_path / "my lessons" / "lesson"
+    folder.mkdir(parents=True)
+    (folder / "assignment.yaml").write_text(YAML, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture
+def out(tmp_path: Path, lesson: Path) -> Path:
+    """A class: ana and cai handed in the same, zed an archive that is broken, eve nothing."""
+    loaded = load_assignment(lesson)
+    rows = [
+        Entry("ana", "Ana", sha256="a"),
+        Entry("ben", "Ben", late=True, sha256="b"),
+        Entry("cai", same_as="ana", sha256="a"),
+        Entry("eve", problem="handed in nothing"),
+        Entry("zed", sha256="z"),
+    ]
+    with Ledger(tmp_path / "out").opened() as ledger:
+        for row in rows:
+            if row.sha256:
+                problem = BROKEN if row.key == "zed" else None
+                result = graded(loaded, row.key, row.sha256, problem)
+                partial = ledger.partial(row.key)
+                (partial / RECORDINGS_FOLDER).mkdir()
+                facts = partial / RECORDINGS_FOLDER / SUBMISSION_FILE
+                facts.write_bytes(to_json(result.prepared.record))
+                write_graded(result, partial, Clock())
+                ledger.put(row.key, partial)
+        ledger.write(rows, "lesson", loaded.sha256, loaded.location)
+        write_class(standing(ledger), ledger)
+    return tmp_path / "out"
+
+
+def grades(text: str) -> dict[str, dict[str, str]]:
+    return {row["submission"]: row for row in csv.DictReader(io.StringIO(text))}
+
+
+def with_more_points(lesson: Path) -> None:
+    file = lesson / "assignment.yaml"
+    file.write_text(YAML.replace("points: 1", "points: 2"), encoding="utf-8")
+
+
+def test_a_regrade_of_one_submission_brings_the_whole_class_up_to_date(
+    rosgrade: Rosgrade, out: Path, lesson: Path
+) -> None:
+    with_more_points(lesson)
+    ended = rosgrade("regrade", out / "submissions" / "ana")
+    assert ended.returncode == 1, ended.stderr
+    assert f"Assignment: {lesson}/assignment.yaml" in ended.stdout
+    found = grades((out / "grades.csv").read_text())
+    # Who handed in the same has the same grade.
+    assert [found[key]["max_score"] for key in ("ana", "ben", "cai")] == ["4", "2", "4"]
+    assert list((out / "submissions" / "cai" / "earlier").glob("result-*.json"))
+    assert "/ 4" in (out / "index.html").read_text(encoding="utf-8")
+    assert "2 of the class are still graded with another version" in ended.stdout
+    assert f"`rosgrade regrade {out} '{lesson}'`" in ended.stdout
+    whole = rosgrade("regrade", out)
+    assert whole.returncode == 0, whole.stderr
+    assert grades((out / "grades.csv").read_text())["ben"]["max_score"] == "4"
+
+
+def test_what_report_recommends_names_the_assignment_and_works(
+    rosgrade: Rosgrade, out: Path, lesson: Path
+) -> None:
+    folder = out / "submissions" / "ben"
+    assert rosgrade("report", folder).returncode == 0
+    with_more_points(lesson)
+    ended = rosgrade("report", folder)
+    assert ended.returncode == 2
+    assert f"`rosgrade regrade {folder} '{lesson}'` judges again" in ended.stderr
+
+
+@pytest.mark.parametrize("command", ["regrade", "report"])
+def test_an_assignment_that_is_not_where_it_was_is_asked_for(
+    rosgrade: Rosgrade, out: Path, lesson: Path, command: str
+) -> None:
+    moved = lesson.parent.parent / "lesson"
+    shutil.move(lesson, moved)
+    for path in (out, out / "submissions" / "ana"):
+        ended = rosgrade(command, path)
+        assert ended.returncode == 2
+        assert (
+            f"was graded with the assignment 'lesson' in {lesson}, which is not there any more"
+            in (ended.stderr)
+        )
+        assert f"name its folder: `rosgrade {command} {path} FOLDER`" in ended.stderr or (
+            path == out and "FOLDER`" in ended.stderr
+        )
+        assert rosgrade(command, path, moved).returncode in (0, 1)
+
+
+def test_an_own_assignment_of_an_older_result_is_asked_for(
+    rosgrade: Rosgrade, out: Path, lesson: Path
+) -> None:
+    file = out / "batch.json"
+    file.write_text(file.read_text().replace(f'"location": "{lesson}"', '"more": 0'))
+    ended = rosgrade("regrade", out)
+    assert ended.returncode == 2
+    assert f"{out}: was graded with the assignment 'lesson'; name its folder: " in ended.stderr
+    assert rosgrade("regrade", out, lesson).returncode == 0
+    assert rosgrade("regrade", out).returncode == 0
+
+
+def test_the_export_of_a_class_is_its_gradebook(rosgrade: Rosgrade, out: Path) -> None:
+    written = out.parent / "export.csv"
+    assert rosgrade("export", "csv", out, "-o", written).returncode == 0
+    assert written.read_bytes() == (out / "grades.csv").read_bytes()
+    found = grades(written.read_text())
+    assert {key: (row["status"], row["score"]) for key, row in found.items()} == {
+        "ana": ("graded", "0"),
+        "ben": ("graded", "0"),
+        "cai": ("graded", "0"),
+        "eve": ("missing", ""),
+        "zed": ("unreadable", ""),
+    }
+    assert (found["ben"]["name"], found["ben"]["late"]) == ("Ben", "yes")
+    assert found["eve"]["note"] == "handed in nothing" and found["zed"]["note"] == BROKEN
+    rosgrade("export", "csv", out, "-o", written, "--zero", "unreadable", "--zero", "missing")
+    assert {row["score"] for row in grades(written.read_text()).values()} == {"0"}
+
+
+def test_no_export_overwrites_what_it_reads(rosgrade: Rosgrade, out: Path, lesson: Path) -> None:
+    gradebook = out.parent / "canvas.csv"
+    gradebook.write_text("Student,ID,Section\nAna,ana,1\n")
+    result = out / "submissions" / "ana" / "result.json"
+    before = [file.read_bytes() for file in (gradebook, result)]
+    for arguments in (
+        ("canvas", out, "--canvas", gradebook),
+        ("canvas", out, "--canvas", gradebook, "-o", gradebook.parent / "." / "canvas.csv"),
+        ("canvas", out, "--canvas", gradebook, "-o", result),
+        ("csv", out, "-o", result),
+        ("csv", out, "-o", out / "batch.json"),
+        ("gradescope", lesson, "--out", lesson),
+        ("classroom50", lesson, "--out", lesson / "more"),
+        ("github", lesson, "--action", "./x", "--out", lesson),
+    ):
+        ended = rosgrade("export", *arguments)
+        assert ended.returncode == 2, arguments
+        assert "this command reads" in ended.stderr or "would be a part of" in ended.stderr
+    assert [file.read_bytes() for file in (gradebook, result)] == before
+    assert sorted(item.name for item in lesson.iterdir()) == ["assignment.yaml"]
+
+
+def test_no_other_command_overwrites_what_it_reads(
+    rosgrade: Rosgrade, out: Path, lesson: Path
+) -> None:
+    folder = out.parent / "class" / "ana"
+    folder.mkdir(parents=True)
+    (folder / "package.xml").write_text("<package/>")
+    roster = out.parent / "roster.csv"
+    roster.write_text("login,submission\nana,class/ana\n")
+    one, yaml = out / "submissions" / "ana", lesson / "assignment.yaml"
+    before = {file: file.read_bytes() for file in (folder / "package.xml", roster, yaml)}
+    for arguments in (
+        ("check", lesson, folder, "--report", folder),
+        ("check", lesson, folder, "--json", folder / "package.xml"),
+        ("check", lesson, folder, "--junit", yaml),
+        ("check", lesson, folder, "--gradescope", "a.json", "--markdown", "./a.json"),
+        ("check", lesson, folder, "--gradescope", "m", "--gradescope-metadata", "m"),
+        ("watch", lesson, folder, "--report", folder),
+        ("batch", lesson, folder.parent, "--out", folder.parent),
+        ("batch", lesson, folder.parent, "--out", folder / "results"),
+        ("batch", lesson, folder.parent, "--out", lesson / "results"),
+        ("batch", lesson, folder.parent, "--out", roster, "--roster", roster),
+        ("batch", lesson, roster, "--out", folder / "results"),
+        ("report", one, "--junit", one / "result.json"),
+        ("report", one, "--markdown", one / "recordings" / "submission.json"),
+        ("show", lesson, "--html", "--out", yaml),
+    ):
+        ended = rosgrade(*arguments, *(["--sandbox", "none"] * (arguments[0] == "batch")))
+        assert ended.returncode == 2, (arguments, ended.stderr)
+        assert any(
+            said in ended.stderr
+            for said in ("this command reads", "would be a part of", "named for two outputs")
+        ), (arguments, ended.stderr)
+    assert {file: file.read_bytes() for file in before} == before
+    assert [item.name for item in folder.iterdir()] == ["package.xml"]
