@@ -8,9 +8,9 @@ from grader.checks.command import Command, command_topic, commands, is_zero
 from grader.checks.compatibility import compatibility_table, refusals
 from grader.checks.death import cause_of_death, dead
 from grader.checks.finding import Evidence, Moment
-from grader.checks.ground import nearest
+from grader.checks.ground import ahead, nearest
 from grader.checks.lateness import taken_s
-from grader.checks.measure import speed
+from grader.checks.measure import metres, speed
 from grader.checks.node_absence import why_no_node
 from grader.checks.scan import misreading
 from grader.checks.sighting import endpoints_seen, first_seen
@@ -152,7 +152,10 @@ def _asks_nothing(recording: Recording, sent: tuple[Command, ...]) -> Cause | No
     misread = misreading(recording, last.time_ns, around)
     if misread is not None:
         return Cause(f"{seen}; {misread.words}", misread.hint, evidence)
-    return Cause(seen, "Which branch of the callback publishes? Log what it compares.", evidence)
+    sight = None if recording.scene is None else ahead(recording.scene, last)
+    where = f"; {code(sight.name)} is {metres(sight.distance_m)} straight ahead" if sight else ""
+    hint = "Which branch of the callback publishes? Log what it compares."
+    return Cause(f"{seen}{where}", hint, evidence)
 
 
 def _in_vain(recording: Recording, sent: tuple[Command, ...]) -> Cause:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
+from grader.checks.exchanged_executables import why_exchanged
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence
 from grader.checks.sighting import nodes_seen, until_the_end
@@ -151,6 +152,9 @@ def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
             ours=True,
             disturbed=True,
         )
+    exchanged = why_exchanged(recording)
+    if exchanged is not None:
+        return exchanged.after(there)
     return Cause(
         there,
         f"The node's name is the argument of super().__init__('{base}') in its constructor.",

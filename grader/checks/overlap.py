@@ -11,6 +11,7 @@ from grader.assignment.unit import format_duration
 from grader.checks import concurrency
 from grader.checks.callback_run import Overlap, Reports, Run, overlaps, read_reports, spans
 from grader.checks.check import Subject, check
+from grader.checks.exchanged_executables import why_exchanged
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.unreported import Reported, why_unreported
 from grader.checks.wording import code, codes, counted, listing
@@ -54,12 +55,13 @@ def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
             Evidence(spans=spans(recording, reports)),
         )
     worst = max(found, key=lambda item: item.seconds)
-    declared = concurrency.declared_words(recording)
+    exchanged = why_exchanged(recording)
+    declared = exchanged.observed if exchanged else concurrency.declared_words(recording)
     return Finding.failed(
         expected,
         f"{_overlap_words(recording, worst)}, and {counted(len(found), 'overlap')} in all"
         + (f"; {declared}" if declared else ""),
-        _exclusion_hint(recording, names, worst),
+        exchanged.hint if exchanged else _exclusion_hint(recording, names, worst),
         Evidence(
             moments=(
                 Moment(
@@ -181,12 +183,15 @@ def _serial(
     )
     if excused is not None:
         return excused
-    declared = concurrency.declared_words(recording)
+    exchanged = why_exchanged(recording)
+    declared = exchanged.observed if exchanged else concurrency.declared_words(recording)
     ended = reports.ended({callback, *parameters.others})
     return Finding.failed(
         expected,
         observed + (f"; {declared}" if declared else ""),
-        _concurrency_hint(recording, len({callback, *parameters.others})),
+        exchanged.hint
+        if exchanged
+        else _concurrency_hint(recording, len({callback, *parameters.others})),
         Evidence(
             moments=(Moment("first run", recording.since_launch_s(ended[0].begin_ns)),),
             spans=spans(recording, reports, reports.of(callback)),

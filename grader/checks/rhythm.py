@@ -157,6 +157,13 @@ def _wrong_period(
             "Create one timer in the constructor: it goes on by itself, and keeps its period "
             "whatever the callback needs.",
         )
+    if right and verdict.regular and _comes_round(recording, limits):
+        return Explanation(
+            f"{longer} too long, although the executor comes round in time: the timer of {wanted} "
+            "is started anew after its callback was called",
+            "timer.reset() lets the period begin anew: without it the timer goes on by itself, and "
+            "keeps its period whatever the callback needs.",
+        )
     if right:
         return Explanation(
             f"{longer} too long: the process declared a timer of {wanted}, but the executor "

@@ -23,7 +23,7 @@ _LONGEST_QUOTE = 80
 _SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
 ENDED_HINT = (
     "Publish in every call of the callback. Look for a counter or a condition that ends it, for "
-    "timer.cancel(), and for a callback that does not return."
+    "timer.cancel() and timer.reset(), and for a callback that does not return."
 )
 # After so many periods of silence a timer has stopped.
 _ENDED_PERIODS = 3.0
@@ -402,7 +402,8 @@ def _idle(recording: Recording, topic: str) -> Cause:
     return Cause(
         seen,
         "Is publish(msg) reached in the callback? An `except: pass` hides the error that would "
-        "tell why not, a lock that is never free keeps it waiting, and timer.cancel() ends it.",
+        "tell why not, a lock that is never free keeps it waiting, timer.cancel() ends it, and "
+        "timer.reset() again and again lets its period never end.",
         evidence,
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
+from grader.checks.exchanged_executables import why_exchanged
 from grader.checks.finding import Evidence, Table
 from grader.checks.near_name import Named, why_misnamed
 from grader.checks.node_absence import why_no_node
@@ -68,6 +69,9 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
             ours=True,
             disturbed=True,
         )
+    exchanged = why_exchanged(recording)
+    if exchanged is not None:
+        return exchanged.after(f"there is no {kind.value} on {code(topic)}")
     if recording.student_endpoints(_OTHER[kind], topic):
         other = _OTHER[kind]
         return Cause(

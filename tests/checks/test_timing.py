@@ -344,9 +344,14 @@ class TestMistakes:
         assert "the executor does not come round to it in time" in found
 
     def test_a_callback_that_takes_longer_than_the_period(self):
-        found = wrong([0.42] * 10)
+        found = wrong([0.42] * 10, calls=tuple(call(0.8 + 0.5 * n, 0.4) for n in range(6)))
         assert "120 ms too long: the process declared a timer of 300 ms" in found
         assert "Keep callbacks short" in found
+
+    def test_a_timer_that_is_reset_in_its_callback(self):
+        found = wrong([0.32] * 10)
+        assert "20 ms too long, although the executor comes round in time" in found
+        assert "timer.reset()" in found and "Keep callbacks short" not in found
 
     def test_a_timer_made_anew_in_each_callback(self):
         anew = (*declarations(), *(declarations()[4:5] * 9))
