@@ -203,6 +203,8 @@ def _outside_code(text: str) -> str:
 def _fields_table(one: type[BaseModel]) -> str:
     schema = one.model_json_schema(by_alias=True)
     definitions = schema.get("$defs", {})
+    # A model that holds itself is among its own definitions.
+    schema = definitions.get(str(schema.get("$ref", "")).rpartition("/")[2], schema)
     required = schema.get("required", [])
     fields = {field.alias or name: field for name, field in one.model_fields.items()}
     rows = []

@@ -190,6 +190,14 @@ _ADVICE = {
     "but found '-'": "is a list indented less than the list before?",
     "but got '['": "does a text with brackets or commas need quotes around it?",
     "but found '<scalar>'": "does a text with quotes, brackets or commas need quotes around it?",
+    "unknown escape character": "in double quotes a backslash begins an escape: write the text in "
+    "single quotes, as in '\\d+'",
+    "undefined alias": "a text that begins with * needs quotes",
+    "but found ','": "something stands behind a closing quote or bracket",
+    "but got ':'": "is a comma or a closing bracket missing before it?",
+    "but got ']'": "the bracket that was opened is of another kind",
+    "but got '}'": "the bracket that was opened is of another kind",
+    "expected <block end>": "does this line stand as far to the right as those that it belongs to?",
 }
 
 

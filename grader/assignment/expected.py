@@ -9,21 +9,22 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from grader.assignment.asking import CallService, SendGoal
 from grader.assignment.binding import BoundCheck
-from grader.assignment.document import Place
 from grader.assignment.interfaces import Interfaces
 from grader.assignment.message import Find
 from grader.assignment.model import Assignment, Scenario
+from grader.assignment.requests import SEPARATOR
 from grader.assignment.source import Source
 from grader.assignment.stimulus import Publish
-from grader.checks import following, log
+from grader.checks.check import NamedFields
 from grader.checks.field import value_at
-from grader.checks.messages import Equal
-from grader.checks.value import NoSuchField, expected_leaves
+from grader.checks.value import NoSuchField, expected_leaves, tolerance_of, unreachable
 from grader.errors import Problem
-from grader.recording.interface import TEXTS, fields_of
+from grader.recording.interface import FLOATS, TEXTS, fields_of
 
 _INDEX = re.compile(r"\[\d+\]")
+_ZERO = {"bool": False, **dict.fromkeys(FLOATS, 0.0)}
 
 
 def problems(
@@ -38,47 +39,67 @@ def problems(
         known: Definitions at hand.
     """
     for index, bound in enumerate(checks):
-        parameters = bound.parameters
-        if not isinstance(parameters, Equal | following.Follows | log.Follows):
-            continue
-        for interface in _types(assignment, bound, parameters.topic):
-            try:
-                message = _sample(interface, known.find)
-            except KeyError:
-                continue
-            for place, lack in _lacks(parameters, message):
-                text = f"{parameters.topic} ({interface}): {lack}"
-                yield source.problem(("checks", index, "with", *place), text)
+        for named in bound.parameters.named_fields():
+            for interface in _types(assignment, bound, named.endpoint):
+                try:
+                    message = _sample(interface, _part(known.find, interface, named.part))
+                except (KeyError, IndexError):
+                    continue
+                lack = _lack(named, message)
+                if lack:
+                    text = f"{named.endpoint} ({interface}): {lack}"
+                    yield source.problem(("checks", index, "with", *named.place), text)
 
 
-def _types(assignment: Assignment, bound: BoundCheck, topic: str) -> list[str]:
-    """The types that a topic has in the scenarios of a check."""
+def _types(assignment: Assignment, bound: BoundCheck, endpoint: str) -> list[str]:
+    """The types that a topic, a service or an action has in the scenarios of a check."""
     wanted = bound.spec.scenarios
     judged = [one for one in assignment.scenarios if not wanted or one.id in wanted]
-    found = (_type(scenario, topic) for scenario in judged)
+    found = (_type(scenario, endpoint) for scenario in judged)
     return list(dict.fromkeys(interface for interface in found if interface is not None))
 
 
-def _type(scenario: Scenario, topic: str) -> str | None:
-    sent = {one.publish: one.type for one in scenario.stimuli if isinstance(one, Publish)}
-    return {**sent, **scenario.recorded_types}.get(topic)
+def _type(scenario: Scenario, endpoint: str) -> str | None:
+    used: dict[str, str] = {}
+    for one in scenario.stimuli:
+        if isinstance(one, Publish):
+            used[one.publish] = one.type
+        elif isinstance(one, CallService):
+            used[one.call] = one.type
+        elif isinstance(one, SendGoal):
+            used[one.send_goal] = one.type
+    return {**used, **scenario.recorded_types}.get(endpoint)
 
 
-def _lacks(
-    parameters: Equal | following.Follows | log.Follows, message: dict[str, Any]
-) -> Iterator[tuple[Place, str]]:
-    if isinstance(parameters, Equal):
-        try:
-            expected_leaves(parameters.value, message)
-        except NoSuchField as error:
-            yield ("value",), str(error)
-        return
-    for number, field in enumerate(parameters.fields):
-        try:
-            value_at(message, _INDEX.sub("[0]", field))
-        except NoSuchField as error:
-            inside = field if isinstance(parameters, following.Follows) else number
-            yield ("fields", inside), str(error)
+def _part(find: Find, interface: str, number: int) -> Find:
+    """Find definitions, of the interface itself only one part.
+
+    Raises:
+        KeyError: It is not at hand.
+        IndexError: It has fewer parts.
+    """
+    text = SEPARATOR.split(find(interface))[number]
+    return lambda name: text if name == interface else find(name)
+
+
+def _lack(named: NamedFields, message: dict[str, Any]) -> str:
+    """Why a message cannot be as a check expects it, or nothing."""
+    try:
+        if isinstance(named.fields, str):
+            value_at(message, _INDEX.sub("[0]", named.fields))
+            return ""
+        if _INDEX.search("".join(named.fields)):
+            wanted = dict(named.fields)
+        else:
+            wanted = expected_leaves(named.fields, message)
+        for path, expected in wanted.items():
+            sample = value_at(message, _INDEX.sub("[0]", path))
+            why = unreachable(expected, sample, tolerance_of(named.tolerance, path))
+            if why:
+                return f"{path} {why}"
+    except NoSuchField as error:
+        return str(error)
+    return ""
 
 
 def _sample(interface: str, find: Find, around: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -97,7 +118,7 @@ def _sample(interface: str, find: Find, around: tuple[str, ...] = ()) -> dict[st
         raise KeyError(interface)
     found: dict[str, Any] = {}
     for name, field in fields_of(interface, find(interface)).items():
-        plain: Any = "" if field.type in TEXTS else 0
+        plain: Any = "" if field.type in TEXTS else _ZERO.get(field.type, 0)
         value = _sample(field.type, find, (*around, interface)) if field.is_message else plain
         found[name] = [value] if field.is_array else value
     return found

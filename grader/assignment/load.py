@@ -10,7 +10,7 @@ from pathlib import Path
 
 from grader import resources
 from grader.assignment import expected, interfaces, rules, simulation, stimulation
-from grader.assignment.binding import BoundCheck, bind
+from grader.assignment.binding import BoundCheck, bind, tell_apart
 from grader.assignment.draft import Draft
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.source import Source, read_source
@@ -155,7 +155,7 @@ def load_assignment(
     if assignment is None or found:
         raise AssignmentError(file, sorted(found, key=lambda problem: problem.line or 0))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
-    return LoadedAssignment(assignment, file, digest, tuple(checks))
+    return LoadedAssignment(assignment, file, digest, tuple(tell_apart(checks)))
 
 
 def _fit(source: Source, catalogue: Mapping[str, Check]) -> tuple[list[BoundCheck], list[Problem]]:

@@ -12,11 +12,12 @@ author is trusted, a student never is.
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
@@ -26,8 +27,11 @@ from pydantic import ConfigDict, create_model
 from pydantic.errors import PydanticUserError
 
 from grader.checks.check import Check, Parameters, Subject
+from grader.checks.finding import Finding
 from grader.nearest import did_you_mean
 
+# Expressions that are never a finding; `early or Finding.passed(...)` may well be one.
+_NO_FINDING = (ast.Constant, ast.Compare, ast.UnaryOp, ast.JoinedStr, ast.List, ast.Tuple, ast.Dict)
 _FORM = re.compile(r"([A-Za-z_]\w*\.py):([A-Za-z_]\w*)")
 
 
@@ -119,12 +123,46 @@ def _check(name: str, function: Callable[..., Any]) -> Check:
             raise ValueError(f"{name}: the argument '{argument}' cannot be given as a key of with")
     keys = [argument.name for argument in arguments[1:]]
     parameters = _parameters(name, function, arguments[1:])
+    _refuse_other_returns(name, function)
 
     def judge(recording: Any, values: Parameters) -> Any:
         return function(recording, **{key: getattr(values, key) for key in keys})
 
     judge.__doc__ = inspect.getdoc(function) or f"{function.__name__.replace('_', ' ')}."
     return Check(name, Subject.RECORDING, parameters, judge)
+
+
+def _refuse_other_returns(name: str, function: Callable[..., Any]) -> None:
+    """Find what is returned in place of a finding, as far as it can be seen without a call.
+
+    Raises:
+        ValueError: Something else is returned, or nothing.
+    """
+    file = Path(function.__code__.co_filename)
+    tree = ast.parse(file.read_bytes())
+    defined = [one for one in tree.body if isinstance(one, ast.FunctionDef)]
+    body = next((one for one in reversed(defined) if one.name == function.__name__), None)
+    if body is None:
+        return
+    returns = list(_returns(body))
+    for found in returns:
+        if found.value is None or isinstance(found.value, _NO_FINDING):
+            raise ValueError(
+                f"{file.name}:{found.lineno}: {name.partition(':')[2]}() must return a Finding, "
+                f"not {ast.unparse(found.value) if found.value else 'nothing'}: "
+                "Finding.passed(expected, observed) or Finding.failed(expected, observed, hint)"
+            )
+    if not returns and not isinstance(body.body[-1], ast.Raise):
+        raise ValueError(f"{name}: the function returns nothing: it must return a Finding")
+
+
+def _returns(node: ast.AST) -> Iterator[ast.Return]:
+    """The return statements of a function, without those of functions inside it."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Return):
+            yield child
+        elif not isinstance(child, ast.FunctionDef | ast.Lambda | ast.ClassDef):
+            yield from _returns(child)
 
 
 def _parameters(
@@ -137,6 +175,9 @@ def _parameters(
             required = argument.default is inspect.Parameter.empty
             default = ... if required else argument.default
             fields[argument.name] = (hints.get(argument.name, Any), default)
+        returned = hints.get("return", Finding)
+        if isinstance(returned, type) and not issubclass(returned, Finding):
+            raise ValueError(f"{name}: it returns {returned.__name__}: a check returns a Finding")
         return create_model(function.__name__, __base__=_OwnParameters, **fields)
     except (NameError, TypeError, AttributeError, PydanticUserError) as error:
         said = str(error).splitlines()[0]

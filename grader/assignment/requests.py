@@ -13,7 +13,7 @@ from grader.assignment.message import Find, MessageError, read_message
 from grader.assignment.messages import StimulusError
 from grader.errors import UsageError
 
-_SEPARATOR = re.compile(r"^---\s*$", re.MULTILINE)
+SEPARATOR = re.compile(r"^---\s*$", re.MULTILINE)
 _SCALARS = (bool, int, float, str)
 
 
@@ -105,7 +105,7 @@ def _part(
 
     def first(name: str) -> str:
         text = find(name)
-        return _SEPARATOR.split(text)[0] if name == interface else text
+        return SEPARATOR.split(text)[0] if name == interface else text
 
     try:
         return read_message(value, interface, first, drawn)

@@ -209,11 +209,38 @@ def _check(draft: Draft, index: int, bound: BoundCheck) -> Iterator[Problem]:
                 text = f"there is no scenario {scenario!r}."
                 listed = f" The scenarios are: {', '.join(known)}."
                 yield problem((*place, "scenarios", number), text + (advice or listed))
+        yield from _unnamed(draft, place, bound)
         yield from _robot(draft, place, bound)
         yield from _topic(draft, place, bound)
         yield from _stimulus(draft, place, bound)
     yield from asking_problems(draft, place, bound)
     yield from _package_of(draft, place, bound)
+
+
+def _unnamed(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
+    """A check of all scenarios would judge one program in the runs of another, too."""
+    if bound.spec.scenarios:
+        return
+    launched = {
+        scenario.id: sorted(map(_program, scenario.launch))
+        for scenario in draft.scenarios_of(bound.spec) or ()
+    }
+    first = next(iter(launched), None)
+    for scenario, programs in launched.items():
+        if first is not None and programs != launched[first]:
+            text = (
+                f"name the 'scenarios' that it judges, for they do not launch the same: {first!r} "
+                f"launches {', '.join(launched[first])}, but {scenario!r} {', '.join(programs)}"
+            )
+            yield draft.source.problem(place, text)
+            return
+
+
+def _program(launch: Launch) -> str:
+    """What is launched, with everything that gives its nodes and topics other names."""
+    renamed = [*launch.remap.items(), ("__node", launch.name), ("__ns", launch.namespace)]
+    rules = ", ".join(f"{old}:={new}" for old, new in renamed if new is not None)
+    return f"'{launch.program}'" + (f" ({rules})" if rules else "")
 
 
 def _robot(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:

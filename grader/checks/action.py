@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import Field, model_validator
@@ -10,12 +11,13 @@ from grader.assignment.model import InterfaceName, TopicName
 from grader.assignment.quantity import Duration, Frequency, Ratio
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.fields import (
-    TOLERANCE,
+    FieldTolerance,
     difference_table,
     difference_words,
     fields_hint,
+    toleranced,
     unlike,
 )
 from grader.checks.fields import words as fields_words
@@ -28,7 +30,7 @@ from grader.checks.goals import (
     why_rejected,
 )
 from grader.checks.offered import ACTION, is_offered
-from grader.checks.value import NoSuchField
+from grader.checks.value import EXACT, NoSuchField
 from grader.checks.wording import code, counted, percent
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
@@ -64,6 +66,10 @@ class OfGoals(Parameters):
         description="Which goals are judged: those with these fields; by default all that the "
         "check can be about.",
     )
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields of the goal."""
+        yield NamedFields(("goal",), self.action, self.goal)
 
     @property
     def words(self) -> str:
@@ -132,6 +138,11 @@ class FeedbackOf(OfGoals):
         default_factory=dict, description="Expected fields of the last feedback of a goal."
     )
 
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields of the goal and of the feedback."""
+        yield from super().named_fields()
+        yield NamedFields(("last",), self.action, self.last, part=2)
+
     @model_validator(mode="after")
     def _enough(self) -> FeedbackOf:
         if self.rate is not None and self.at_least < 3:
@@ -194,7 +205,7 @@ def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf
         rate_hz = _rate_hz(goal)
         if abs(rate_hz - parameters.rate) > parameters.tolerance * parameters.rate:
             return _other_rate(recording, goal, parameters, rate_hz)
-    wrong = unlike(found[-1].value, parameters.last, TOLERANCE)
+    wrong = unlike(found[-1].value, parameters.last, EXACT)
     if wrong:
         return Cause(
             f"the last feedback has {difference_words(wrong)}",
@@ -240,10 +251,13 @@ class Result(OfGoals):
         pattern="^(succeeded|aborted)$",
         description="How the goal ends: `succeeded` or `aborted`.",
     )
-    tolerance: float = Field(
-        TOLERANCE, ge=0, allow_inf_nan=False, description="Largest difference of two numbers."
-    )
+    tolerance: FieldTolerance = EXACT
     within: Duration = Field(description="How long after the goal the result may come.")
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields of the goal and of the result."""
+        yield from super().named_fields()
+        yield from toleranced("result", self.action, self.result, self.tolerance, part=1)
 
 
 @check("action.result", Subject.RECORDING, Result)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
 from grader.assignment.source import Model
 from grader.checks.finding import Finding
+from grader.checks.value import EXACT, Tolerance
 
 
 class Subject(str, Enum):
@@ -21,8 +22,31 @@ class Subject(str, Enum):
     """One run: a :class:`~grader.recording.model.Recording`."""
 
 
+@dataclass(frozen=True)
+class NamedFields:
+    """Fields of a message, a request or an answer that a check names, for validation.
+
+    Attributes:
+        place: Where they stand below ``with``.
+        endpoint: The topic, service or action that they are exchanged on.
+        fields: What is expected of which field, nested or by path; or one path.
+        part: Of the definition: 0 message, request or goal; 1 response or result; 2 feedback.
+        tolerance: Largest difference of two numbers.
+    """
+
+    place: tuple[str | int, ...]
+    endpoint: str
+    fields: Mapping[str, Any] | str
+    part: int = 0
+    tolerance: Tolerance = EXACT
+
+
 class Parameters(Model):
     """Base of every check's parameters (the ``with`` of the YAML)."""
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields that the check names, so that a misspelt one is found before any run."""
+        yield from ()
 
 
 class NoParameters(Parameters):

@@ -3,15 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field
+
+from grader.checks.check import NamedFields
+from grader.checks.field import FieldPath
 from grader.checks.finding import Table
-from grader.checks.value import Difference, differences, expected_leaves
+from grader.checks.value import EXACT, Difference, Tolerance, differences, expected_leaves
 from grader.checks.wording import codes, value_text
 
 _MOST_FIELDS = 6
-TOLERANCE = 1e-9
-"""Largest difference of two numbers that are meant to be the same."""
+
+_Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+FieldTolerance = Annotated[
+    _Amount | dict[FieldPath, _Amount],
+    Field(
+        description="Largest difference of two numbers; or by field, such as `{sum: 0.1}`: the "
+        "numbers of other fields must be exact."
+    ),
+]
+
+
+def toleranced(
+    key: str,
+    endpoint: str,
+    fields: Mapping[str, Any],
+    tolerance: Tolerance = EXACT,
+    *,
+    part: int = 0,
+) -> Iterator[NamedFields]:
+    """The fields below one key of ``with``, and those that have a tolerance of their own."""
+    yield NamedFields((key,), endpoint, fields, part, tolerance)
+    for path in tolerance if isinstance(tolerance, Mapping) else ():
+        yield NamedFields(("tolerance", path), endpoint, path, part)
 
 
 def has_fields(value: Mapping[str, Any], wanted: Mapping[str, Any] | None) -> bool:
@@ -20,11 +45,11 @@ def has_fields(value: Mapping[str, Any], wanted: Mapping[str, Any] | None) -> bo
     Raises:
         NoSuchField: It cannot have such a field.
     """
-    return not wanted or not unlike(value, wanted, TOLERANCE)
+    return not wanted or not unlike(value, wanted, EXACT)
 
 
 def unlike(
-    value: Mapping[str, Any], wanted: Mapping[str, Any], tolerance: float
+    value: Mapping[str, Any], wanted: Mapping[str, Any], tolerance: Tolerance
 ) -> tuple[Difference, ...]:
     """The wanted fields that a value has not.
 

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from pydantic import Field
 
 from grader.assignment.name import TopicName
 from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.checks.made_of import MadeOf, Sample
 from grader.checks.sighting import endpoints_seen
 from grader.checks.silence import why_few, why_silent
-from grader.checks.source_value import SourceText, mistakes, spread
+from grader.checks.source_value import SourceText, SourceValue, mistakes, spread
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted, listing
 from grader.recording.model import NS, Kind, Recording
@@ -55,6 +55,14 @@ class Follows(Parameters):
         validate_default=False,
     )
     at_least: int = Field(5, ge=1, description="How many messages must have come to judge.")
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The judged fields, and those of the source."""
+        for field, text in self.fields.items():
+            value = SourceValue.of(text)
+            yield NamedFields(("fields", field), self.topic, field)
+            for path in value.paths:
+                yield NamedFields(("fields", field), self.source, path)
 
 
 @check("messages.follows", Subject.RECORDING, Follows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Literal
 
@@ -11,7 +11,7 @@ from pydantic import Field
 from grader.assignment.model import TopicName
 from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.echo import Echo, Wanted, echoes, wanted_values
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
@@ -64,6 +64,11 @@ class Follows(Parameters):
         None,
         description="Longest time without such a line while messages come; by default any.",
     )
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields whose numbers are logged."""
+        for number, field in enumerate(self.fields):
+            yield NamedFields(("fields", number), self.topic, field)
 
 
 @check("log.follows", Subject.RECORDING, Follows)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -25,6 +26,8 @@ from grader.recording.model import NS, Recording
 Level = Literal["DEBUG", "INFO", "WARN", "ERROR", "FATAL"]
 
 _SHOWN = 5
+# At the end of a run one record may be due, and one on its way.
+_SILENT_PERIODS = 2.0
 _METHODS = {"DEBUG": "debug", "INFO": "info", "WARN": "warning", "ERROR": "error", "FATAL": "fatal"}
 
 
@@ -247,10 +250,11 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     """The node logs as often as it must, and no more.
 
     Judged by the stamps of the records: their mean rate from the first to the last, or, of
-    fewer than three, by how many there are in the time that was observed.
+    fewer than three, by how many there are in the time that was observed. With a lowest rate the
+    node must log until the end of the observation: the last two periods may be silent.
 
-    Explains a log that is flooded from a fast callback, one that comes too seldom, and the same
-    mistakes as log.contains where there is none.
+    Explains a log that is flooded from a fast callback, one that comes too seldom or falls
+    silent, and the same mistakes as log.contains where there is none.
     """
     low_hz, high_hz = parameters.bounds_hz
     if parameters.rate is not None:
@@ -272,6 +276,9 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         end_ns = recording.stop_ns
         rate_hz = len(found) / watched_s if watched_s > 0.0 else 0.0
     if low_hz <= rate_hz <= high_hz:
+        silent = _fell_silent(recording, found, low_hz)
+        if silent is not None:
+            return silent.finding(expected)
         return Finding.passed(expected, f"{rate_hz:.3g} Hz", _evidence(recording, found))
     if not found:
         return _why_lacking(recording, parameters, records, saying, found).finding(expected)
@@ -286,6 +293,32 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         "self.get_logger().info('...', throttle_duration_sec=1.0)."
     )
     return Finding.failed(expected, seen, hint, _evidence(recording, found))
+
+
+def _fell_silent(recording: Recording, found: Sequence[Logged], low_hz: float) -> Cause | None:
+    """Why the lowest rate is missed after the last record; None if it is not."""
+    if not found or low_hz <= 0.0:
+        return None
+    last_ns = found[-1].time_ns
+    silent_s = (recording.stop_ns - last_ns) / NS
+    seen = f"{counted(len(found), 'log message')}, but none in the last {format_duration(silent_s)}"
+    allowed_s = _SILENT_PERIODS / low_hz
+    if silent_s <= allowed_s:
+        return None
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0]).after(seen)
+    taken_s = recording.taken_s(last_ns, recording.stop_ns)
+    if silent_s - taken_s <= allowed_s:
+        return Cause(
+            f"{seen}: the machine took {format_duration(taken_s)}", ours=True, disturbed=True
+        )
+    return Cause(
+        seen,
+        "The node must go on logging: look for a counter or a condition that ends it, for a timer "
+        "that is cancelled, and for a callback that does not return.",
+        Evidence(moments=(Moment("last of them", recording.since_launch_s(last_ns)),)),
+    )
 
 
 def _evidence(recording: Recording, records: list[Logged]) -> Evidence:

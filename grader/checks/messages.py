@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
 from grader.assignment.model import TopicName
 from grader.checks import slip
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import NamedFields, Parameters, Subject, check
+from grader.checks.fields import FieldTolerance, toleranced
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.silence import why_few, why_silent, why_unreadable
-from grader.checks.value import Difference, NoSuchField, differences, expected_leaves, leaves
+from grader.checks.value import (
+    EXACT,
+    Difference,
+    NoSuchField,
+    Tolerance,
+    differences,
+    expected_leaves,
+    leaves,
+    tolerance_of,
+)
 from grader.checks.wording import code, codes, counted, value_text
 from grader.recording.model import Kind, Message, Recording
 
@@ -129,10 +140,12 @@ class Equal(Parameters):
     rest: Literal["zero", "any"] = Field(
         "zero", description="What every field must be that `value` does not name."
     )
-    tolerance: float = Field(
-        1e-9, ge=0, allow_inf_nan=False, description="Largest difference of two numbers."
-    )
+    tolerance: FieldTolerance = EXACT
     at_least: int = Field(1, ge=1, description="How many messages must have come to judge.")
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The expected fields."""
+        return toleranced("value", self.topic, self.value, self.tolerance)
 
 
 @check("messages.equal", Subject.RECORDING, Equal)
@@ -182,9 +195,16 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
 def _expected_words(parameters: Equal) -> str:
     fields = ", ".join(f"{path} = {value_text(item)}" for path, item in _plain(parameters.value))
     rest = ", all else 0" if parameters.rest == "zero" else ""
-    within = "" if parameters.tolerance <= 1e-6 else f" (within {parameters.tolerance:g})"
+    within = _within(parameters.tolerance)
     enough = f", {parameters.at_least} or more" if parameters.at_least > 1 else ""
     return f"{fields}{rest}{within} in every message on {code(parameters.topic)}{enough}"
+
+
+def _within(tolerance: Tolerance) -> str:
+    if not isinstance(tolerance, Mapping):
+        return "" if tolerance <= 1e-6 else f" (within {tolerance:g})"
+    parts = (f"{path} within {amount:g}" for path, amount in tolerance.items())
+    return f" ({', '.join(parts)})" if tolerance else ""
 
 
 def _plain(value: dict[str, Any], path: str = "") -> list[tuple[str, Any]]:
@@ -280,6 +300,6 @@ def _explanation(
     return slip.explain(
         found,
         leaves(messages[first - 1].value),
-        parameters.tolerance,
+        tolerance_of(parameters.tolerance, found[0].field),
         always=len(wrong) == len(messages),
     )

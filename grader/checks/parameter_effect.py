@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import statistics
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import Field, model_validator
@@ -12,16 +13,22 @@ from grader.assignment.model import TopicName
 from grader.assignment.quantity import Duration, Ratio
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
-from grader.checks.check import Subject, check
+from grader.checks.check import NamedFields, Subject, check
 from grader.checks.death import cause_of_death, dead
-from grader.checks.fields import TOLERANCE, difference_table, difference_words, unlike
+from grader.checks.fields import (
+    FieldTolerance,
+    difference_table,
+    difference_words,
+    toleranced,
+    unlike,
+)
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.parameter import OfParameter, same_value, why_not_declared
 from grader.checks.parameter_calls import Setting, settings
 from grader.checks.silence import why_silent
 from grader.checks.unanswered import why_taken
-from grader.checks.value import NoSuchField
+from grader.checks.value import EXACT, NoSuchField
 from grader.checks.wording import code, counted, percent, value_text
 from grader.recording.model import NS, Message, Recording
 
@@ -38,9 +45,7 @@ class TakesEffect(OfParameter):
         description="What messages have then, nested or by path; other fields do not matter.",
     )
     period: Duration | None = Field(None, description="Time between two messages then.")
-    tolerance: float = Field(
-        TOLERANCE, ge=0, allow_inf_nan=False, description="Largest difference of two numbers."
-    )
+    tolerance: FieldTolerance = EXACT
     period_tolerance: Ratio = Field(
         0.05, description="How far the median of the intervals may be from the period."
     )
@@ -49,6 +54,10 @@ class TakesEffect(OfParameter):
         description="How soon after it was set, by default 500 ms.",
         validate_default=False,
     )
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields that change."""
+        return toleranced("fields", self.topic, self.fields, self.tolerance)
 
     @model_validator(mode="after")
     def _something(self) -> TakesEffect:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 from pydantic import Field, model_validator
 
 from grader.assignment.name import TopicName
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.silence import why_few, why_silent
@@ -49,6 +49,14 @@ class Series(Parameters):
         if self.start is not None and self.step is None:
             raise ValueError("'start' goes with 'step'")
         return self
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The field, with each of its values."""
+        yield NamedFields(("field",), self.topic, self.field)
+        for number, value in enumerate(self.values):
+            yield NamedFields(
+                ("values", number), self.topic, {self.field: value}, tolerance=self.tolerance
+            )
 
     @property
     def needed(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from typing import Any, Literal
 
 from pydantic import Field
@@ -12,22 +13,23 @@ from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead
 from grader.checks.fields import (
-    TOLERANCE,
+    FieldTolerance,
     brief,
     difference_table,
     difference_words,
     fields_hint,
     has_fields,
+    toleranced,
     unlike,
 )
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.offered import SERVICE, is_offered, services, why_not_offered
 from grader.checks.unanswered import why_taken, why_unanswered
-from grader.checks.value import NoSuchField
+from grader.checks.value import EXACT, NoSuchField
 from grader.checks.wording import code, codes, counted
 from grader.recording.model import NS, Call, Recording
 
@@ -75,14 +77,19 @@ class Responds(Parameters):
         description="Texts of the response that must hold a word: field -> word, upper and lower "
         "case alike.",
     )
-    tolerance: float = Field(
-        TOLERANCE, ge=0, allow_inf_nan=False, description="Largest difference of two numbers."
-    )
+    tolerance: FieldTolerance = EXACT
     within: Duration = Field(
         1.0,
         description="How long the answer may take, by default 1 s.",
         validate_default=False,
     )
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields of the request and of the response."""
+        yield NamedFields(("request",), self.service, self.request)
+        yield from toleranced("response", self.service, self.response, self.tolerance, part=1)
+        for path in self.contains:
+            yield NamedFields(("contains", path), self.service, {path: ""}, part=1)
 
 
 @check("service.responds", Subject.RECORDING, Responds)

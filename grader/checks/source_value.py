@@ -42,6 +42,11 @@ class SourceValue:
         match = _YAW.fullmatch(text)
         return cls(text, _PATH.validate_python(match["path"] if match else text), match is not None)
 
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The fields that hold its numbers."""
+        return tuple(f"{self.path}.{part}" for part in _QUATERNION) if self.is_yaw else (self.path,)
+
     def number(self, message: Mapping[str, Any]) -> float:
         """The number that follows from a message.
 
@@ -49,7 +54,7 @@ class SourceValue:
             NoSuchField: It has no such field.
         """
         if self.is_yaw:
-            return yaw(*(number_at(message, f"{self.path}.{part}") for part in _QUATERNION))
+            return yaw(*(number_at(message, path) for path in self.paths))
         return number_at(message, self.path)
 
     def error(self, observed: float, wanted: float) -> float:
@@ -85,7 +90,7 @@ def mistakes(value: SourceValue, message: Mapping[str, Any]) -> Iterator[tuple[s
     """
     right = value.number(message)
     if value.is_yaw:
-        x, y, z, w = (number_at(message, f"{value.path}.{part}") for part in _QUATERNION)
+        x, y, z, w = (number_at(message, path) for path in value.paths)
         for part, number in zip(_QUATERNION, (x, y, z, w), strict=True):
             yield f"`{part}` of the quaternion, which is no angle: convert the quaternion", number
         yield "the yaw in degrees: ROS has angles in radians (REP-103)", math.degrees(right)

@@ -10,6 +10,12 @@ from typing import Any
 
 from grader.nearest import did_you_mean
 
+EXACT = 1e-9
+"""Largest difference of two numbers that are meant to be the same."""
+
+Tolerance = float | Mapping[str, float]
+"""Largest difference of two numbers: of every field, or by path, where others are exact."""
+
 FLOAT32_MAX = 3.4028234663852886e38
 
 
@@ -86,12 +92,49 @@ def _expect(names: list[str], item: Any, message: Any, path: str, found: dict[st
     if isinstance(message, Mapping):
         raise NoSuchField(f"{path} is a message: name its fields ({', '.join(message)})")
     if _kind(item) != _kind(message):
-        raise NoSuchField(f"{path} is {_kind(message)}, but {_kind(item)} is expected of it")
+        raise NoSuchField(f"{path} {_other_kind(item, message)}")
     found[path] = item
 
 
+def _other_kind(item: Any, value: Any) -> str:
+    here, wanted = ("true or false" if isinstance(x, bool) else _kind(x) for x in (value, item))
+    words = item.lower() if isinstance(item, str) and isinstance(value, bool) else ""
+    advice = ": write true or false" if words in ("yes", "no", "on", "off") else ""
+    return f"is {here}, but {wanted} is expected of it{advice}"
+
+
+def unreachable(expected: Any, sample: Any, tolerance: float) -> str:
+    """Why a field can never have an expected value, to follow its name; nothing if it can.
+
+    Args:
+        expected: The value.
+        sample: A value of the field's type, as its definition has it.
+        tolerance: Largest difference of two numbers.
+    """
+    if _kind(expected) != _kind(sample):
+        return _other_kind(expected, sample)
+    items, samples = _items(expected), _items(sample)
+    if items is not None and samples:
+        return next(filter(None, (unreachable(one, samples[0], tolerance) for one in items)), "")
+    if not isinstance(expected, int | float) or not isinstance(sample, int | float):
+        return ""
+    if isinstance(sample, bool):
+        fits, kind = expected in (0, 1), "true or false"
+    elif isinstance(sample, int):
+        whole = not math.isfinite(expected) or abs(expected - round(expected)) <= tolerance
+        fits, kind = whole and not isinstance(expected, bool), "a whole number"
+    else:
+        fits, kind = not isinstance(expected, bool), "a number"
+    shown = str(expected).lower() if isinstance(expected, bool) else expected
+    return "" if fits else f"is {kind}, but {shown} is expected of it"
+
+
 def differences(
-    expected: Mapping[str, Any], message: Mapping[str, Any], *, rest_zero: bool, tolerance: float
+    expected: Mapping[str, Any],
+    message: Mapping[str, Any],
+    *,
+    rest_zero: bool,
+    tolerance: Tolerance,
 ) -> tuple[Difference, ...]:
     """Fields of a message that have not the expected value.
 
@@ -105,14 +148,19 @@ def differences(
     found = []
     for path, wanted in expected.items():
         observed = _at(message, path)
-        if not same(wanted, observed, tolerance):
+        if not same(wanted, observed, tolerance_of(tolerance, path)):
             found.append(Difference(path, wanted, observed))
     if rest_zero:
         for path, observed in leaves(message).items():
             named = any(path == known or path.startswith(known + "[") for known in expected)
-            if not named and not _is_zero(observed, tolerance):
+            if not named and not _is_zero(observed, tolerance_of(tolerance, path)):
                 found.append(Difference(path, zero_of(observed), observed))
     return tuple(found)
+
+
+def tolerance_of(tolerance: Tolerance, path: str) -> float:
+    """The tolerance of one field."""
+    return tolerance.get(path, EXACT) if isinstance(tolerance, Mapping) else tolerance
 
 
 def same(wanted: Any, observed: Any, tolerance: float) -> bool:
@@ -125,7 +173,9 @@ def same(wanted: Any, observed: Any, tolerance: float) -> bool:
         return len(wanted_items) == len(observed_items) and all(
             same(a, b, tolerance) for a, b in zip(wanted_items, observed_items, strict=True)
         )
-    if not (isinstance(wanted, int | float) and isinstance(observed, int | float)):
+    truth = isinstance(wanted, bool) or isinstance(observed, bool)
+    if truth or not (isinstance(wanted, int | float) and isinstance(observed, int | float)):
+        # A tolerance is for numbers: false is never near enough to true.
         return bool(wanted == observed)
     if math.isnan(wanted) or math.isnan(observed):
         return math.isnan(wanted) and math.isnan(observed)
@@ -147,7 +197,7 @@ def zero_of(value: Any) -> Any:
 
 
 def _is_zero(value: Any, tolerance: float) -> bool:
-    if isinstance(value, int | float):
+    if isinstance(value, int | float) and not isinstance(value, bool):
         return abs(value) <= tolerance
     return not value
 

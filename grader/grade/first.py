@@ -1,9 +1,11 @@
-"""Which of the checks that failed a student should mend first. Pure."""
+"""What the checks of a submission say together: is it graded, what should be mended first? Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from typing import Protocol
+
+from grader.checks.finding import Status
 
 
 class _Place(Protocol):
@@ -78,6 +80,28 @@ def first_to_fix(
 
     shown = only_shown(without_points, waits)
     return max((check for check in reasons if check not in shown), key=others, default=None)
+
+
+class _Judged(Protocol):
+    """How a check ended."""
+
+    @property
+    def id(self) -> str: ...
+    @property
+    def status(self) -> Status: ...
+    @property
+    def max_points(self) -> float: ...
+    @property
+    def waits_for(self) -> tuple[str, ...]: ...
+
+
+def every_point_judged(checks: Iterable[_Judged]) -> bool:
+    """Whether no check with points ended as an error, or waits for one that did."""
+    checks = tuple(checks)
+    errors = {check.id for check in checks if check.status is Status.ERROR}
+    return not any(
+        check.max_points and not errors.isdisjoint((check.id, *check.waits_for)) for check in checks
+    )
 
 
 def only_shown(without_points: Collection[str], waits: Iterable[Sequence[str]]) -> frozenset[str]:

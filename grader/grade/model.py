@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from grader.assignment.model import Assignment, Visibility
 from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
 from grader.checks.finding import Finding, Status
-from grader.grade.first import first_to_fix, reason
+from grader.grade.first import every_point_judged, first_to_fix, reason
 from grader.grade.points import total
 from grader.submission.record import SubmissionRecord
 
@@ -97,8 +97,8 @@ class Grade:
 
     @property
     def graded(self) -> bool:
-        """Whether every check could be judged. If not, the score means nothing yet."""
-        return not self.of(Status.ERROR)
+        """Whether every check with points could be judged. If not, the score means nothing yet."""
+        return every_point_judged(self.results)
 
     @property
     def score(self) -> float:

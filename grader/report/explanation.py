@@ -114,9 +114,13 @@ def points(check: CheckPart) -> str:
 
 
 def only_shown(result: Result) -> frozenset[str]:
-    """Ids of the checks that failed without points, and that nothing else waits for."""
-    failed = [c.id for c in result.checks if c.status is Status.FAILED and not c.max_points]
-    return first.only_shown(failed, (check.waits_for for check in result.checks))
+    """Ids of the checks without points that did not pass, and that nothing else waits for."""
+    mild = [
+        check.id
+        for check in result.checks
+        if check.status in (Status.FAILED, Status.ERROR) and not check.max_points
+    ]
+    return first.only_shown(mild, (check.waits_for for check in result.checks))
 
 
 def headline(result: Result) -> str:
@@ -124,7 +128,7 @@ def headline(result: Result) -> str:
     withheld = Withheld(result.withheld.checks, result.withheld.points)
     full_points = result.score == result.max_score > 0
     statuses = [check.status for check in result.checks]
-    return words.summary(statuses, withheld, full_points=full_points)
+    return words.summary(statuses, withheld, graded=result.graded, full_points=full_points)
 
 
 def score(result: Result) -> str:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from grader.assignment.model import Visibility
 from grader.assignment.withheld import Withheld
 from grader.checks.finding import Status
-from grader.grade.first import first_to_fix, reason
+from grader.grade.first import every_point_judged, first_to_fix, reason
 from grader.grade.model import CheckResult, Grade
 from grader.grade.points import total
 from grader.report.result_model import CheckPart, Result, WithheldPart
@@ -32,7 +32,7 @@ def for_student(result: Result) -> Result:
     if not hidden:
         return result
     judged = {item.scenario for check in visible for item in (check, *check.other_scenarios)}
-    graded = all(check.status is not Status.ERROR for check in visible)
+    graded = every_point_judged(visible)
     return result.model_copy(
         update={
             "score": total(check.points for check in visible) if graded else None,

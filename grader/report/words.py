@@ -78,14 +78,16 @@ def headline(grade: Grade) -> str:
     """One sentence on the whole, and one on what is judged only at grading."""
     statuses = [result.status for result in grade.results]
     full_points = grade.full_points and grade.max_score > 0
-    return summary(statuses, grade.withheld, full_points=full_points)
+    return summary(statuses, grade.withheld, graded=grade.graded, full_points=full_points)
 
 
-def summary(statuses: Sequence[Status], withheld: Withheld, *, full_points: bool) -> str:
+def summary(
+    statuses: Sequence[Status], withheld: Withheld, *, graded: bool, full_points: bool
+) -> str:
     """:func:`headline` of checks that ended so; ``full_points`` of those that there are."""
     total, passed = len(statuses), statuses.count(Status.PASSED)
     failed, skipped = statuses.count(Status.FAILED), statuses.count(Status.SKIPPED)
-    if Status.ERROR in statuses:
+    if not graded:
         text = "Something of the grader or of the machine failed; no point is lost by it"
     elif full_points or passed == total:
         text = f"{passed} of {total} visible checks passed" if withheld.checks else "Full points"
@@ -96,6 +98,9 @@ def summary(statuses: Sequence[Status], withheld: Withheld, *, full_points: bool
         if skipped:
             verb = "waits" if skipped == 1 else "wait"
             text += f", {counted(skipped, 'other')} {verb} for {'it' if failed == 1 else 'them'}"
+    if graded and Status.ERROR in statuses:
+        errors = counted(statuses.count(Status.ERROR), "check")
+        text += f"; {errors} without points could not be judged"
     return f"{text}{announcement(withheld)}."
 
 

@@ -83,3 +83,10 @@ def test_the_example_of_an_own_check_works(tmp_path: Path) -> None:
 def test_the_example_in_the_documentation_is_the_shipped_assignment() -> None:
     file = resources.assignments() / "timed_publisher" / "assignment.yaml"
     assert file.read_text(encoding="utf-8").strip() in docs.assignment_markdown()
+
+
+def test_every_table_of_keys_has_rows() -> None:
+    header = "| key | value | default | meaning |\n| --- | --- | --- | --- |\n"
+    for name, text in docs.documents().items():
+        for part in text.split(header)[1:]:
+            assert part.startswith("| `"), f"{name}: an empty table"

@@ -23,8 +23,14 @@ scenarios:
       - {topic: /twist, type: geometry_msgs/msg/Twist}
       - {topic: /path, type: geometry_msgs/msg/Path}
       - {topic: /lab, type: lab_msgs/msg/Any}
+      - {topic: /flag, type: std_msgs/msg/Bool}
+      - {topic: /words, type: std_msgs/msg/String}
+      - {topic: /number, type: std_msgs/msg/Int8}
     stimuli:
       - {publish: /text, type: std_msgs/msg/String, message: {data: a}}
+      - {call: /add, type: std_srvs/srv/Add, request: {a: 1}, within: 5 s}
+      - {send_goal: /count, type: std_srvs/action/Count, goal: {to: 3}}
+      - {set_parameters: {size: 2}, node: bot}
     timeout: 5 s
 checks:
   - id: fields
@@ -34,10 +40,15 @@ checks:
 """
 DEFINITIONS = {
     "std_msgs/msg/String": "string data\n",
+    "std_msgs/msg/Bool": "bool data\n",
+    "std_msgs/msg/Int8": "int8 data\n",
+    "std_srvs/srv/Add": "int64 a\n---\nint64 sum\nstring words\n",
+    "std_srvs/action/Count": "int32 to\n---\nint32[] numbers\n---\nint32 now\n",
     "geometry_msgs/msg/Twist": "Vector3 linear\nVector3 angular\n",
     "geometry_msgs/msg/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
     "geometry_msgs/msg/Path": "Vector3[] points\nfloat32[3] sizes\nint8 KIND=1\n",
 }
+ADD, COUNT = "/add (std_srvs/srv/Add): ", "/count (std_srvs/action/Count): "
 TWIST, PATH = "/twist (geometry_msgs/msg/Twist): ", "/path (geometry_msgs/msg/Path): "
 
 Mistakes = Callable[[str, str], list[str]]
@@ -104,12 +115,82 @@ def mistakes(write: Callable[..., Path], ros_with: Callable[..., None]) -> Mista
             "fields[1]: /text (std_msgs/msg/String): the message has no field 'dat'; it has data. "
             "Did you mean 'data'?",
         ),
+        (
+            "messages.follows",
+            "topic: /twist, source: /path, tolerance: 1, fields: {linear.x: 'size[0]'}",
+            f"fields.linear.x: {PATH}the message has no field 'size'; it has points, sizes. Did "
+            "you mean 'sizes'?",
+        ),
+        (
+            "messages.equal",
+            "topic: /twist, value: {linear.x: 1}, tolerance: {linear.z: 1, x: 1}",
+            f"tolerance.x: {TWIST}the message has no field 'x'; it has angular, linear.",
+        ),
+        (
+            "messages.equal",
+            "topic: /number, value: {data: 1.5}",
+            "value: /number (std_msgs/msg/Int8): data is a whole number, but 1.5 is expected of it",
+        ),
+        (
+            "messages.sequence",
+            "topic: /words, field: dota, step: 1",
+            "field: /words (std_msgs/msg/String): the message has no field 'dota'; it has data. "
+            "Did you mean 'data'?",
+        ),
+        (
+            "messages.sequence",
+            "topic: /flag, field: data, values: [true, no]",
+            "values[1]: /flag (std_msgs/msg/Bool): data is true or false, but a text is expected "
+            "of it: write true or false",
+        ),
+        (
+            "messages.sequence",
+            "topic: /flag, field: data, values: [true, 1.5]",
+            "values[1]: /flag (std_msgs/msg/Bool): data is true or false, but 1.5 is expected of "
+            "it",
+        ),
+        (
+            "service.responds",
+            "service: /add, request: {c: 1}",
+            f"request: {ADD}the message has no field 'c'; it has a.",
+        ),
+        (
+            "service.responds",
+            "service: /add, response: {total: 3}",
+            f"response: {ADD}the message has no field 'total'; it has sum, words.",
+        ),
+        (
+            "service.responds",
+            "service: /add, contains: {sum: three}",
+            f"contains.sum: {ADD}sum is a number, but a text is expected of it",
+        ),
+        (
+            "action.result",
+            "action: /count, within: 1 s, result: {number: 3}",
+            f"result: {COUNT}the message has no field 'number'; it has numbers. Did you mean "
+            "'numbers'?",
+        ),
+        (
+            "action.result",
+            "action: /count, within: 1 s, result: {numbers: [1, 2.5]}",
+            f"result: {COUNT}numbers is a whole number, but 2.5 is expected of it",
+        ),
+        (
+            "action.feedback",
+            "action: /count, last: {later: 3}",
+            f"last: {COUNT}the message has no field 'later'; it has now.",
+        ),
+        (
+            "parameter.takes_effect",
+            "node: bot, name: size, value: 2, topic: /twist, fields: {linear.w: 2.0}",
+            f"fields: {TWIST}linear has no field 'w'; it has x, y, z.",
+        ),
     ],
 )
 def test_a_field_that_a_message_does_not_have_is_told_with_its_line(
     mistakes: Mistakes, uses: str, parameters: str, said: str
 ) -> None:
-    assert mistakes(uses, parameters) == [f"19: checks[0].with.{said}"]
+    assert mistakes(uses, parameters) == [f"25: checks[0].with.{said}"]
 
 
 @pytest.mark.parametrize(
@@ -123,8 +204,11 @@ def test_a_field_that_a_message_does_not_have_is_told_with_its_line(
             "topic: /path, source: /twist, tolerance: 1, fields: {'points[7].x': linear.x}",
         ),
         ("log.follows", "topic: /text, fields: [data]"),
+        ("messages.sequence", "topic: /path, field: 'sizes[2]', values: [1, 2.5]"),
+        ("messages.equal", "topic: /flag, value: {data: 1}"),
+        ("service.responds", "service: /add, response: {sum: 3}, tolerance: {sum: 1}"),
+        ("action.feedback", "action: /count, goal: {to: 3}, last: {now: 3}"),
     ],
-    ids=["nested and by path", "arrays", "not at hand here", "an item of an array", "sent"],
 )
 def test_what_a_message_has_or_may_have_is_accepted(
     mistakes: Mistakes, uses: str, parameters: str

@@ -250,6 +250,42 @@ def test_a_launch_names_what_is_handed_in(
     assert mistakes(GOOD.replace(old, new)) == [said]
 
 
+def test_checks_of_all_scenarios_need_the_same_programs_in_each(mistakes: Mistakes) -> None:
+    other = "  - {id: other, launch: [{executable: sub}], timeout: 5 s}\nchecks:\n"
+    two = GOOD.replace("[bot_pub]", "[bot_pub, sub]").replace("checks:\n", other)
+    assert mistakes(two) == [
+        "14: checks[0]: name the 'scenarios' that it judges, for they do not launch the same: "
+        "'run' launches 'bot_pub', but 'other' 'sub'"
+    ]
+    assert mistakes(two.replace("alive, points", "alive, scenarios: [run, other], points")) == []
+    assert mistakes(two.replace("[{executable: sub}]", "[{executable: bot_pub}]")) == []
+    renamed = two.replace("[{executable: sub}]", "[{executable: bot_pub, namespace: /one}]")
+    assert "but 'other' 'bot_pub' (__ns:=/one)" in mistakes(renamed)[0]
+
+
+def test_checks_of_the_same_title_say_what_each_is_about(
+    write: Write, catalogue: Catalogue
+) -> None:
+    recorded = "record: [{topic: /cmd_vel, type: a/msg/B}, {topic: /odom, type: a/msg/B}]"
+    head = re.sub(r"record: .*", recorded, HEAD).replace(
+        "[bot_pub]\n", "[bot_pub]\n    depends: [a]\n"
+    )
+    loaded = load_assignment(
+        write(
+            head
+            + "  - {id: a, uses: topic.published, points: 1, with: {topic: /cmd_vel}}\n"
+            + "  - {id: b, uses: topic.published, points: 1, with: {topic: /odom}}\n"
+            + "  - {id: c, uses: node.alive, points: 1}\n"
+        ),
+        catalogue,
+    )
+    assert [bound.title for bound in loaded.checks] == [
+        "Something is right: /cmd_vel",
+        "Something is right: /odom",
+        "Something is right",
+    ]
+
+
 @pytest.mark.parametrize(
     ("until", "said"),
     [

@@ -56,6 +56,27 @@ def unclear(recording, a: Missing):
 
 def positional(recording, a, /):
     pass
+
+
+def silent(recording):
+    recording.on("/odom")
+
+
+def truth(recording):
+    def inside():
+        return True
+
+    if inside():
+        return Finding.passed("", "")
+    return recording.messages == ()
+
+
+def words(recording) -> bool:
+    return recording.ok
+
+
+def either(recording):
+    return recording.early or Finding.passed("", "")
 """
 
 
@@ -75,6 +96,10 @@ def test_an_own_check_judges_with_its_validated_parameters(write: Write) -> None
         "within 1.0 s",
         "a recording",
     )
+
+
+def test_a_return_that_may_be_a_finding_is_left_to_the_run(write: Write) -> None:
+    assert load_assignment(write(yaml("checks.py:either"), checks=MINE), {}).checks
 
 
 def test_loading_leaves_nothing_behind_in_the_folder(write: Write) -> None:
@@ -97,7 +122,7 @@ def test_loading_leaves_nothing_behind_in_the_folder(write: Write) -> None:
         ("checks.py:quik", "checks.py has no 'quik'. Did you mean 'quick'?"),
         (
             "checks.py:zzz",
-            "checks.py has no 'zzz'. Its functions: quick, anything, nothing, unclear, positional.",
+            "checks.py has no 'zzz'. Its functions: quick, anything, nothing, unclear, positional, ",
         ),
         ("checks.py:SETTING", "'SETTING' in checks.py is not a function"),
         ("checks.py:Limit", "'Limit' in checks.py is not a function"),
@@ -105,6 +130,9 @@ def test_loading_leaves_nothing_behind_in_the_folder(write: Write) -> None:
         ("checks.py:anything", "the argument '**keys' cannot be given as a key of with"),
         ("checks.py:positional", "the argument 'a' cannot be given as a key of with"),
         ("checks.py:unclear", "its annotations cannot be read: name 'Missing' is not defined"),
+        ("checks.py:silent", "checks.py:silent: the function returns nothing: it must return a"),
+        ("checks.py:truth", "checks.py:52: truth() must return a Finding, not recording.messages"),
+        ("checks.py:words", "checks.py:words: it returns bool: a check returns a Finding"),
     ],
 )
 def test_what_cannot_be_loaded_is_told_at_its_line(write: Write, python: str, said: str) -> None:

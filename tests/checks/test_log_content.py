@@ -1,6 +1,7 @@
 """log.contains, log.level, log.rate: what loggers say, once each."""
 
 import itertools
+from dataclasses import replace
 
 import pytest
 
@@ -121,6 +122,18 @@ class TestRate:
         run = logging(*(logs("tick", 0.5 + 0.1 * n) for n in range(30)))
         found = failing("log.rate", run, text="tick", at_most="2 Hz")
         assert "30 log messages, 10 Hz" in found and "throttle_duration_sec" in found
+
+    def test_falling_silent_costs_as_much_as_too_seldom(self):
+        run = logging(*(logs("tick", 0.5 + 0.1 * n) for n in range(10)))
+        found = failing("log.rate", run, text="tick", rate="10 Hz")
+        assert "10 log messages, but none in the last" in found and "must go on logging" in found
+        assert judge("log.rate", run, text="tick", at_most="10 Hz").status is Status.PASSED
+
+    def test_silence_that_the_machine_made_is_no_fault_of_the_node(self):
+        stopped = logging(*(logs("tick", 0.5 + 0.1 * n) for n in range(10)))
+        end_s = stopped.since_launch_s(stopped.stop_ns)
+        run = replace(stopped, disturbance=taken(1.4, end_s, waited_s=end_s - 1.4))
+        assert judge("log.rate", run, text="tick", rate="10 Hz").disturbed
 
     def test_too_seldom_because_of_the_machine(self):
         run = logging(

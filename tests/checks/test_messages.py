@@ -287,6 +287,20 @@ class TestSilence:
 
 
 class TestEqual:
+    def test_no_tolerance_makes_true_of_false(self):
+        run = recording(messages=messages(every(0.3), {"success": True, "sum": 2.5}))
+        wanted = {"success": False, "sum": 2.0}
+        assert "success = true instead of false" in equal(run, wanted, tolerance=1).observed
+        assert equal(run, {**wanted, "success": True}, tolerance=1).status is Status.PASSED
+
+    def test_a_tolerance_may_be_of_one_field_and_others_are_exact(self):
+        run = recording(messages=messages(every(0.3), {"a": 1.2, "b": 1.2}))
+        finding = equal(run, {"a": 1.0, "b": 1.0}, tolerance={"a": 0.5})
+        assert "has b = 1.2 instead of 1" in finding.observed
+        assert "(a within 0.5)" in finding.expected
+        passed = equal(run, {"a": 1.0, "b": 1.0}, tolerance={"a": 0.5, "b": 0.5})
+        assert passed.status is Status.PASSED
+
     def test_passes_for_nested_values_and_for_paths(self):
         paths = {"linear.x": 1.0, "angular.z": 0.5}
         for value in (VALUE, paths, {"linear": {"x": 1}, "angular.z": 0.5}):

@@ -198,6 +198,15 @@ class TestOurFaults:
         assert node.decisive.traceback.startswith("Traceback (most recent call last):")
         assert "raise says" in node.decisive.traceback
 
+    def test_an_error_of_a_check_without_points_leaves_the_submission_graded(self):
+        result = judge(Told("shown", Finding.error("", ""), points=0), Told("node", points=2))
+        assert statuses(result) == {"shown": "error", "node": "passed"}
+        assert (result.graded, result.full_points, result.score) == (True, True, 2)
+
+    def test_points_that_wait_for_an_error_without_points_are_not_graded(self):
+        shown = Told("shown", Finding.error("", ""), points=0)
+        assert not judge(shown, Told("node", requires=("shown",), points=2)).graded
+
     def test_even_our_own_exceptions_are_not_let_through(self):
         assert not judge(Told("node", GraderFault("no memory"))).graded
 

@@ -83,14 +83,15 @@ def test_whose_fault_it_was():
     assert "KeyError" in cases["depth"][0].text
 
 
-def test_what_is_only_shown_makes_no_test_fail():
+@pytest.mark.parametrize("finding", [FAIL, Finding.error("a run", FAIL.observed)])
+def test_what_is_only_shown_makes_no_test_fail(finding):
     recordings = {"listen": make_run()}
-    checks = [Told("node"), Told("silence", FAIL, points=0)]
+    checks = [Told("node"), Told("silence", finding, points=0)]
     told = grade(make_loaded(checks), make_submission(), recordings)
     text = render_junit(make_result(told, recordings, make_facts()))
     jenkins().validate(text)
     (suite,) = ET.fromstring(text)
-    assert (suite.get("failures"), suite.get("skipped")) == ("0", "1")
+    assert [suite.get(key) for key in ("failures", "errors", "skipped")] == ["0", "0", "1"]
     (shown,) = suite.iter("skipped")
     assert shown.get("type") == "no points"
     assert shown.get("message") == f"Title of silence: {FAIL.observed}"

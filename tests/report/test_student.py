@@ -202,9 +202,9 @@ def test_hidden_checks_are_announced_with_their_number_and_points():
 
 
 def test_the_announcement_also_stands_behind_what_failed():
-    assert summary([Status.PASSED, Status.FAILED], Withheld(1, 0.5), full_points=False) == (
-        "1 check failed; 1 hidden check, 0.5 points, runs at grading."
-    )
+    assert summary(
+        [Status.PASSED, Status.FAILED], Withheld(1, 0.5), graded=True, full_points=False
+    ) == ("1 check failed; 1 hidden check, 0.5 points, runs at grading.")
 
 
 def test_what_is_shown_without_points_is_no_reason_to_worry():
@@ -214,6 +214,13 @@ def test_what_is_shown_without_points_is_no_reason_to_worry():
         recordings(),
     )
     assert headline(told) == "Full points; 1 check without points failed."
+    assert explanation.headline(make_result(told, recordings(), make_facts())) == headline(told)
+
+
+def test_an_error_without_points_is_told_beside_full_points():
+    checks = [Told("node"), Told("silence", Finding.error("", ""), points=0)]
+    told = grade(make_loaded(checks), make_submission(), recordings())
+    assert headline(told) == "Full points; 1 check without points could not be judged."
     assert explanation.headline(make_result(told, recordings(), make_facts())) == headline(told)
 
 
