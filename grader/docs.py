@@ -1,7 +1,8 @@
 """The documentation that is made from the code: ``python -m grader.docs [--check]``.
 
 ``docs/assignment-yaml.md`` comes from the models of the YAML, ``docs/checks.md`` from the
-catalogue of checks. Nothing in them is typed twice; with ``--check`` a stale file is an error.
+catalogue of checks, ``docs/recording.md`` from the model of a recording. Nothing in them is typed
+twice; with ``--check`` a stale file is an error.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ import inspect
 import re
 import sys
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 from pydantic import BaseModel
@@ -19,9 +22,12 @@ from pydantic import BaseModel
 from grader import resources
 from grader.assignment import asking, limits, model, mutant, stimulus
 from grader.assignment.unit import UNITS, Dimension, format_duration
+from grader.checks import finding
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance
+from grader.recording import interaction
+from grader.recording import model as recording
 from sim import description, world_model
 from sim.motion import Pose
 
@@ -98,8 +104,8 @@ def drives_straight(recording: Recording, topic: str, tolerance: Angle = 0.01) -
     return Finding.failed("no turn", f"turns with {max(turns):g} rad/s", "Leave angular.z at 0.")
 ```
 
-Its first argument is the recording; the others are the keys of `with`, validated by their
-annotations. The first line of its docstring is its title. It must be a pure function: it is
+Its first argument is [the recording](recording.md); the others are the keys of `with`, validated
+by their annotations. The first line of its docstring is its title. It must be a pure function: it is
 called again when a recording is judged again. An exception in it costs no student a point; the
 submission counts as not graded. The file runs in the grader's own process, so its author must
 be trusted."""
@@ -115,6 +121,28 @@ _EXAMPLES = {
     Dimension.RATIO: "5 %",
     Dimension.SIZE: "64 MiB",
 }
+_RECORDED = (
+    recording.Recording,
+    recording.Message,
+    recording.Node,
+    recording.Endpoint,
+    recording.Qos,
+    recording.Process,
+    recording.LogLine,
+    recording.Call,
+    interaction.Goal,
+    interaction.Feedback,
+    interaction.Service,
+    recording.Join,
+    recording.Intervention,
+    recording.Truth,
+    recording.Incident,
+    recording.Scene,
+    recording.Declaration,
+    recording.Disturbance,
+)
+_FOUND = (finding.Finding, finding.Evidence, finding.Moment, finding.Plot, finding.Table)
+_READABLE = (FunctionType, property, cached_property)
 _TYPES = {
     "string": "text",
     "number": "number",
@@ -182,6 +210,45 @@ def check_markdown(check: Check) -> str:
     if check.parameters.model_fields:
         parts.append(_fields_table(check.parameters))
     return "\n\n".join(parts)
+
+
+def recording_markdown() -> str:
+    """What an own check can look at, and what it returns."""
+    parts = [
+        "# The recording",
+        _MADE,
+        "An [own check](assignment-yaml.md#own-checks) gets the recording of one run. These are "
+        "its parts, as Python objects that cannot be changed. Names that end in `_ns` are times in "
+        "nanoseconds since 1970 on the clock of the machine that ran the scenario; "
+        "`recording.since_launch_s(time_ns)` makes seconds of them.",
+        *map(_class_section, _RECORDED),
+        "# The finding",
+        "A check returns `Finding.passed(expected, observed)` or `Finding.failed(expected, "
+        "observed, hint)`, both with an `evidence` if there is something to show.",
+        *map(_class_section, _FOUND),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _class_section(one: type) -> str:
+    documentation = re.sub(r":\w+:`", "`", inspect.getdoc(one) or "")
+    text, _, attributes = documentation.partition("\nAttributes:\n")
+    entries = re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", attributes, re.MULTILINE)
+    rows = [(f"`{name}`", " ".join(words.split())) for name, words in entries]
+    for name, member in vars(one).items():
+        told = inspect.getdoc(member)
+        if name.startswith("_") or not told or not isinstance(member, _READABLE):
+            continue
+        call = f"{name}{_arguments(member)}" if inspect.isfunction(member) else name
+        rows.append((f"`{call}`", told.partition("\n")[0]))
+    table = [_outside_code(_table(("name", "meaning"), rows).replace("``", "`"))] if rows else []
+    told = _outside_code(text.strip().replace("``", "`"))
+    return "\n\n".join([f"## {one.__name__}", told, *table])
+
+
+def _arguments(function: Any) -> str:
+    names = [name for name in inspect.signature(function).parameters if name != "self"]
+    return f"({', '.join(names)})"
 
 
 def _model_section(heading: str, one: type[BaseModel]) -> str:
@@ -299,7 +366,11 @@ def _table(header: tuple[str, ...], rows: Any) -> str:
 
 def documents() -> dict[str, str]:
     """Every generated file of ``docs/``, by name."""
-    return {"assignment-yaml.md": assignment_markdown(), "checks.md": checks_markdown()}
+    return {
+        "assignment-yaml.md": assignment_markdown(),
+        "checks.md": checks_markdown(),
+        "recording.md": recording_markdown(),
+    }
 
 
 def stale(folder: Path) -> list[str]:

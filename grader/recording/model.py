@@ -452,8 +452,19 @@ class Recording:
         joined: What late joiners received, by their names, in the order of their reception.
         unreadable: Topic -> how many messages on it hold other bytes than its type has; they are
             not among ``messages``.
+        nodes: Nodes that were seen in the graph, in the order of their appearance.
+        endpoints: Their publishers and subscriptions, likewise.
+        processes: The student's, in the order of `launch`.
+        log: What they wrote and logged, line by line.
+        declarations: What the tracer in the student's processes reported.
+        calls: Calls of services by the probe, in order.
         services: What the student's nodes offer.
         goals: Goals that the probe sent.
+        waits: Waits of the probe with their limits.
+        joins: Late joiners.
+        interventions: What the probe did to the student's processes.
+        breaches: Limits of the sandbox that were reached.
+        disturbance: What the host took from the run, sample by sample.
         faults: What of ours or of the machine went wrong, one sentence each.
         truth: The simulated robot, step by step; empty in a scenario without a world.
         incidents: What the simulator noted.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,9 @@ from grader import docs, resources
 from grader.assignment.own_check import load_own_check
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check
-from grader.recording.model import Message
+from grader.checks.finding import Evidence, Finding
+from grader.recording.interaction import Goal
+from grader.recording.model import Endpoint, Message, Recording, Scene, Truth
 
 
 def test_the_files_in_docs_are_up_to_date(capsys: pytest.CaptureFixture[str]) -> None:
@@ -83,6 +86,14 @@ def test_the_example_of_an_own_check_works(tmp_path: Path) -> None:
 def test_the_example_in_the_documentation_is_the_shipped_assignment() -> None:
     file = resources.assignments() / "timed_publisher" / "assignment.yaml"
     assert file.read_text(encoding="utf-8").strip() in docs.assignment_markdown()
+
+
+def test_the_page_of_the_recording_tells_of_every_part_of_it() -> None:
+    text = docs.recording_markdown()
+    for one in (Recording, Message, Endpoint, Goal, Truth, Scene, Finding, Evidence):
+        section = text.partition(f"\n## {one.__name__}\n")[2].partition("\n## ")[0]
+        for field in fields(one):
+            assert f"| `{field.name}` |" in section, f"{one.__name__}.{field.name}"
 
 
 def test_every_table_of_keys_has_rows() -> None:

@@ -122,7 +122,7 @@ def test_loading_leaves_nothing_behind_in_the_folder(write: Write) -> None:
         ("checks.py:quik", "checks.py has no 'quik'. Did you mean 'quick'?"),
         (
             "checks.py:zzz",
-            "checks.py has no 'zzz'. Its functions: quick, anything, nothing, unclear, positional, ",
+            "checks.py has no 'zzz'. Its functions: quick, anything, nothing, unclear, ",
         ),
         ("checks.py:SETTING", "'SETTING' in checks.py is not a function"),
         ("checks.py:Limit", "'Limit' in checks.py is not a function"),
