@@ -105,10 +105,10 @@ def drives_straight(recording: Recording, topic: str, tolerance: Angle = 0.01) -
 ```
 
 Its first argument is [the recording](recording.md); the others are the keys of `with`, validated
-by their annotations. The first line of its docstring is its title. It must be a pure function: it is
-called again when a recording is judged again. An exception in it costs no student a point; the
-submission counts as not graded. The file runs in the grader's own process, so its author must
-be trusted."""
+by their annotations. The first line of its docstring is its title. It must be a pure function: it
+is called again when a recording is judged again. An exception in it costs no student a point; the
+submission counts as not graded. The file runs in the grader's own process, so its author must be
+trusted."""
 _EXAMPLES = {
     Dimension.TIME: "300 ms",
     Dimension.FREQUENCY: "10 Hz",

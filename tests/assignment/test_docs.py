@@ -45,7 +45,7 @@ def test_every_check_is_described_with_all_its_parameters() -> None:
 
 
 def test_links_lead_to_headings() -> None:
-    for text in docs.documents().values():
+    for text in (docs.assignment_markdown(), docs.checks_markdown()):
         outside = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
         headings = {
             re.sub(r"[^a-z0-9_ -]", "", line.lstrip("# ").lower()).replace(" ", "-")
