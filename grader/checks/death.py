@@ -230,8 +230,8 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
             return Cause(
                 f"{ended}: it imports {code(lacking)}{where}, a ROS 2 package that is not "
                 "installed where this is graded",
-                f"No point is lost by it. Tell whoever runs the grader (`sudo apt install "
-                f"{apt_name}`), or do without the package.",
+                f"No point is lost by it. Tell whoever runs the grader: `sudo apt install "
+                f"{apt_name}`.",
                 evidence,
                 ours=True,
             )

@@ -50,9 +50,9 @@ def library_hint(message: str, recording: Recording) -> str | None:
     if nearest(found[1], own | PACKAGES, cutoff=0.8) is not None:
         return None
     return (
-        "Where this is graded, Python has the standard library, ROS 2 and "
-        f"{codes(allowed.split())}; {code(found[1])} is not among them, even if it is installed "
-        "on your machine: do without it, or ask your instructor to allow it. If it is a module of "
-        "your own: import it from its package (from my_package import my_module), and let "
-        "setup.py install it (packages=[...])."
+        f"Is {code(found[1])} spelt right? Where this is graded, Python has the standard library, "
+        f"ROS 2 and {codes(allowed.split())}. A package or a module of your own: hand it in, name "
+        "it in package.xml, let setup.py install it (packages=[...]), and import it from its "
+        "package (from my_package import my_module). Another library: ask your instructor to allow "
+        "it."
     )

@@ -37,7 +37,6 @@ from grader.submission.toolchain import missing_here, missing_tools
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
 
-_UNSAID = "colcon could not build this package; the log says why"
 _WHOLE_LOG = 60_000
 _SUMMARY = re.compile(r"Summary: \d+ packages? finished")
 _SIGNALLED = 128
@@ -242,7 +241,7 @@ class _Workshop:
         culprit = None
         if not succeeded:
             culprit = find_culprit(log, failed, self.sources)
-            culprit = culprit or last_started(log, self.sources, problem or _UNSAID)
+            culprit = culprit or last_started(log, self.sources, problem)
         if problem is not None:
             log += f"\n[rosgrade: {problem}]\n"
         return BuildRecord(

@@ -39,6 +39,11 @@ _ABSOLUTE_DATA = "os.path.isabs(dest)"
 _READ_OUTPUT = "ast.literal_eval(output)"
 _DIED = re.compile(r"(?=.*setup\.py).* died with <Signals\.(\w+): \d+>")
 _INTERFACES = (".msg", ".srv", ".action")
+# What colcon and make say of a program that failed, and not that program itself.
+_AROUND = re.compile(
+    r"g?make(\[\d+\])?: |ninja: |---( |$)|(Failed|Aborted) +<<<|Summary:|\s+\d+ pack"
+)
+_ERROR = re.compile(r"\berror\b|undefined reference", re.IGNORECASE)
 _MAX_MESSAGE = 500
 _MOST_QUOTED = 10
 _MOST_LINES = 10_000
@@ -90,16 +95,30 @@ def find_culprit(log: str, failed: Collection[str], sources: Sources) -> SourceE
     return None
 
 
-def last_started(log: str, sources: Sources, message: str) -> SourceError | None:
-    """Blame the build file of the package that was being built when the log ends."""
+def last_started(log: str, sources: Sources, problem: str | None) -> SourceError | None:
+    """Blame the build file of the package that was being built when the log ends.
+
+    Args:
+        log: As for :func:`find_culprit`.
+        sources: The submission.
+        problem: Why the build ended, or None where only the log tells.
+    """
     # What a build file prints may look like colcon's own lines.
-    started = [name for name in _STARTED.findall(log) if name in sources.folders]
-    folder = sources.folders.get(started[-1] if started else "")
-    if folder is None:
+    started = [item for item in _STARTED.finditer(log) if item[1] in sources.folders]
+    if not started:
         return None
+    folder = sources.folders[started[-1][1]]
+    message = problem or _last_words(log[started[-1].end() :])
     files = [join(folder, name) for name in ("setup.py", "CMakeLists.txt", "package.xml")]
     file = next((file for file in files if file in sources.files), files[-1])
     return SourceError(shown(file), None, message)
+
+
+def _last_words(log: str) -> str:
+    """The first line of a package's log that tells of an error, or its last line."""
+    said = [line.strip() for line in log.splitlines() if line.strip() and not _AROUND.match(line)]
+    errors = [line for line in said if _ERROR.search(line)]
+    return (errors[0] if errors else said[-1] if said else "it says nothing")[:_MAX_MESSAGE]
 
 
 @dataclass(frozen=True)

@@ -313,3 +313,23 @@ def test_where_nothing_is_said_the_package_that_was_being_built_is_named() -> No
     log = "Starting >>> bot\nFinished <<< bot\nStarting >>> c\n"
     assert str(last_started(log, SOURCES, "too late")) == "src/c/CMakeLists.txt: too late"
     assert last_started("", SOURCES, "too late") is None
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ("the robot is not there", "the robot is not there"),
+        (
+            "/usr/bin/ld: x.o: undefined reference to `drive'\ncollect2: error: ld returned 1",
+            "/usr/bin/ld: x.o: undefined reference to `drive'",
+        ),
+        ("", "it says nothing"),
+    ],
+)
+def test_where_no_file_is_blamed_the_log_s_own_words_are_shown(said: str, words: str) -> None:
+    log = (
+        f"Starting >>> c\n--- stderr: c\n{said}\n"
+        "gmake[1]: *** [CMakeFiles/Makefile2:183: all] Error 2\n---\n"
+        "Failed   <<< c [0.5s, exited with code 2]\n"
+    )
+    assert str(last_started(log, SOURCES, None)) == f"src/c/CMakeLists.txt: {words}"
