@@ -207,18 +207,24 @@ class Difference:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the checks made of one mutant or variant.
+    """What the checks made of one submission whose grade is known.
 
     Attributes:
         differences: Checks that ended otherwise than they must; none if all is well.
+        problem: What else is wrong with the grade; empty if nothing is.
     """
 
     differences: tuple[Difference, ...]
+    problem: str = ""
 
     @property
     def right(self) -> bool:
-        """Whether every check ended as it must."""
-        return not self.differences
+        """Whether it was graded as it must be."""
+        return not self.differences and not self.problem
+
+    def __str__(self) -> str:
+        """Write what is wrong in one line; nothing if all is well."""
+        return "; ".join([*map(str, self.differences), *([self.problem] if self.problem else [])])
 
     @property
     def judged(self) -> bool:

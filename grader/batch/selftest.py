@@ -1,7 +1,8 @@
 """The mutation score of an assignment: does it tell right from wrong?
 
 The reference and every variant (a right solution in another style) must get full points; every
-mutant must lose exactly the checks that it names.
+mutant must lose exactly the checks that it names; the starter package, untouched, must get
+almost nothing.
 """
 
 from __future__ import annotations
@@ -14,17 +15,30 @@ from enum import Enum
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.mutant import Change, Mutant, Verdict, expected_statuses, verdict
+from grader.assignment.mutant import (
+    Change,
+    Difference,
+    Mutant,
+    Verdict,
+    expected_statuses,
+    verdict,
+)
 from grader.assignment.mutation import apply, load_mutants
 from grader.assignment.unit import format_duration
 from grader.batch.grading import Graded, Grading
 from grader.checks.finding import Status
+from grader.grade.model import Grade
 from grader.report.facts import RunFacts
 from grader.report.grade_part import grade_json
 from grader.report.result import make_result
+from grader.report.words import counted_points, number
 from grader.scratch import Scratch
+from grader.starter import write_starter
 
 REFERENCE = "reference"
+STARTER = "starter"
+MOST_FOR_STARTER = 0.15
+"""Share of the points that the starter package may get before anything was written in it."""
 
 
 class Role(str, Enum):
@@ -33,6 +47,7 @@ class Role(str, Enum):
     REFERENCE = "reference"
     VARIANT = "variant"
     MUTANT = "mutant"
+    STARTER = "starter"
 
 
 @dataclass(frozen=True)
@@ -40,10 +55,10 @@ class Trial:
     """One submission to grade, with the outcome that it must have.
 
     Attributes:
-        role: Reference, variant or mutant.
-        id: ``reference``, or the id of the change.
+        role: Reference, variant, mutant or starter.
+        id: ``reference``, ``starter``, or the id of the change.
         title: One line for people.
-        change: What differs from the reference; None for the reference.
+        change: What differs from the reference; None for the reference and the starter.
     """
 
     role: Role
@@ -76,7 +91,7 @@ class TrialResult:
 
 
 def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Trial, ...]:
-    """The trials of an assignment: its reference, its variants, its mutants.
+    """The trials of an assignment: its reference, its variants, its mutants, its starter.
 
     Raises:
         UsageError: It has no reference or no mutants.
@@ -96,15 +111,19 @@ def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Tri
             for change in changes
             if not change.skip_reason
         ),
+        Trial(Role.STARTER, STARTER, "the starter package, untouched", None),
     )
 
 
-def write_submission(trial: Trial, reference: Path, folder: Path) -> Path:
+def write_submission(trial: Trial, loaded: LoadedAssignment, reference: Path, folder: Path) -> Path:
     """Make the submission of a trial.
 
     Returns:
-        The reference itself, or the changed copy in ``folder``.
+        The reference itself, or the changed copy or the starter in ``folder``.
     """
+    if trial.role is Role.STARTER:
+        write_starter(loaded, folder / trial.id)
+        return folder / trial.id
     if trial.change is None:
         return reference
     target = folder / trial.id
@@ -130,15 +149,16 @@ def run_trial(
         folder: For the submission and its recordings.
         on_graded: Told everything that was found, which is not kept.
     """
-    submission = write_submission(trial, reference, folder / "submissions")
+    submission = write_submission(trial, loaded, reference, folder / "submissions")
     graded = grading.grade(submission, folder / "recordings" / trial.id)
     on_graded(graded)
     actual = {result.id: result.status for result in graded.grade.results}
-    if trial.change is None:
-        expected = dict.fromkeys(actual, Status.PASSED)
+    if trial.role is Role.STARTER:
+        outcome = _starter_verdict(graded.grade)
+    elif trial.change is None:
+        outcome = verdict(dict.fromkeys(actual, Status.PASSED), actual)
     else:
-        expected = expected_statuses(loaded.assignment, trial.change)
-    outcome = verdict(expected, actual)
+        outcome = verdict(expected_statuses(loaded.assignment, trial.change), actual)
     return TrialResult(
         trial=trial,
         verdict=outcome,
@@ -153,6 +173,19 @@ def run_trial(
             for line in _told(graded, one.check)
         ),
     )
+
+
+def _starter_verdict(grade: Grade) -> Verdict:
+    not_judged = tuple(
+        Difference(result.id, Status.FAILED, result.status) for result in grade.of(Status.ERROR)
+    )
+    problem = ""
+    if grade.score > MOST_FOR_STARTER * grade.max_score:
+        problem = (
+            f"{counted_points(grade.score)} of {number(grade.max_score)}, and a starter package "
+            f"may have {MOST_FOR_STARTER:.0%} at most: give the points to what the lesson is about"
+        )
+    return Verdict(not_judged, problem)
 
 
 def _told(graded: Graded, check: str) -> Iterator[str]:
@@ -233,17 +266,19 @@ class MutationScore:
         mutants: All mutants.
         accepted: Right solutions (reference and variants) with full points.
         right: All right solutions.
+        starter_right: Whether the untouched starter got as little as it must.
     """
 
     killed: int
     mutants: int
     accepted: int
     right: int
+    starter_right: bool = True
 
     @property
     def perfect(self) -> bool:
         """Whether nothing was judged wrongly."""
-        return self.killed == self.mutants and self.accepted == self.right
+        return self.killed == self.mutants and self.accepted == self.right and self.starter_right
 
     @property
     def percent(self) -> float:
@@ -254,10 +289,11 @@ class MutationScore:
 def mutation_score(results: list[TrialResult]) -> MutationScore:
     """Count the results of one assignment."""
     mutants = [r for r in results if r.trial.role is Role.MUTANT]
-    right = [r for r in results if r.trial.role is not Role.MUTANT]
+    right = [r for r in results if r.trial.role in {Role.REFERENCE, Role.VARIANT}]
     return MutationScore(
         killed=sum(r.verdict.right for r in mutants),
         mutants=len(mutants),
         accepted=sum(r.verdict.right for r in right),
         right=len(right),
+        starter_right=all(r.verdict.right for r in results if r.trial.role is Role.STARTER),
     )

@@ -48,7 +48,8 @@ def selftest(
     """Grade the reference, variants and mutants of an assignment.
 
     The reference and every variant must get full points, every mutant must lose exactly the
-    checks that it names. Ends with 0 only if all of that is so.
+    checks that it names, and the untouched starter package must get 15 % of the points at most.
+    Ends with 0 only if all of that is so.
     """
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
@@ -111,14 +112,13 @@ def _print(console: Console, assignment: str, results: list[TrialResult]) -> Non
     from rich.table import Table
 
     table = Table("", assignment, "WHAT", "LOST", box=None, pad_edge=False)
-    order = ("reference", "variant", "mutant")
+    order = ("reference", "variant", "mutant", "starter")
     for result in sorted(results, key=lambda r: (order.index(r.trial.role.value), r.trial.id)):
-        wrong = "; ".join(str(difference) for difference in result.verdict.differences)
         table.add_row(
             "ok" if result.verdict.right else "WRONG",
             result.trial.id,
             escape(result.trial.title),
-            escape(wrong or ", ".join(result.lost) or "nothing"),
+            escape(str(result.verdict) or ", ".join(result.lost) or "nothing"),
         )
     console.print(table)
     for result in results:

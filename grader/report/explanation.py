@@ -23,8 +23,8 @@ class Row:
     """One thing that is said.
 
     Attributes:
-        name: What it is: ``expected``, ``observed``, ``try next``, ``also``, ``where`` or
-            ``printed``.
+        name: What it is: ``expected``, ``observed``, ``try next``, ``also``, ``where``,
+            ``printed`` or ``waiting``.
         text: Cleaned; ``printed`` has several lines.
     """
 
@@ -69,11 +69,19 @@ def _cut(text: str) -> str:
     return text if len(text) <= MOST_CHARACTERS else f"{text[: MOST_CHARACTERS - 1]}…"
 
 
-def explain(check: CheckPart) -> tuple[Row, ...]:
-    """Say why a check ended as it did, every scenario that did not pass in its turn."""
+def explain(check: CheckPart, result: Result) -> tuple[Row, ...]:
+    """Say why a check ended as it did, every scenario that did not pass in its turn.
+
+    Args:
+        check: Which.
+        result: The result that it is part of.
+    """
     findings = [check, *check.other_scenarios]
     told = [item for item in findings if item.status is check.status]
-    return tuple(row for item in told for row in _rows(check, item, many=len(findings) > 1))
+    rows = [row for item in told for row in _rows(check, item, many=len(findings) > 1)]
+    if points := words.points_waiting(check.id, result.checks):
+        rows.append(Row("waiting", points))
+    return tuple(rows)
 
 
 def _rows(check: CheckPart, finding: FindingPart, *, many: bool) -> Iterator[Row]:
@@ -97,9 +105,9 @@ def where(place: PlacePart) -> str:
     return one_line(f"{place.file}{line}: {place.message}")
 
 
-def plain(check: CheckPart) -> str:
+def plain(check: CheckPart, result: Result) -> str:
     """:func:`explain` as text, a line for each; several lines stand below their name."""
-    return "\n".join(_told(row) for row in explain(check))
+    return "\n".join(_told(row) for row in explain(check, result))
 
 
 def _told(row: Row) -> str:

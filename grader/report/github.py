@@ -45,7 +45,7 @@ def annotation_lines(result: Result, prefix: str | None = "") -> tuple[str, ...]
     failed.sort(key=lambda check: (check.id != copy.first_to_fix, check.points - check.max_points))
     shown = explanation.only_shown(copy)
     return tuple(
-        _annotation(check, "notice" if check.id in shown else "error", prefix)
+        _annotation(check, copy, "notice" if check.id in shown else "error", prefix)
         for check in failed[:MOST_ANNOTATIONS]
     )
 
@@ -108,7 +108,7 @@ def command(name: str, message: str, **properties: str) -> str:
     return f"::{name}{' ' if told else ''}{told}::{_data(clean(message)[:MOST_CHARACTERS])}"
 
 
-def _annotation(check: CheckPart, level: str, prefix: str | None) -> str:
+def _annotation(check: CheckPart, result: Result, level: str, prefix: str | None) -> str:
     properties: dict[str, str] = {}
     place = next(iter(check.evidence.places), None)
     if place is not None and prefix is not None:
@@ -116,12 +116,12 @@ def _annotation(check: CheckPart, level: str, prefix: str | None) -> str:
         if place.line:
             properties["line"] = str(place.line)
     properties["title"] = one_line(f"{check.title} ({explanation.points(check)})")
-    return command(level, "\n".join(_message(check)), **properties)
+    return command(level, "\n".join(_message(check, result)), **properties)
 
 
-def _message(check: CheckPart) -> Iterator[str]:
-    for row in explanation.explain(check):
-        if row.name in ("scenario", "expected", "observed", *words.ADVICE):
+def _message(check: CheckPart, result: Result) -> Iterator[str]:
+    for row in explanation.explain(check, result):
+        if row.name in ("scenario", "expected", "observed", *words.ADVICE, "waiting"):
             yield f"{row.name}: {row.text}"
 
 

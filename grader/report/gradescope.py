@@ -54,6 +54,7 @@ def render_gradescope(result: Result, metadata: Mapping[str, Any] | None = None)
         result: The whole result, hidden checks too.
         metadata: Gradescope's ``submission_metadata.json``, or None.
     """
+    copy = for_student(result)
     extra: dict[str, Any] = {
         "graded": result.graded,
         "rosgrade_version": result.rosgrade_version,
@@ -76,9 +77,7 @@ def render_gradescope(result: Result, metadata: Mapping[str, Any] | None = None)
             "visibility": "visible",
             "stdout_visibility": "hidden",
             "extra_data": extra,
-            "tests": [
-                _test(number, check, result.graded) for number, check in enumerate(result.checks, 1)
-            ],
+            "tests": [_test(number, check, copy) for number, check in enumerate(result.checks, 1)],
         }
     )
 
@@ -151,17 +150,17 @@ def _notes(result: Result) -> Iterator[str]:
         yield f"\n{block.rstrip()}"
 
 
-def _test(number: int, check: CheckPart, graded: bool) -> dict[str, Any]:
+def _test(number: int, check: CheckPart, copy: Result) -> dict[str, Any]:
     test: dict[str, Any] = {
         "number": str(number),
         "name": check.title,
-        "output": markdown.explained(check),
+        "output": markdown.explained(check, copy),
         "output_format": "md",
         "tags": [check.scenario] if check.scenario else [],
         "visibility": check.visibility,
         "extra_data": {"id": check.id, "status": check.status.value},
     }
-    if graded:
+    if copy.graded:
         test |= {"score": check.points, "max_score": check.max_points}
     if check.status is not Status.ERROR:
         test["status"] = "passed" if check.status is Status.PASSED else "failed"

@@ -147,6 +147,7 @@ def environment() -> Environment:
         remarks=remarks,
         counted=counted,
         tally=words.tally,
+        points_waiting=words.points_waiting,
         waiting=words.waiting,
         align=align,
         arrange=arrange,

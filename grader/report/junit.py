@@ -120,5 +120,9 @@ def _case(
     kind = _TYPE[check.status] if element == _ELEMENT[check.status] else _WITHOUT_POINTS
     verdict = ET.SubElement(case, element, {"type": kind, "message": message})
     if check.status is not Status.SKIPPED:
-        body = [f"points: {explanation.points(check)}", explanation.plain(check), check.traceback]
+        body = [
+            f"points: {explanation.points(check)}",
+            explanation.plain(check, result),
+            check.traceback,
+        ]
         verdict.text = clean("\n".join(part for part in body if part))

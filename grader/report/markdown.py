@@ -86,10 +86,10 @@ def fence(text: str) -> str:
     return f"{marks}text\n{shown}\n{marks}"
 
 
-def explained(check: CheckPart) -> str:
+def explained(check: CheckPart, result: Result) -> str:
     """What a check says, as a list."""
     lines: list[str] = []
-    for row in explanation.explain(check):
+    for row in explanation.explain(check, result):
         if row.name == "printed":
             printed = [_cut(line) for line in row.text.splitlines()[-_LOG_LINES:]]
             lines += ["", fence("\n".join(printed)), ""]
@@ -144,4 +144,4 @@ def _explanations(result: Result) -> Iterator[str]:
         for check in result.checks:
             if check.status is status:
                 yield f"### {words.STATUS[status].symbol} {prose(check.title)}\n"
-                yield f"{explained(check)}\n"
+                yield f"{explained(check, result)}\n"

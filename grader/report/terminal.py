@@ -56,7 +56,7 @@ def print_grade(
     console.print(_table(console, grade))
     for result in (*grade.of(Status.FAILED), *grade.of(Status.ERROR)):
         console.print()
-        _explain(console, result)
+        _explain(console, grade, result)
     _tell_runs(console, recordings)
     console.print()
     _conclude(console, grade)
@@ -85,7 +85,7 @@ def print_changes(
     explained = (first,) if first is not None else after.of(Status.ERROR)[:1]
     for result in explained:
         console.print()
-        _explain(console, result)
+        _explain(console, after, result)
     _tell_runs(console, recordings)
     console.print()
     _conclude(console, after, before)
@@ -159,7 +159,7 @@ def _short(grade: Grade, result: CheckResult) -> str:
     return result.decisive.finding.observed
 
 
-def _explain(console: Console, result: CheckResult) -> None:
+def _explain(console: Console, grade: Grade, result: CheckResult) -> None:
     """Say why points were lost, or why there is no verdict."""
     console.print(
         Text.assemble(_status(console, result.status), "  ", (_line(console, result.title), "bold"))
@@ -172,6 +172,8 @@ def _explain(console: Console, result: CheckResult) -> None:
     for advice, items in same_advice.items():
         for name, text in (*_seen(result, items), *_advised(advice), *_evidence(items)):
             console.print(_hanging(console, name, text))
+    if points := words.points_waiting(result.id, grade.results):
+        console.print(_hanging(console, "waiting", points))
 
 
 def _hanging(console: Console, name: str, text: str) -> Text:

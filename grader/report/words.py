@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from grader.assignment.model import Visibility
@@ -10,6 +10,7 @@ from grader.assignment.withheld import Withheld
 from grader.checks.finding import Finding, Status
 from grader.checks.wording import counted
 from grader.grade.model import CheckResult, Grade
+from grader.grade.points import total
 from grader.recording.model import Breach
 from grader.report.result_model import CheckPart, PlacePart
 from grader.submission.record import SourceError
@@ -85,12 +86,12 @@ def summary(
     statuses: Sequence[Status], withheld: Withheld, *, graded: bool, full_points: bool
 ) -> str:
     """:func:`headline` of checks that ended so; ``full_points`` of those that there are."""
-    total, passed = len(statuses), statuses.count(Status.PASSED)
+    every, passed = len(statuses), statuses.count(Status.PASSED)
     failed, skipped = statuses.count(Status.FAILED), statuses.count(Status.SKIPPED)
     if not graded:
         text = "Something of the grader or of the machine failed; no point is lost by it"
-    elif full_points or passed == total:
-        text = f"{passed} of {total} visible checks passed" if withheld.checks else "Full points"
+    elif full_points or passed == every:
+        text = f"{passed} of {every} visible checks passed" if withheld.checks else "Full points"
         if failed:
             text += f"; {counted(failed, 'check')} without points failed"
     else:
@@ -128,6 +129,19 @@ def first_place(first: CheckResult | CheckPart) -> str:
         else first.evidence.places
     )
     return "".join(place.file + (f":{place.line}" if place.line else "") for place in places[:1])
+
+
+def points_waiting(check: str, checks: Iterable[CheckResult | CheckPart]) -> str:
+    """``4.25 points wait for this``: what is skipped because a check failed; or nothing.
+
+    Args:
+        check: Id of the check that failed.
+        checks: All checks of the grade.
+    """
+    points = total(one.max_points for one in checks if check in one.waits_for)
+    if not points:
+        return ""
+    return f"{counted_points(points)} {'waits' if points == 1 else 'wait'} for this"
 
 
 def waiting(grade: Grade, result: CheckResult) -> str:

@@ -23,7 +23,7 @@ from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import compare, find, regrade
 from grader.batch.rendering import find_reports, render_all
-from grader.batch.selftest import Role, Trial, run_trial
+from grader.batch.selftest import Role, Trial, mutation_score, run_trial
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
 from grader.recording.mcap_writer import write_recording
@@ -272,18 +272,19 @@ def test_recordings_are_judged_again_without_running_anything(
     assert regrade(load_assignment(lesson.folder), found).grade.full_points
 
 
+class Once:
+    """Grades by giving away what was graded before."""
+
+    def __init__(self, graded: Graded) -> None:
+        self.graded = [graded]
+
+    def grade(self, *_: object) -> Graded:
+        return self.graded.pop()
+
+
 def test_of_a_trial_only_what_is_printed_is_kept(
     grade: Grade, lesson: LoadedAssignment, tmp_path: Path
 ) -> None:
-    class Once:
-        """Grades by giving away what was graded before."""
-
-        def __init__(self, graded: Graded) -> None:
-            self.graded = [graded]
-
-        def grade(self, *_: object) -> Graded:
-            return self.graded.pop()
-
     once = Once(grade(recording(stop_s=2.5))[0])
     told: list[weakref.ref[Graded]] = []
     trial = Trial(Role.REFERENCE, "reference", "the reference solution", None)
@@ -300,6 +301,18 @@ def test_of_a_trial_only_what_is_printed_is_kept(
     assert (result.lost, result.graded, result.repeated) == (("ends",), True, False)
     assert not result.verdict.right
     assert '"id": "ends"' in result.grade
+
+
+def test_an_untouched_starter_that_gets_many_points_is_judged_wrongly(
+    grade: Grade, lesson: LoadedAssignment, tmp_path: Path
+) -> None:
+    once = Once(grade(recording(stop_s=2.5))[0])
+    trial = Trial(Role.STARTER, "starter", "the starter package, untouched", None)
+    result = run_trial(trial, lesson, once, tmp_path, tmp_path)  # type: ignore[arg-type]
+    assert str(result.verdict).startswith(
+        "1 point of 2, and a starter package may have 15% at most"
+    )
+    assert not mutation_score([result]).perfect
 
 
 def test_a_limit_of_the_build_is_the_author_s(lesson: LoadedAssignment, tmp_path: Path) -> None:

@@ -67,6 +67,7 @@ LOST = """\
   expected  a node /bot_publisher
   observed  no node at all
   try next  Call rclpy.spin(node).
+  waiting   3 points wait for this
 
 Fix this first: The node is there. 1 other check waits for it.
 Score: 1 of 6 points, before 6"""
@@ -84,6 +85,7 @@ No check changed.
   expected  a node /bot_publisher
   observed  a node /bot
   try next  Look at super().__init__().
+  waiting   3 points wait for this
 
 Fix this first: The node is there. 1 other check waits for it.
 Score: 1 of 6 points"""

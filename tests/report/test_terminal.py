@@ -41,6 +41,7 @@ Publish a Twist every 300 ms   ada_lovelace
   also      Let a timer do the waiting: `create_timer(0.3, callback)`.
   where     src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)
   printed   loop took 0.31 s
+  waiting   2 points wait for this
 
 Fix this first: It publishes every 300 ms
 (src/bot_publisher/bot_publisher/node.py:18). 1 other check waits for it.
@@ -61,6 +62,7 @@ Publish a Twist every 300 ms   ada_lovelace
   also      Let a timer do the waiting: `create_timer(0.3, callback)`.
   where     src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)
   printed   loop took 0.31 s
+  waiting   2 points wait for this
 
 Fix this first: It publishes every 300 ms (src/bot_publisher/bot_publisher/node.py:18). 1 other check waits for it.
 Score: 3.02 of 7 points
