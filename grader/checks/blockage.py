@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
+from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.failure import interrupted_callback, interrupted_place
@@ -15,6 +16,8 @@ from grader.submission.record import SourceError
 
 # What was asked for later than this before the end may be unanswered for that reason.
 _ANSWER_NS = NS
+# A node whose callbacks return at once answers a call to its parameter services sooner.
+_SLOW_S = 0.5
 
 HINT = (
     "A callback must return soon. Look for `while True`, time.sleep() or input() in a callback, in "
@@ -70,6 +73,66 @@ def stuck_callback(recording: Recording) -> SourceError | None:
     """Where a callback was that did not return until it was interrupted; None without one."""
     places = (interrupted_callback(recording, item.name) for item in recording.processes)
     return next((place for place in places if place is not None), None)
+
+
+def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
+    """The cause if callbacks are not called, or late; None where nothing tells of it.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Fully qualified names of those whose callbacks should run.
+    """
+    return (
+        why_never_spun(recording, seen, nodes)
+        or why_blocked(recording, seen, nodes, recording.launched_ns)
+        or why_slow(recording, seen, nodes)
+    )
+
+
+def why_blocked(
+    recording: Recording, seen: str, nodes: Collection[str], since_ns: int
+) -> Cause | None:
+    """The cause if an executor never comes round, as unanswered calls to its node tell.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Fully qualified names of those whose callbacks should run.
+        since_ns: An answer before this says nothing.
+    """
+    call = first_unanswered(recording, nodes, since_ns)
+    if call is None:
+        return None
+    where, evidence = where_blocked(recording, min(nodes), call)
+    since_s = recording.since_launch_s(call.requested_ns)
+    return Cause(
+        f"{seen}: something keeps the executor from coming round{where}; from {since_s:.2f} s "
+        "after launch on the node's parameter service answers no call either",
+        HINT,
+        evidence,
+    )
+
+
+def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
+    """The cause if callbacks keep each other waiting for long, as late answers to calls tell.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Fully qualified names of those whose callbacks should run.
+    """
+    waited = long_wait(recording, nodes)
+    if waited is None or waited[1] <= _SLOW_S:
+        return None
+    call, wait_s = waited
+    moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
+    return Cause(
+        f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
+        f"service waited {format_duration(wait_s)} and more",
+        HINT,
+        Evidence(moments=(moment,)),
+    )
 
 
 def where_blocked(recording: Recording, node: str, call: Call) -> tuple[str, Evidence]:

@@ -11,11 +11,12 @@ from pydantic import Field
 from grader.assignment.model import TopicName
 from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
+from grader.checks.blockage import why_slow
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.echo import Echo, Wanted, echoes, wanted_values
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.log_absence import why_not_logged, why_slow
+from grader.checks.log_absence import why_not_logged
 from grader.checks.printed import quote
 from grader.checks.sighting import endpoints_seen
 from grader.checks.value import NoSuchField
@@ -174,7 +175,8 @@ def _too_seldom(
             disturbed=True,
         )
     observed += f", although messages came on {code(parameters.topic)}"
-    slow = why_slow(recording, parameters.topic, observed)
+    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, parameters.topic)}
+    slow = why_slow(recording, observed, nodes)
     if slow is not None:
         return slow.finding(expected)
     return Finding.failed(

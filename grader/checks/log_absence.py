@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from grader.assignment.unit import format_duration
-from grader.checks.blockage import (
-    HINT,
-    first_unanswered,
-    long_wait,
-    where_blocked,
-    why_never_spun,
-)
+from grader.checks.blockage import why_blocked, why_never_spun, why_slow
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_no_history, why_not_delivered
@@ -25,8 +19,6 @@ from grader.checks.wording import code, codes, counted, listing, value_text
 from grader.recording.model import NS, Kind, LogLine, Recording
 
 _LOG_LINES = 5
-# A node whose callbacks return at once answers a call to its parameter services sooner.
-_SLOW_S = 0.5
 # Who may log less often than a message comes needs lines for no more than this share of them.
 _SOME = 0.5
 # Share of the time that the host may take before silence says nothing any more.
@@ -70,15 +62,16 @@ def why_not_logged(
             ours=True,
             disturbed=True,
         )
+    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
     cause = (
         _disturbed(recording, topic, wanted, needed, decimals, within_ns)
         or why_never_spun(
             recording,
             f"the callback is never called: the subscription to {code(topic)} is there and its "
             "QoS matches",
-            {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)},
+            nodes,
         )
-        or _blocked(recording, topic, found)
+        or why_blocked(recording, _seen(topic, found), nodes, recording.carried(topic)[0].stamp_ns)
         or _dropped(recording, topic)
     )
     if cause is not None:
@@ -89,7 +82,7 @@ def why_not_logged(
     return (
         _behind(recording, topic, wanted, near, decimals, within_ns)
         # What a late line shows may look like something else of the message that came before it.
-        or why_slow(recording, topic, _late(topic, within_ns))
+        or why_slow(recording, _late(topic, within_ns), nodes)
         or _elsewhere(recording, topic, wanted, near, decimals)
         or _other_values(recording, topic, wanted, near, decimals)
         or _silent(recording, topic)
@@ -128,23 +121,6 @@ def _disturbed(
     )
 
 
-def _blocked(recording: Recording, topic: str, found: Sequence[Echo]) -> Cause | None:
-    """The node's parameter service tells: it answers only while the executor comes round."""
-    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
-    call = first_unanswered(recording, nodes, recording.carried(topic)[0].stamp_ns)
-    if call is None:
-        return None
-    since_s = recording.since_launch_s(call.requested_ns)
-    where, evidence = where_blocked(recording, min(nodes), call)
-    return Cause(
-        f"{_seen(topic, found)}: its callback is not called, because something keeps the executor "
-        f"from coming round{where}. The subscription is there and its QoS matches, but from "
-        f"{since_s:.2f} s after launch on the node's parameter service answers no call either",
-        HINT,
-        evidence,
-    )
-
-
 def _dropped(recording: Recording, topic: str) -> Cause | None:
     """Output that was not kept may have held what is missing."""
     dropped = sum(process.dropped_bytes for process in recording.processes)
@@ -155,28 +131,6 @@ def _dropped(recording: Recording, topic: str) -> Cause | None:
         f"{dropped} bytes more",
         "Write less: a line for each message is enough.",
         ours=True,
-    )
-
-
-def why_slow(recording: Recording, topic: str, seen: str) -> Cause | None:
-    """The cause if callbacks keep the executor from coming round for long, or None.
-
-    Args:
-        recording: The run.
-        topic: That the student's nodes subscribe to.
-        seen: What was seen of it.
-    """
-    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
-    waited = long_wait(recording, nodes)
-    if waited is None or waited[1] <= _SLOW_S:
-        return None
-    call, wait_s = waited
-    moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
-    return Cause(
-        f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
-        f"service waited {format_duration(wait_s)} and more",
-        HINT,
-        Evidence(moments=(moment,)),
     )
 
 
@@ -193,7 +147,11 @@ def _few(
         f"log lines follow only {len(found)} of {counted(len(wanted), 'message')} on "
         f"{code(topic)}, written {written} after launch"
     )
-    slow = why_slow(recording, topic, seen)
+    slow = why_slow(
+        recording,
+        seen,
+        {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)},
+    )
     if slow is not None:
         return slow
     seldom_is_right = needed <= _SOME * len(wanted)
@@ -358,8 +316,8 @@ def _silent(recording: Recording, topic: str) -> Cause:
     return Cause(
         f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
         f"type and its QoS match{spins}{other}",
-        "Call self.get_logger().info(...) or print(...) in the callback. What debug() logs is not "
-        "shown by default, an `except: pass` hides an error, and an `if` may leave messages out.",
+        "Is the line reached that logs what the message says? What debug() logs is not shown by "
+        "default, an `except: pass` hides an error, and an `if` may leave messages out.",
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
             log=tuple(line.text for line in output_lines(recording)[:_LOG_LINES]),

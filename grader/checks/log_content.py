@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from grader.assignment.quantity import Frequency, Ratio
 from grader.assignment.unit import format_duration
+from grader.checks.blockage import why_not_called
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead
@@ -142,13 +143,13 @@ def _why_lacking(
     if missing is not None:
         return missing
     method = _METHODS[parameters.level or "INFO"]
-    hint = f"Call self.get_logger().{method}('...')."
+    hint = f"Is the line reached that calls self.get_logger().{method}('...') with such a text?"
     other = [item for item in saying if item not in found]
     if other:
         level = other[0].level
         return Cause(
             f"{quote(other[0].text)} is logged as {level}, not as {parameters.level}",
-            hint,
+            f"Call self.get_logger().{method}('...').",
             _evidence(recording, other),
         )
     seen = f"only {len(found)} of them" if found else "none"
@@ -158,6 +159,10 @@ def _why_lacking(
     lost = sum(process.dropped_bytes for process in recording.processes)
     if lost:
         return Cause(f"{seen}, but {lost} bytes of output were not kept", "Log less.", ours=True)
+    nodes = {node.name for node in recording.student_nodes}
+    idle = why_not_called(recording, seen, nodes)
+    if idle is not None:
+        return idle
     if found:
         return Cause(seen, hint, _evidence(recording, found))
     lines = [line for line in printed(recording) if parameters.says(line.text)]

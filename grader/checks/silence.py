@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.assignment.unit import format_duration
 from grader.checks import compatibility, testimony
-from grader.checks.blockage import HINT, first_unanswered, where_blocked, why_never_spun
+from grader.checks.blockage import why_blocked, why_never_spun
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_not_delivered
@@ -61,15 +61,14 @@ def why_silent(recording: Recording, topic: str) -> Cause:
     if ended:
         return cause_of_death(recording, ended[0]).after(f"no message on {code(topic)}")
     asked = _asked_on(recording, topic)
+    nodes = {item.node for item in publishers}
     return (
         _undelivered(recording, topic, asked)
         or (_slow(recording, topic) if not asked else None)
         or _starved(recording, topic)
-        or why_never_spun(
-            recording, f"no message on {code(topic)}", {item.node for item in publishers}
-        )
+        or why_never_spun(recording, f"no message on {code(topic)}", nodes)
         or why_time_stands_still(recording, f"no message on {code(topic)}")
-        or _blocked(recording, topic)
+        or why_blocked(recording, f"no message on {code(topic)}", nodes, recording.launched_ns)
         or why_never_awaited(recording, f"no message on {code(topic)}")
         or _prints(recording, topic)
         or _unanswered(recording, topic, asked)
@@ -268,21 +267,6 @@ def _unanswered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cau
             moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
             places=_interrupted(recording),
         ),
-    )
-
-
-def _blocked(recording: Recording, topic: str) -> Cause | None:
-    """The node's parameter service tells: it answers only while the executor comes round."""
-    nodes = {item.node for item in recording.student_endpoints(Kind.PUBLISHER, topic)}
-    call = first_unanswered(recording, nodes, recording.launched_ns)
-    if call is None:
-        return None
-    where, evidence = where_blocked(recording, min(nodes), call)
-    return Cause(
-        f"no message on {code(topic)}: something keeps the executor from coming round{where}; the "
-        "node's parameter service answers no call either",
-        HINT,
-        evidence,
     )
 
 

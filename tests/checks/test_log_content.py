@@ -11,6 +11,7 @@ from grader.recording.model import Ending
 from tests.checks.asking import logs
 from tests.checks.builder import (
     at,
+    call,
     died,
     failing,
     judge,
@@ -64,6 +65,16 @@ class TestContains:
     def test_similar(self):
         found = failing("log.contains", logging(logs("reday")), **READY)
         assert "similar is `reday`" in found
+
+    def test_a_timer_that_never_comes_to_log(self):
+        blocked = logging(calls=(call(0.5, None), call(1.5, None), call(2.5, None)))
+        found = failing("log.contains", blocked, **READY)
+        assert "something keeps the executor from coming round" in found
+        assert "get_logger" not in found
+        slow = logging(calls=tuple(call(0.5 + 0.6 * n, 0.55) for n in range(5)))
+        found = failing("log.rate", slow, text="ready", at_least="1 Hz")
+        assert "the callbacks keep each other waiting" in found
+        assert "get_logger" not in found
 
     def test_nothing_logged(self):
         assert "the node logs nothing" in failing("log.contains", recording(), **READY)
