@@ -7,14 +7,16 @@ import re
 import shutil
 import stat
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 import yaml
 
-from grader.batch.roster import Roster, Student, name_forms, normal
+from grader.batch.roster import Roster, Student, name_forms, resemblance, written
+from grader.checks.wording import listing
 from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
 from grader.submission.archive import SUFFIXES, unpack
 from grader.submission.manifest import MANIFEST
@@ -36,6 +38,9 @@ _FOREIGN = (".rar", ".7z")
 _REPOSITORY = re.compile(r"(https?|ssh|git|file)://|[\w.-]+@[\w.-]+:")
 _CLONE_LIMIT_S = 120.0
 _BARE = "is a bare git repository; give a clone of it, or name it as file://… in a roster"
+# No name of a repository has so many in earnest.
+_MOST_HYPHENS = 12
+_MOST_TWICE = 10
 # A class's archive holds what many students handed in.
 _CLASS_LIMITS = ArchiveLimits(total_bytes=8192 * MIB, members=500_000)
 
@@ -83,6 +88,7 @@ def take_in(
     roster: Roster | None = None,
     on_left_out: Callable[[str], None] = lambda _: None,
     out: Path | None = None,
+    on_prefix: Callable[[str], None] = lambda _: None,
 ) -> list[HandedIn]:
     """Find out who handed in what.
 
@@ -93,6 +99,8 @@ def take_in(
         roster: Who should have handed in; without one everybody who did is a row.
         on_left_out: Told the name of each file that is taken for no submission.
         out: Folder of the results; in ``source`` it is no submission.
+        on_prefix: Told what all names of repositories begin with, where what follows is taken
+            for a login of the roster.
 
     Returns:
         The rows, sorted by key; those of the roster that handed in nothing are among them.
@@ -105,8 +113,9 @@ def take_in(
     entries = list(_entries(folder, staging, on_left_out, out))
     if not entries:
         raise UsageError(f"{source}: holds no submission; expected a folder or an archive of each")
-    rows = _matched(entries, roster) if roster is not None else [_row(item) for item in entries]
-    return _unique(rows)
+    if roster is None:
+        return _unique([_row(item) for item in entries])
+    return _unique(_matched(entries, roster, on_prefix))
 
 
 def take_in_roster(
@@ -416,19 +425,95 @@ def _with_problem(row: HandedIn, problem: str) -> HandedIn:
     return replace(row, problem="; ".join(part for part in (problem, row.problem) if part))
 
 
-def _matched(entries: list[_Entry], roster: Roster) -> list[HandedIn]:
-    """Give each entry to the student of the roster that it names."""
-    known: dict[str, set[str]] = {}
+class _Names:
+    """Who of a roster a name names.
+
+    Attributes:
+        prefix: What stands before the login in the names of repositories, or empty.
+    """
+
+    def __init__(self, students: Sequence[Student], entries: Sequence[_Entry]) -> None:
+        """Learn the names of a class.
+
+        Args:
+            students: Of the roster.
+            entries: What was handed in.
+        """
+        self._alike: dict[str, list[Student]] = {}
+        for student in students:
+            for form in student.resembling:
+                self._alike.setdefault(form, []).append(student)
+        self.prefix = self._find_prefix([_stem(entry.path) for entry in entries])
+
+    def _find_prefix(self, stems: Sequence[str]) -> str:
+        """GitHub Classroom's ``<assignment>-``, where both that and logins may hold hyphens.
+
+        It is what most of the names share; where they share several, logins of the roster must
+        stand behind only one of them, more than once.
+        """
+        known: dict[str, int] = {}
+        shared: Counter[str] = Counter()
+        for stem in stems:
+            parts = stem.split("-")[:_MOST_HYPHENS]
+            for end in range(1, len(parts)):
+                prefix = "-".join(parts[:end]) + "-"
+                shared[prefix] += 1
+                if self._by_login(stem[len(prefix) :]):
+                    known[prefix] = known.get(prefix, 0) + 1
+        most = max(shared.values(), default=0)
+        found = [prefix for prefix, count in shared.items() if count == most > 1]
+        fitting = [prefix for prefix in found if prefix in known]
+        if len(fitting) != 1 or (len(found) > 1 and known[fitting[0]] == 1):
+            return ""
+        return fitting[0]
+
+    def exact(self, entry: _Entry) -> set[str]:
+        """Students whom one of its names names; the first name that anybody has decides."""
+        for name in entry.names:
+            keys = {
+                student.key
+                for form in name_forms(name)
+                for student in self._alike.get(resemblance(form), ())
+                if written(form) in student.logins or written(form) in student.names
+            }
+            if keys:
+                return keys
+        stem = _stem(entry.path)
+        if self.prefix and stem.startswith(self.prefix):
+            return self._by_login(stem.removeprefix(self.prefix))
+        return set()
+
+    def alike(self, entry: _Entry) -> set[str]:
+        """Students whom it may be of: their name is written alike, or its name ends with it."""
+        parts = _stem(entry.path).split("-")[-_MOST_HYPHENS:]
+        ends = ["-".join(parts[first:]) for first in range(1, len(parts))]
+        forms = map(resemblance, (*entry.names, *ends))
+        return {student.key for form in forms for student in self._alike.get(form, ())}
+
+    def _by_login(self, login: str) -> set[str]:
+        alike = self._alike.get(resemblance(login), ())
+        return {student.key for student in alike if written(login) in student.logins}
+
+
+def _matched(
+    entries: list[_Entry], roster: Roster, on_prefix: Callable[[str], None]
+) -> list[HandedIn]:
+    """Give each entry to the student of the roster that it names.
+
+    What only resembles a name is given to nobody, and is told on its own row and on theirs.
+    """
+    names = _Names(roster.students, entries)
+    if names.prefix:
+        on_prefix(names.prefix)
     named: dict[str, set[str]] = {}
     students = {student.key: student for student in roster.students}
     for student in roster.students:
-        for form in student.identifiers:
-            known.setdefault(form, set()).add(student.key)
         if student.submission:
             file = PurePosixPath(student.submission).name.removesuffix(".git")
             named.setdefault(file, set()).add(student.key)
     rows: list[HandedIn] = []
-    handed: dict[str, str] = {}
+    handed: dict[str, list[tuple[int, str]]] = {}
+    doubtful: dict[str, list[str]] = {}
     given: set[Path] = set()
     for entry in entries:
         # What the roster says itself needs no guess, and a team may have handed in one for all.
@@ -437,19 +522,33 @@ def _matched(entries: list[_Entry], roster: Roster) -> list[HandedIn]:
             # Gradescope's export names a team too; the roster has named all of it already.
             continue
         given.add(entry.path)
-        keys = told or _owners(entry, known)
+        keys = told or names.exact(entry)
         if not told and len(keys) != 1:
-            why = "not in the roster" if not keys else f"may be {' or '.join(sorted(keys))}"
-            rows.append(replace(_row(entry), problem=why))
+            may_be = sorted(keys or names.alike(entry))
+            for key in may_be:
+                doubtful.setdefault(key, []).append(shown(entry.path.name))
+            parts = ["" if keys else "not in the roster"]
+            parts.append(f"may be {listing(may_be, 'or')}" if may_be else "")
+            rows.append(replace(_row(entry), problem="; ".join(filter(None, parts))))
             continue
         for key in sorted(keys):
             student = students[key]
+            handed.setdefault(key, []).append((len(rows), shown(entry.path.name)))
             row = replace(_row(entry), key=key, name=student.name, problem=student.problem)
-            if key in handed:
-                row = _with_problem(row, f"handed in twice: {handed[key]} too")
-            handed.setdefault(key, shown(entry.path.name))
             rows.append(row)
-    return rows + [_missing(s) for s in roster.students if s.key not in handed]
+    for key, found in handed.items():
+        for at, file in found if len(found) > 1 else ():
+            others = [other for _, other in found[:_MOST_TWICE] if other != file] or [file]
+            rows[at] = _with_problem(rows[at], f"handed in twice: {listing(others)} too")
+        for at, _ in found if key in doubtful else ():
+            rows[at] = _with_problem(rows[at], f"{listing(doubtful[key])} may be theirs too")
+    missing = [_missing(student) for student in roster.students if student.key not in handed]
+    return rows + [
+        replace(row, problem=f"{row.problem}; {listing(doubtful[row.key])} may be theirs")
+        if row.key in doubtful
+        else row
+        for row in missing
+    ]
 
 
 def _missing(student: Student) -> HandedIn:
@@ -457,21 +556,6 @@ def _missing(student: Student) -> HandedIn:
     if student.submission:
         why += f": {shown(student.submission)} is not among the submissions"
     return _with_problem(HandedIn(student.key, None, student.name, problem=student.problem), why)
-
-
-def _owners(entry: _Entry, known: Mapping[str, set[str]]) -> set[str]:
-    """Students that an entry names; the first of its names that anybody has decides."""
-    for name in entry.names:
-        for form in name_forms(name):
-            if normal(form) in known:
-                return known[normal(form)]
-    # GitHub Classroom: <assignment>-<login>, where both may contain hyphens.
-    parts = entry.path.name.split("-")
-    for first in range(1, len(parts)):
-        owners = known.get(normal("-".join(parts[first:])))
-        if owners:
-            return owners
-    return set()
 
 
 def _unique(rows: list[HandedIn]) -> list[HandedIn]:

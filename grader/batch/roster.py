@@ -6,10 +6,12 @@ import codecs
 import csv
 import io
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from grader.checks.wording import listing
 from grader.errors import UsageError
 from grader.submission.paths import shown
 
@@ -28,6 +30,7 @@ _EXCEL = "Windows-1252"
 """What Excel writes in Western Europe and America, unless it is asked for UTF-8."""
 # How Excel is told the delimiter, in a line before the header.
 _DELIMITER = re.compile(r'"?sep=(.)"?\s*\n', re.IGNORECASE)
+_NO_LETTER = re.compile(r"[\W_]+")
 _END = "end of the roster"
 
 
@@ -59,14 +62,31 @@ class Student:
         return shown(self.login or self.id or self.email or self.name)
 
     @property
-    def identifiers(self) -> frozenset[str]:
-        """Every form in which the student may be named, normalised."""
+    def logins(self) -> frozenset[str]:
+        """What identifies the student, as :func:`written`: number, login, address.
+
+        Without a login the part of the address before the @ stands for it.
+        """
         local = self.email.partition("@")[0]
-        return frozenset(
-            normal(form)
-            for form in (self.id, self.login, self.email, local, *name_forms(self.name))
-            if form
-        )
+        return frozenset(map(written, (self.id, self.login or local, self.email))) - {""}
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Each way to write the whole name, as :func:`written`: ``ana lopez``, ``lopez_ana``."""
+        forms = {self.name}
+        for form in name_forms(self.name):
+            words = form.replace(",", " ").split()
+            forms |= {between.join(words) for between in (" ", "_", "-", ".", "")}
+            # Canvas' way.
+            forms.add(_letters(form))
+        return frozenset(map(written, forms)) - {""}
+
+    @property
+    def resembling(self) -> frozenset[str]:
+        """What may be meant for the student, as :func:`resemblance`."""
+        local = self.email.partition("@")[0]
+        forms = (self.id, self.login, self.email, local, *name_forms(self.name))
+        return frozenset(resemblance(form) for form in forms if form)
 
 
 @dataclass(frozen=True)
@@ -82,9 +102,22 @@ class Roster:
     problems: tuple[str, ...] = ()
 
 
-def normal(text: str) -> str:
-    """A name as it is compared: letters and digits only, in lower case."""
-    return re.sub(r"[\W_]+", "", text).casefold()
+def written(text: str) -> str:
+    """A name as it is compared: case, spaces around it and an accent's encoding do not matter."""
+    return " ".join(unicodedata.normalize("NFKC", text).casefold().split())
+
+
+def resemblance(text: str) -> str:
+    """What names have in common that are written alike: letters and digits, without accents."""
+    if not text.isascii():
+        split = unicodedata.normalize("NFKD", text)
+        text = "".join(one for one in split if not unicodedata.combining(one))
+    folded = text.casefold()
+    return _letters(folded) or folded
+
+
+def _letters(text: str) -> str:
+    return _NO_LETTER.sub("", text)
 
 
 def name_forms(name: str) -> tuple[str, ...]:
@@ -178,6 +211,7 @@ def _columns(header: Sequence[str]) -> dict[str, int]:
 
 def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) -> Roster:
     students: dict[str, Student] = {}
+    again: dict[str, list[int]] = {}
     problems: list[str] = []
     for number, row in rows:
         cells = [cell.strip() for cell in row]
@@ -193,11 +227,13 @@ def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) 
         if not student.key:
             problems.append(f"row {number}: names nobody")
             continue
-        name = normal(student.key) or student.key
+        name = written(student.key)
         known = students.setdefault(name, student)
         if known is not student:
             problems.append(f"row {number}: {student.key} is in row {known.row} already")
-            told = f"in the roster again in row {number}"
-            told = f"{known.problem}; {told}" if known.problem else told
-            students[name] = replace(known, problem=told)
+            again.setdefault(name, []).append(number)
+    for name, numbers in again.items():
+        told = f"in the roster again in row {listing(map(str, numbers))}"
+        problem = "; ".join(part for part in (students[name].problem, told) if part)
+        students[name] = replace(students[name], problem=problem)
     return Roster(tuple(students.values()), tuple(problems))

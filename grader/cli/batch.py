@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 NOT_GRADED = 3
 _AUTO = "auto"
+_MOST_PROBLEMS = 20
 
 
 def batch(
@@ -91,8 +92,12 @@ def batch(
         if grading is not None:
             progress.say(f"sandbox: {grading.enclosure}")
         names, rows = _rows(submissions, roster, out, staging, progress)
-        for problem in names.problems if names else ():
+        problems = names.problems if names else ()
+        for problem in problems[:_MOST_PROBLEMS]:
             progress.note(f"{roster or submissions}: {problem}")
+        if len(problems) > _MOST_PROBLEMS:
+            more = f"{len(problems) - _MOST_PROBLEMS} more such rows"
+            progress.note(f"{roster or submissions}: {more}")
         _refuse_within(out, rows)
         with Ledger(out).opened() as ledger:
             work = Batch(loaded, ledger, frozenset(retry or ()))
@@ -159,7 +164,10 @@ def _rows(
     def left_out(name: str) -> None:
         progress.note(f"{name} is neither a folder nor an archive, and is left out")
 
-    return read, take_in(submissions, staging, read, left_out, out)
+    def say_prefix(prefix: str) -> None:
+        progress.say(f"names are read as {prefix}LOGIN")
+
+    return read, take_in(submissions, staging, read, left_out, out, say_prefix)
 
 
 def _refuse_within(out: Path, rows: Sequence[HandedIn]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import unicodedata
 import zipfile
 from pathlib import Path
 
@@ -233,11 +234,73 @@ def test_an_archive_of_the_class_is_opened(tmp_path: Path, staging: Path) -> Non
 
 
 def test_github_classroom_repositories_go_to_their_logins(course: Path, staging: Path) -> None:
-    folder(course / "timed-publisher-ana-l")
-    roster = parse_roster("name,github\nAna Lopez,ana-l\nWei Ng,wei\n", "r.csv")
-    ana, wei = take_in(course, staging, roster)
-    assert (ana.key, ana.name) == ("ana-l", "Ana Lopez")
-    assert (wei.key, wei.path, wei.problem) == ("wei", None, "handed in nothing")
+    for login in ("ana-l", "bo", "a-wei"):
+        folder(course / f"timed-publisher-{login}")
+    roster = parse_roster("name,github\nAna Lopez,ana-l\nBo Ek,Bo\nWei Ng,wei\n", "r.csv")
+    said: list[str] = []
+    bo, ana, stranger, wei = take_in(course, staging, roster, on_prefix=said.append)
+    assert (ana.key, ana.name, ana.problem) == ("ana-l", "Ana Lopez", "")
+    assert (bo.key, bo.name, bo.problem) == ("Bo", "Bo Ek", "")
+    assert said == ["timed-publisher-"]
+    # a-wei is another login than wei.
+    assert (stranger.key, stranger.name) == ("timed-publisher-a-wei", "")
+    assert stranger.problem == "not in the roster; may be wei"
+    assert wei.path is None
+    assert wei.problem == "handed in nothing; timed-publisher-a-wei may be theirs"
+
+
+@pytest.mark.parametrize(
+    ("folders", "owner"),
+    [
+        # An exact name goes before whatever else may be meant.
+        (["ada", "hw1-a-ada"], "ada"),
+        (["hw1-ada", "hw1-a-ada"], "hw1-ada"),
+        (["hw1-ada", "hw1-bob", "hw1-a-ada"], "hw1-ada"),
+        # Nothing tells which part of these is a login.
+        (["hw1-a-ada"], None),
+        (["smith-ada"], None),
+        (["hw1-a-ada", "hw1-a-zed"], None),
+        # Other logins, other addresses.
+        (["a-da"], None),
+        (["a_da"], None),
+        (["ADA"], "ADA"),
+        (["ada.l"], None),
+        (["ada.lovelace"], "ada.lovelace"),
+        (["Lovelace, Ada"], "Lovelace, Ada"),
+    ],
+)
+def test_nobody_is_given_by_a_guess_what_may_be_somebody_else_s(
+    course: Path, staging: Path, folders: list[str], owner: str | None
+) -> None:
+    for name in folders:
+        folder(course / name)
+    students = (
+        Student(2, login="ada", email="ada.l@example.org", name="Ada Lovelace"),
+        Student(3, login="bob"),
+    )
+    rows = {row.key: row for row in take_in(course, staging, Roster(students))}
+    assert rows["ada"].path == (course / owner if owner else None)
+    for name in folders:
+        if name == owner or name.endswith(("bob", "zed")):
+            continue
+        # It stands on both rows.
+        assert "may be ada" in rows[name].problem
+        assert name in rows["ada"].problem and "may be theirs" in rows["ada"].problem
+
+
+def test_a_name_is_the_same_however_its_accents_are_encoded(course: Path, staging: Path) -> None:
+    folder(course / unicodedata.normalize("NFD", "Núñez, Ana"))
+    folder(course / "muller")
+    students = (Student(2, login="s1", name="Ana Núñez"), Student(3, login="s2", name="Müller"))
+    rows = {row.key: row for row in take_in(course, staging, Roster(students))}
+    assert rows["s1"].path is not None and not rows["s1"].problem
+    assert rows["s2"].problem == "handed in nothing; muller may be theirs"
+
+
+def test_logins_that_differ_by_a_hyphen_are_two_students() -> None:
+    roster = parse_roster("login\na-da\nada\n", "r.csv")
+    assert [student.key for student in roster.students] == ["a-da", "ada"]
+    assert not roster.problems
 
 
 def test_who_is_not_in_the_roster_is_graded_and_said(course: Path, staging: Path) -> None:
@@ -252,7 +315,9 @@ def test_a_name_that_two_students_have_is_given_to_neither(course: Path, staging
     roster = Roster((Student(2, id="1", name="Ana Lopez"), Student(3, id="2", name="Lopez, Ana")))
     rows = {row.key: row for row in take_in(course, staging, roster)}
     assert rows["Ana Lopez"].problem == "may be 1 or 2"
-    assert rows["1"].path is None and rows["2"].path is None
+    for key in ("1", "2"):
+        assert rows[key].path is None
+        assert rows[key].problem == "handed in nothing; Ana Lopez may be theirs"
 
 
 def test_what_a_roster_names_is_whose_it_says(course: Path, staging: Path) -> None:
@@ -284,7 +349,10 @@ def test_two_submissions_of_one_student_are_both_rows(course: Path, staging: Pat
     archive(course / "Ana.zip")
     rows = take_in(course, staging, Roster((Student(2, login="ana"),)))
     assert [row.key for row in rows] == ["ana", "ana (2)"]
-    assert rows[1].problem == "handed in twice: Ana.zip too"
+    assert [row.problem for row in rows] == [
+        "handed in twice: ana too",
+        "handed in twice: Ana.zip too",
+    ]
 
 
 @pytest.mark.parametrize("name", ["a\nb", "q'\"uote", "🤖", "\u202eevil", "-rf", "a b.zip.d"])
@@ -325,9 +393,7 @@ def test_who_is_in_the_roster_twice_is_told_on_the_row(course: Path, staging: Pa
     roster = parse_roster("login,name\nana,Ana\nben,Ben\nana,Ana\nben,Ben\nben,Ben\n", "r.csv")
     rows = {row.key: row for row in take_in(course, staging, roster)}
     assert rows["ana"].problem == "in the roster again in row 4"
-    assert rows["ben"].problem == (
-        "handed in nothing; in the roster again in row 5; in the roster again in row 6"
-    )
+    assert rows["ben"].problem == ("handed in nothing; in the roster again in row 5 and 6")
     assert len(rows) == 2
 
 
