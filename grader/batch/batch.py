@@ -63,6 +63,7 @@ class Batch:
     ledger: Ledger
     retry: frozenset[str] = frozenset()
     _entries: dict[str, Entry] = field(default_factory=dict)
+    _twins: dict[str, list[str]] = field(default_factory=dict)
 
     def read(
         self, rows: Sequence[HandedIn], on_read: Callable[[str], None] = lambda _: None
@@ -98,6 +99,7 @@ class Batch:
                 original = row.key if distinct else first.setdefault(entry.sha256, row.key)
                 if original != row.key:
                     entry = replace(entry, same_as=original)
+                    self._twins.setdefault(original, []).append(row.key)
                 elif not entry.fault:
                     paths[row.key] = row.path
             self._entries[row.key] = entry
@@ -168,8 +170,8 @@ class Batch:
         if result is None or result.submission.sha256 != self._entries[key].sha256:
             return False
         # Of the same submissions only one is graded, whichever of them was named.
-        same = {twin.key for twin in self._entries.values() if twin.same_as == key}
-        if RETRY_ALL in self.retry or not self.retry.isdisjoint({key, *same}):
+        same = {key, *self._twins.get(key, ())}
+        if RETRY_ALL in self.retry or not self.retry.isdisjoint(same):
             return False
         return not (RETRY_ERRORS in self.retry and not result.graded)
 
@@ -222,7 +224,7 @@ class Batch:
         entry = self._entries[key]
         result = self.ledger.result(key) if entry.sha256 and not entry.fault else None
         yield Done(entry, result, fresh)
-        for twin in [item for item in self._entries.values() if item.same_as == key]:
+        for twin in [self._entries[name] for name in self._twins.get(key, ())]:
             told = self._entries[twin.key] = replace(twin, fault=entry.fault)
             if result is not None:
                 try:

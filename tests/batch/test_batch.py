@@ -6,22 +6,27 @@ What is handed in here cannot be built, so that nothing needs ROS.
 from __future__ import annotations
 
 import shutil
+import sys
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import pytest
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import NOT_YET, Batch, Done
-from grader.batch.class_files import copies, notes
+from grader.batch.class_files import class_rows, copies, notes
 from grader.batch.crew import Crew, CrewLost, LocalCrew
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.intake import HandedIn, take_in
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.rendering import find_reports
+from grader.batch.roster import parse_roster
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
 from grader.report.result import make_result
@@ -325,3 +330,58 @@ def test_no_grade_is_told_that_was_removed_with_its_folder(course: Class, replac
             assert not (out / "batch.json").exists()
     crew.close()
     assert all(item.result is not None for item in course.grade(course.crew()).values())
+
+
+def steps(work: Callable[[], object]) -> int:
+    """How many instructions of Python some work takes: the same on a busy machine."""
+    count = 0
+
+    def trace(frame: FrameType, event: str, _: Any) -> Any:
+        nonlocal count
+        frame.f_trace_opcodes = True
+        frame.f_trace_lines = False
+        count += event == "opcode"
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        work()
+    finally:
+        sys.settrace(before)
+    return count
+
+
+@pytest.mark.parametrize("line", ["s{0},Ana {0},s{0}@x.org", "s,Ana,s@x.org", "s{0},Ana,s@x.org"])
+def test_a_roster_twice_as_long_takes_no_more_than_twice_the_work(
+    course: Class, tmp_path: Path, line: str
+) -> None:
+    for name in ("s1", "Ana", "hw1-s2", "hw1-s3"):
+        course.hand_in(name, name)
+
+    def whole(size: int) -> int:
+        """From the roster to what is written of the class, without what is graded."""
+        out, staging = tmp_path / f"out{size}", tmp_path / f"staging{size}"
+        staging.mkdir()
+        text = "login,name,email\n" + "".join(f"{line.format(n)}\n" for n in range(size))
+
+        def work() -> None:
+            roster = parse_roster(text, "r.csv")
+            rows = take_in(course.folder / "class", staging, roster)
+            with Ledger(out).opened() as ledger:
+                batch = Batch(course.loaded, ledger)
+                batch.read(rows)
+                done = list(batch.grade({}, None))
+                batch.left(done)
+                class_rows(done, ledger)
+
+        return steps(work)
+
+    whole(10)
+    assert whole(800) < 2.2 * whole(400)
+
+
+def test_a_row_that_stands_in_a_roster_very_often_is_told_in_few_words() -> None:
+    (student,) = parse_roster("login\n" + "ana\n" * 1_000, "r.csv").students
+    assert student.problem.startswith("in the roster again in row 3, 4,")
+    assert student.problem.endswith(" more") and len(student.problem) < 100
