@@ -25,9 +25,9 @@ from grader.run.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.submission.bounded import OutputLimits
-from grader.submission.build_cache import files_in
 from grader.submission.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
+from grader.tree import listing
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
@@ -145,23 +145,23 @@ class Grading:
         return sandbox and sandbox.allowing(self._loaded.assignment.libraries)
 
     def _watched(self, prepared: Prepared) -> Callable[[Mapping[str, Recording]], None]:
-        """See that no point is lost because somebody empties the cache while nodes run.
+        """See that no point is lost because the cache is emptied or damaged while nodes run.
 
         Returns:
             What takes the recordings and raises :class:`GraderFault` if anything that they run
-            with was deleted since.
+            with was deleted or changed since.
         """
         sandbox = self._sandbox
         check_python = sandbox.watched() if sandbox is not None and prepared.install else None
         folders = (*prepared.underlays, *((prepared.install,) if prepared.install else ()))
-        before = [(folder, files_in(folder)) for folder in folders]
+        before = [(folder, listing(folder)) for folder in folders]
 
         def check(recordings: Mapping[str, Recording]) -> None:
             for folder, files in before:
-                if not files <= files_in(folder):
+                if not files <= listing(folder):
                     raise GraderFault(
-                        f"files of what was built were deleted in {folder.parent} while it ran, "
-                        "perhaps by somebody who tidied up; grade again"
+                        f"files of what was built were deleted or changed in {folder.parent} "
+                        "while it ran, perhaps by somebody who tidied up; grade again"
                     )
             # To look at every file of it takes 0.1 s; without one a program ends by itself.
             if check_python is not None and any(map(_has_died, recordings.values())):

@@ -12,6 +12,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.ros import RosInstallation
 from grader.submission.build_cache import BuildCache
 from grader.submission.underlay import completed, install_prefix
+from grader.tree import listing
 
 _WORD = re.compile(r"\w+")
 
@@ -31,7 +32,7 @@ class TypeSupport:
         self._ros = ros
         self._cache = cache
         self._lock = threading.Lock()
-        self._prefixes: tuple[Path, ...] | None = None
+        self._found: dict[Path, frozenset[str]] | None = None
 
     def prefixes(self, on_build: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Install spaces of ours for the cell; built where they are not there yet, or any more.
@@ -43,10 +44,12 @@ class TypeSupport:
             GraderFault: They cannot be built here.
         """
         with self._lock:
-            # Somebody may empty the cache while a class is graded, or while rosgrade watches.
-            if self._prefixes is None or not all(path.is_dir() for path in self._prefixes):
-                self._prefixes = self._built(on_build)
-            return self._prefixes
+            # The cache may be emptied or damaged while a class is graded, or rosgrade watches.
+            if self._found is None or any(
+                not path.is_dir() or files != listing(path) for path, files in self._found.items()
+            ):
+                self._found = {path: listing(path) for path in self._built(on_build)}
+            return tuple(self._found)
 
     def _built(self, on_build: Callable[[str], None]) -> tuple[Path, ...]:
         cache = BuildCache(self._cache)

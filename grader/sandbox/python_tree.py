@@ -20,14 +20,14 @@ import tempfile
 import time
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from importlib import metadata
 from pathlib import Path
 
 from grader.errors import GraderFault
 from grader.nearest import did_you_mean
+from grader.tree import listing
 
-VERSION = 1
+VERSION = 2
 KEPT = 4
 """Trees that nobody uses at the moment; each holds up to 0.3 GB where ROS was updated since."""
 AGE_S = 30 * 24 * 3600.0
@@ -49,33 +49,20 @@ class PythonTree:
     Attributes:
         path: Its folder.
         lock: Descriptor of the lock.
-        prefix: The environment that it was made of.
-        wanted: Distributions in it besides those of ROS.
     """
 
     path: Path
     lock: int
-    prefix: Path
-    wanted: frozenset[str] = frozenset()
 
     def is_whole(self) -> bool:
-        """Whether all of it is still there: caches are emptied, and old files tidied away."""
-        present = {
-            os.path.relpath(os.path.join(folder, name), self.path)  # noqa: PTH118
-            for folder, folders, names in os.walk(self.path)
-            for name in (*folders, *names)
-        }
-        return self._expected <= present
-
-    @cached_property
-    def _expected(self) -> frozenset[str]:
-        files = _contents(self.prefix, _closure(self.wanted).values())
-        there = (str(file) for file in files if os.path.lexists(self.prefix / file))
-        # What is seen through the link lib64 lies in lib.
-        return frozenset(re.sub("^lib64/", "lib/", file) for file in there)
+        """Whether all of it is still there as it was made: caches are emptied, disks damaged."""
+        try:
+            return _list_file(self.path).read_text(encoding="ascii") == _listed(self.path)
+        except (OSError, ValueError):
+            return False
 
     def discard(self) -> None:
-        """Let another one be made in its place; whoever uses it keeps what is left."""
+        """Let another one be made in its place; what uses it keeps what is left."""
         with contextlib.suppress(OSError):
             gone = tempfile.mkdtemp(prefix=_UNFINISHED, dir=self.path.parent)
             self.path.rename(gone)
@@ -115,7 +102,9 @@ def student_prefix(
     parts += sorted(path.name for path in prefix.glob("lib/python3*/site-packages/*-info"))
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
     target = trees_folder(cache) / key
-    tree = PythonTree(target, _hold(target), prefix, wanted)
+    tree = PythonTree(target, _hold(target))
+    if target.is_dir() and not tree.is_whole():
+        tree.discard()
     if not target.is_dir():
         _make(target, prefix, _closure(wanted).values())
         prune(target.parent)
@@ -200,6 +189,7 @@ def prune(folder: Path, kept: int = KEPT, age_s: float = AGE_S) -> None:
                     gone = path.with_name(f"{_UNFINISHED}{path.name}")
                     with contextlib.suppress(OSError):
                         path.rename(gone)
+                        _list_file(path).unlink(missing_ok=True)
                     shutil.rmtree(gone, ignore_errors=True)
 
 
@@ -258,11 +248,24 @@ def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribut
             _link(prefix / file, unfinished / file)
         for folder, _, _ in os.walk(unfinished):
             Path(folder).chmod(0o755)
+        with tempfile.NamedTemporaryFile("w", dir=target.parent, delete=False) as list_file:
+            list_file.write(_listed(unfinished))
+        Path(list_file.name).replace(_list_file(target))
         # Somebody else was quicker, perhaps.
         with contextlib.suppress(OSError):
             unfinished.rename(target)
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def _list_file(tree: Path) -> Path:
+    """The file beside an environment that says what is in it."""
+    return tree.with_name(f"{tree.name}.files")
+
+
+def _listed(tree: Path) -> str:
+    text = "\n".join(sorted(listing(tree)))
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def _contents(prefix: Path, distributions: Iterable[metadata.Distribution]) -> set[Path]:

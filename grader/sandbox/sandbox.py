@@ -99,9 +99,9 @@ class Sandbox:
         return self._filter_file(student_filter(one_session=True))
 
     def _filter_file(self, program: bytes) -> Path:
-        # Looked for at every use: somebody may empty the cache while rosgrade watches.
+        # Read at every use: the cache may be emptied while rosgrade watches, or a disk damage it.
         file = self.cache / "sandbox" / f"{hashlib.sha256(program).hexdigest()[:32]}.bpf"
-        if not file.is_file():
+        if not file.is_file() or file.read_bytes() != program:
             file.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as unfinished:
                 unfinished.write(program)

@@ -26,6 +26,8 @@ _UNHEARD_OF = (
     *("init_module", "finit_module", "delete_module", "kexec_load", "kexec_file_load"),
 )
 """Calls that no node and no library of one has a use for."""
+_LEADER = 2
+"""What a sandbox is started with; of a build that is colcon."""
 INIT = 1
 """The first process of a sandbox, the only one in it that is not the student's."""
 _REFUSED = (
@@ -58,6 +60,8 @@ _SOCKET_LEVEL, _BUFFER_SIZES = 1, (7, 8, 32, 33)
 # CLONE_NEWNS, NEWCGROUP, NEWUTS, NEWIPC, NEWUSER, NEWPID, NEWNET, NEWTIME: linux/sched.h
 _NAMESPACES = (0x20000, 0x2000000, 0x4000000, 0x8000000, 0x10000000, 0x20000000, 0x40000000, 0x80)
 _TIOCSTI, _TIOCLINUX = 0x5412, 0x541C
+# F_SETOWN and F_SETOWN_EX; FIOSETOWN and SIOCSPGRP: asm-generic/fcntl.h, sockios.h
+_OWNERS, _OWNING = (8, 15), (0x8901, 0x8902)
 _INT = 0xFFFFFFFF
 # AF_UNIX, AF_INET, AF_INET6, AF_NETLINK (getifaddrs): linux/socket.h
 _FAMILIES = (1, 2, 10, 16)
@@ -69,8 +73,9 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
     """Assemble the filter, as the BPF program that ``bwrap --seccomp`` takes.
 
     Args:
-        one_session: Also keep all processes in one session, as the kernel shares the CPU between
-            sessions. A daemon then gets the signals that are meant for its parent.
+        one_session: For a build: also keep all processes in one session, as the kernel shares
+            the CPU between sessions, and let none of them send a signal to what started them.
+            A daemon then gets the signals that are meant for its parent.
         guarded: What :func:`guard_filter` tells of is left to it.
 
     Raises:
@@ -88,7 +93,15 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
         _add(rules, refuse, "clone", seccomp.Arg(0, seccomp.MASKED_EQ, flag, flag))
     # Its flags are in memory, where a filter cannot look; libc then uses clone.
     _add(rules, seccomp.ERRNO(errno.ENOSYS), "clone3")
-    for request in (_TIOCSTI, _TIOCLINUX):
+    for target in (0, -1, INIT, -INIT, _LEADER, -_LEADER) if one_session else ():
+        at_leader = seccomp.Arg(0, seccomp.MASKED_EQ, _INT, target & _INT)
+        for name in (*_SIGNALLING, "pidfd_open"):
+            _add(rules, refuse, name, at_leader)
+    # The limits of another process, and signals by way of a file that is ready.
+    _add(rules, refuse, "prlimit64", seccomp.Arg(0, seccomp.NE, 0))
+    for command in _OWNERS:
+        _add(rules, refuse, "fcntl", seccomp.Arg(1, seccomp.MASKED_EQ, _INT, command))
+    for request in (_TIOCSTI, _TIOCLINUX, *_OWNING):
         _add(rules, refuse, "ioctl", seccomp.Arg(1, seccomp.MASKED_EQ, _INT, request))
     for option in _BUFFER_SIZES:
         level = seccomp.Arg(1, seccomp.MASKED_EQ, _INT, _SOCKET_LEVEL)

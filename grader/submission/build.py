@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from grader.errors import GraderFault
 from grader.oom import oom_kills
@@ -37,6 +37,7 @@ from grader.submission.toolchain import missing_here, missing_tools
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
 
+_T = TypeVar("_T")
 _WHOLE_LOG = 60_000
 _SUMMARY = re.compile(r"Summary: \d+ packages? finished")
 _SIGNALLED = 128
@@ -45,6 +46,22 @@ _KILLED = re.compile(r"code -9\b|\bSIGKILL\b|\bKilled\b")
 _LEAST_FREE_BYTES = 64 * MIB
 # What makes the sandbox, each with its own complaint; colcon is only started by the last.
 _NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|prlimit): .*")
+
+
+class BuildKilled(GraderFault):
+    """A build was ended by a signal from outside; once more it may come to its end."""
+
+
+def once_more(attempt: Callable[[bool], _T]) -> _T:
+    """Build, and build again if the first build was killed.
+
+    Args:
+        attempt: Builds from the beginning; told whether it is the second time.
+    """
+    try:
+        return attempt(False)
+    except BuildKilled:
+        return attempt(True)
 
 
 def build(
@@ -61,6 +78,7 @@ def build(
     sandbox: Sandbox | None = None,
     stop: threading.Event | None = None,
     on_output: Callable[[str], None] = lambda _: None,
+    is_second: bool = False,
 ) -> CachedBuild:
     """Build all packages of a submission, unless just this was built before.
 
@@ -79,8 +97,10 @@ def build(
         sandbox: What the build runs in, or None.
         stop: Ends the build from another thread when it is set.
         on_output: Called with each line of colcon's as it comes.
+        is_second: Whether an earlier attempt raised :class:`BuildKilled`.
 
     Raises:
+        BuildKilled: A signal ended it that no limit of ours sends.
         GraderFault: It could not be built here, for no fault of the student: colcon is missing,
             the disk is full.
     """
@@ -100,7 +120,7 @@ def build(
         stop=stop,
         on_output=on_output,
     )
-    workshop = _Workshop(located, sources, ros, colcon, on_output)
+    workshop = _Workshop(located, sources, ros, colcon, on_output, is_second)
     alone = partial(
         build,
         ros=ros,
@@ -111,6 +131,7 @@ def build(
         on_progress=on_progress,
         sandbox=sandbox,
         stop=stop,
+        is_second=is_second,
     )
     terms = [*_terms(limits, sandbox), *(["apart"] if is_apart else [])]
     key = build_key(located.sha256, ros, sandboxed=sandbox is not None, terms=terms)
@@ -157,6 +178,7 @@ class _Workshop:
     ros: RosInstallation
     colcon: Callable[[Path, Path], Colcon]
     on_output: Callable[[str], None]
+    is_second: bool
 
     def build(self, install: Path, parts: Mapping[str, CachedBuild]) -> BuildRecord:
         # Beside the copy, so that relative paths in the log are the same on every run.
@@ -174,13 +196,9 @@ class _Workshop:
         kills = oom_kills()
         check_python = colcon.sandbox.watched() if colcon.sandbox else None
         outcome = colcon.build(finished)
-        killed = None
         if kills != oom_kills():
             _check_memory(outcome)
-        elif colcon.sandbox is not None and kills is not None:
-            killed = _killed_from_within(outcome)
-        if killed is None:
-            self._check_machine(outcome, scratch, install)
+        self._check_machine(outcome, scratch, install)
         if check_python is not None and outcome.status != 0:
             check_python()
         limits = colcon.limits
@@ -190,7 +208,7 @@ class _Workshop:
             most_bytes=limits.install_bytes,
             most_files=limits.install_files,
         )
-        problem = problem or _ended_by_us(outcome, colcon.wall_s) or killed
+        problem = problem or _ended_by_us(outcome, colcon.wall_s)
         record = self._record(outcome, finished, problem, scratch, install)
         record = _with_parts(record, parts.values())
         if finished:
@@ -205,10 +223,15 @@ class _Workshop:
         """Raise what is not the student's fault."""
         if outcome.ended_by_us:
             return
-        if outcome.status is not None and outcome.status < 0:
-            raise GraderFault(
-                f"colcon was killed by signal {-outcome.status}; perhaps memory ran out"
+        killed = _signal_of(outcome)
+        if killed is not None:
+            raise BuildKilled(
+                f"colcon was ended by {killed}, twice, which no limit of ours sends: "
+                "perhaps somebody stopped it, or memory ran out; grade again"
             )
+        if not self.is_second and outcome.status != 0 and _KILLED.search(outcome.output):
+            # Perhaps by the build itself; then it happens again.
+            raise BuildKilled("a program of the build was killed")
         unstarted = _NOT_STARTED.match(outcome.output) if outcome.status else None
         if unstarted and "Starting >>>" not in outcome.output:
             raise GraderFault(f"the sandbox of the build could not be started: {unstarted[0]}")
@@ -286,22 +309,21 @@ def _check_memory(outcome: Outcome) -> None:
         raise GraderFault("this machine ran out of memory: a program of the build was killed")
 
 
-def _killed_from_within(outcome: Outcome) -> str | None:
-    """Say which signal ended colcon in a sandbox, or None; nobody else's reaches into one.
+def _signal_of(outcome: Outcome) -> str | None:
+    """The signal that ended colcon, or None.
 
-    The kernel itself may end a process for want of memory: see to that before.
+    In a sandbox no program of a build can send it one (see :func:`student_filter`), and none can
+    write to its memory: see :data:`~grader.submission.colcon.UNTOUCHABLE`.
     """
-    status = outcome.status
-    if _SUMMARY.search(outcome.output):
+    if outcome.status is None or _SUMMARY.search(outcome.output):
         # It came to its end, and ends with the status of what failed, such as sys.exit(137).
         return None
     # As a shell tells of a signal, and bubblewrap does.
-    number = status - _SIGNALLED if status is not None and status > _SIGNALLED else None
-    if number is None or number >= signal.NSIG:
+    number = -outcome.status if outcome.status < 0 else outcome.status - _SIGNALLED
+    if not 0 < number < signal.NSIG:
         return None
     # Few of the real-time signals have a name.
-    name = next((one.name for one in signal.Signals if one == number), f"signal {number}")
-    return f"colcon was ended by {name}, which only a program of the build can have sent"
+    return next((one.name for one in signal.Signals if one == number), f"signal {number}")
 
 
 def _is_cut_off(output: str, packages: Collection[str]) -> bool:

@@ -2,7 +2,8 @@
 
 ``<cache>/builds/<key>/`` holds ``build.json`` and, where something was installed, ``install/``.
 An entry is made under another name and renamed, so it is there as a whole or not at all. The
-hash in it finds damage, such as a student's program that wrote into its own installation.
+hashes in it find damage, such as a disk that lost a block, or a student's program that wrote into
+its own installation; what is damaged is built anew.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from grader.tree import remove_tree
 INSTALL = "install"
 
 _RECORD = "build.json"
+_SITE_PACKAGES, _COMPILED = "site-packages", "__pycache__"
 _UNFINISHED = ".unfinished-"
 _PRUNED = "pruned.stamp"
 _PRUNE_EACH_S = 600.0
@@ -53,7 +55,7 @@ class CacheLimits:
 
 @dataclass(frozen=True)
 class _Entry:
-    """The content of ``build.json``."""
+    """The content of ``build.json``, behind a line with its hash."""
 
     build: BuildRecord
     installed: bool
@@ -161,7 +163,8 @@ class BuildCache:
         size = sum(path.lstat().st_size for path in _files(install))
         entry = _Entry(build, installed, tree_hash(install) if installed else "", size)
         with _usable(self._folder):
-            (unfinished / _RECORD).write_bytes(_ENTRY.dump_json(entry))
+            content = _ENTRY.dump_json(entry)
+            (unfinished / _RECORD).write_bytes(_hash_line(content) + content)
             other = self.find(key)
             if other is not None:
                 return other
@@ -209,9 +212,9 @@ class BuildCache:
 
 
 def tree_hash(folder: Path) -> str:
-    """Hash all files and links below a folder, but for what Python caches while it runs."""
+    """Hash all files and links below a folder, with what the build compiled of Python."""
     total = hashlib.sha256()
-    for path in _files(folder):
+    for path in _files(folder, compiled=True):
         name = os.fsencode(path.relative_to(folder))
         status = path.lstat()
         if stat.S_ISLNK(status.st_mode):
@@ -225,24 +228,26 @@ def tree_hash(folder: Path) -> str:
     return total.hexdigest()
 
 
-def files_in(folder: Path) -> frozenset[Path]:
-    """All files and links below a folder, but for what Python caches while it runs."""
-    return frozenset(_files(folder))
-
-
-def _files(folder: Path) -> Iterator[Path]:
+def _files(folder: Path, *, compiled: bool = False) -> Iterator[Path]:
     for parent, folders, names in os.walk(folder):
         links = [name for name in folders if Path(parent, name).is_symlink()]
-        folders[:] = sorted(name for name in folders if name != "__pycache__")
+        # Elsewhere Python compiles while a node runs, without a sandbox.
+        kept = compiled and _SITE_PACKAGES in Path(parent).parts
+        folders[:] = sorted(name for name in folders if kept or name != _COMPILED)
         for name in sorted([*names, *links]):
             yield Path(parent, name)
 
 
 def _read(folder: Path) -> _Entry | None:
     try:
-        return _ENTRY.validate_json((folder / _RECORD).read_bytes())
+        line, _, content = (folder / _RECORD).read_bytes().partition(b"\n")
+        return _ENTRY.validate_json(content) if _hash_line(content) == line + b"\n" else None
     except (OSError, ValidationError):
         return None
+
+
+def _hash_line(content: bytes) -> bytes:
+    return hashlib.sha256(content).hexdigest().encode() + b"\n"
 
 
 def _size(folder: Path) -> int:

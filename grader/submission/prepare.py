@@ -16,7 +16,7 @@ from grader.ros import RosInstallation
 from grader.submission import source
 from grader.submission.apart import built_apart
 from grader.submission.archive import SUFFIXES
-from grader.submission.build import build
+from grader.submission.build import build, once_more
 from grader.submission.build_cache import BuildCache, CacheLimits
 from grader.submission.build_limits import BuildLimits
 from grader.submission.culprit import Sources
@@ -100,10 +100,16 @@ def prepare(
     limits = limits or PrepareLimits()
     source = check_path(path)
     on_progress("reading the submission")
-    try:
+    builds = BuildCache(cache, limits.cache)
+
+    def attempt(is_second: bool) -> Prepared:
         with opened(source, limits.archive) as located:
-            builds = BuildCache(cache, limits.cache)
-            return _prepare(located, ros, builds, limits, on_progress, sandbox, stop, on_output)
+            return _prepare(
+                located, ros, builds, limits, on_progress, sandbox, stop, on_output, is_second
+            )
+
+    try:
+        return once_more(attempt)
     except SubmissionError as error:
         return refused(source, error)
 
@@ -164,6 +170,7 @@ def _prepare(
     sandbox: Sandbox | None,
     stop: threading.Event | None,
     on_output: Callable[[str], None],
+    is_second: bool,
 ) -> Prepared:
     allowance = source.Allowance()
     packages = [
@@ -198,6 +205,7 @@ def _prepare(
         sandbox=sandbox,
         stop=stop,
         on_output=on_output,
+        is_second=is_second,
     )
     if built.build.cached:
         for line in built.build.log.splitlines():

@@ -15,8 +15,8 @@ from pathlib import Path
 from grader.errors import GraderFault
 from grader.resources import carried_interfaces
 from grader.ros import RosInstallation
-from grader.submission.build import build
-from grader.submission.build_cache import BuildCache
+from grader.submission.build import build, once_more
+from grader.submission.build_cache import BuildCache, CachedBuild
 from grader.submission.build_limits import BuildLimits
 from grader.submission.culprit import Sources
 from grader.submission.locate import opened
@@ -50,21 +50,26 @@ def install_prefix(
         GraderFault: They do not build on this machine.
     """
     check_toolchain(ros.environment({})["PATH"])
-    with opened(packages) as located:
-        folders = {
-            packages.name if folder == "." else folder.rpartition("/")[2]: folder
-            for folder in located.packages
-        }
-        built = build(
-            located,
-            Sources({file.path for file in located.files}, folders),
-            ros,
-            only_python=False,
-            cache=cache,
-            is_apart=True,
-            limits=_LIMITS,
-            on_progress=lambda what: on_progress(f"{what} (ours, once on this machine)"),
-        )
+
+    def attempt(is_second: bool) -> CachedBuild:
+        with opened(packages) as located:
+            folders = {
+                packages.name if folder == "." else folder.rpartition("/")[2]: folder
+                for folder in located.packages
+            }
+            return build(
+                located,
+                Sources({file.path for file in located.files}, folders),
+                ros,
+                only_python=False,
+                cache=cache,
+                is_apart=True,
+                limits=_LIMITS,
+                on_progress=lambda what: on_progress(f"{what} (ours, once on this machine)"),
+                is_second=is_second,
+            )
+
+    built = once_more(attempt)
     if built.install is None or not built.build.succeeded:
         reason = built.build.culprit or built.build.log[-2000:]
         raise GraderFault(f"the interface packages in {packages} could not be built: {reason}")

@@ -481,12 +481,22 @@ ATTACKS = {
     "build_kills_colcon": Attack(
         at_build=KILL_COLCON.format(signal=9),
         lost=frozenset({"builds"}),
-        named=("colcon was ended by SIGKILL, which only a program of the build",),
+        named=("PermissionError: [Errno 1] Operation not permitted",),
     ),
     "build_kills_colcon_in_real_time": Attack(
         at_build=KILL_COLCON.format(signal=40),
         lost=frozenset({"builds"}),
-        named=("colcon was ended by signal 40, which only a program of the build",),
+        named=("PermissionError: [Errno 1] Operation not permitted",),
+    ),
+    "build_kills_its_group": Attack(
+        at_build="import os, sys\nif 'install' in sys.argv:\n    os.kill(0, 15)",
+        lost=frozenset({"builds"}),
+        named=("PermissionError: [Errno 1] Operation not permitted",),
+    ),
+    "build_writes_into_colcon": Attack(
+        at_build="import os\nopen(f'/proc/{os.getppid()}/mem', 'r+b')",
+        lost=frozenset({"builds"}),
+        named=("PermissionError: [Errno 13] Permission denied",),
     ),
     # No signal, though a shell would tell of one so.
     "build_ends_as_if_killed": Attack(

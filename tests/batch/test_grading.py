@@ -125,7 +125,7 @@ def grade(lesson: LoadedAssignment, tmp_path: Path) -> Grade:
     def run(*outcomes: Recording | Exception) -> tuple[Graded, ScriptedRunner]:
         runner = ScriptedRunner(*outcomes)
         grading = Grading(lesson, runner, tmp_path / "cache")
-        prepared = Prepared(record=SUBMISSION, install=tmp_path)
+        prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
         return grading.grade_prepared(prepared, tmp_path / "recordings"), runner
 
     return run
@@ -245,7 +245,7 @@ def test_a_cache_that_is_emptied_while_nodes_run_costs_nobody_points(
             super().run(*arguments, alone=alone, **more)
 
     grading = Grading(lesson, Emptied(recording(stop_s=9.0)), tmp_path / "cache")
-    with pytest.raises(GraderFault, match=r"deleted in .* while it ran"):
+    with pytest.raises(GraderFault, match=r"deleted or changed in .* while it ran"):
         grading.grade_prepared(Prepared(SUBMISSION, install), tmp_path / "recordings")
 
 

@@ -145,6 +145,24 @@ def test_a_python_that_somebody_tidied_up_is_found_out_and_made_anew(tmp_path: P
     sandbox.watched()()
 
 
+def test_a_damaged_python_or_filter_is_made_anew(tmp_path: Path) -> None:
+    sandbox = Sandbox(tmp_path)
+    damaged = next(sandbox.python_tree.glob("lib/python3*/site-packages/rclpy/node.py"))
+    whole = damaged.read_bytes()
+    # As a file of its own: the environment of ours has the same by a hard link.
+    damaged.unlink()
+    damaged.write_bytes(bytes(len(whole)))
+    for file in (sandbox.filter_file, sandbox.guard_file, sandbox.build_filter_file):
+        program = file.read_bytes()
+        file.write_bytes(bytes(len(program)))
+        again = Sandbox(tmp_path)
+        assert program in (again.filter_file.read_bytes(), again.guard_file.read_bytes()) or (
+            again.build_filter_file.read_bytes() == program
+        )
+    (found,) = Sandbox(tmp_path).python_tree.glob("lib/python3*/site-packages/rclpy/node.py")
+    assert found.read_bytes() == whole
+
+
 def test_a_library_that_the_assignment_allows_is_there(tmp_path: Path) -> None:
     sandbox = Sandbox(tmp_path).allowing(("SciPy",))
     (site,) = sandbox.python_tree.glob("lib/python3*/site-packages")

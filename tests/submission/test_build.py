@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +15,9 @@ import pytest
 from grader.checks.unbuilt import why_not_built
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
+from grader.run.descendants import descendants
 from grader.sandbox.sandbox import Sandbox
+from grader.sandbox.trial import try_sandbox
 from grader.submission.build_key import build_key
 from grader.submission.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
@@ -282,7 +285,7 @@ def test_a_setup_py_that_the_kernel_ends_for_want_of_memory_is_no_fault_of_the_s
     tree: Tree, real_ros: RosInstallation, monkeypatch: pytest.MonkeyPatch, kills: int
 ) -> None:
     tree.package({"setup.py": f"import os\nos.kill(os.getpid(), 9)\n{SETUP_PY}"})
-    counted = iter([1, kills])
+    counted = iter([1, kills, 1, 1])
     monkeypatch.setattr("grader.submission.build.oom_kills", counted.__next__)
     if kills == 1:
         assert not build_of(prepared(tree, real_ros)).succeeded
@@ -295,7 +298,7 @@ def test_a_colcon_that_is_killed_is_no_fault_of_the_student(
     tree: Tree, real_ros: RosInstallation
 ) -> None:
     tree.package({"setup.py": f"import os\nos.kill(os.getppid(), 9)\n{SETUP_PY}"})
-    with pytest.raises(GraderFault, match="killed by signal 9"):
+    with pytest.raises(GraderFault, match="colcon was ended by SIGKILL"):
         prepared(tree, real_ros)
 
 
@@ -415,3 +418,50 @@ def test_a_build_depends_on_the_submission_and_the_installation(
     (index / "std_msgs").unlink()
     again = RosInstallation(named_ros.source, named_ros.python, named_ros.prefixes)
     assert build_key("0", again) != first
+
+
+READY = "ready to be killed"
+WAITS = f"""\
+import sys, time
+if 'install' in sys.argv:
+    print({READY!r}, flush=True)
+    time.sleep(1)
+{SETUP_PY}"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("enclosed", [True, False])
+@pytest.mark.parametrize(
+    ("target", "times", "graded"),
+    [("runpy", 1, True), ("runpy", 9, False), ("setup.py", 1, True)],
+)
+def test_a_build_that_is_killed_from_outside_is_built_again_and_never_kept(
+    tree: Tree, real_ros: RosInstallation, enclosed: bool, target: str, times: int, graded: bool
+) -> None:
+    if enclosed and try_sandbox().problem:
+        pytest.skip("no sandbox on this machine")
+    tree.package({"setup.py": WAITS})
+    cache = tree.root.parent / "cache"
+    killed: list[int] = []
+
+    def kill(line: str) -> None:
+        if READY not in line or len(killed) == times:
+            return
+        commands = descendants(os.getpid()).items()
+        found = [pid for pid, command in commands if target in command and "bwrap" not in command]
+        pid = max(found)
+        killed.append(pid)
+        os.kill(pid, signal.SIGKILL)
+
+    def graded_now() -> Prepared:
+        sandbox = Sandbox(cache) if enclosed else None
+        return prepare(tree.root, real_ros, cache=cache, sandbox=sandbox, on_output=kill)
+
+    if graded:
+        build = build_of(graded_now())
+        assert (build.succeeded, build.cached, len(killed)) == (True, False, 1)
+        return
+    with pytest.raises(GraderFault, match="colcon was ended by SIGKILL"):
+        graded_now()
+    assert len(killed) == 2
+    assert list(cache.rglob("build.json")) == []

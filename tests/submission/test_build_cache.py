@@ -12,13 +12,15 @@ from grader.submission.build_cache import INSTALL, BuildCache, CachedBuild, Cach
 from grader.submission.record import BuildRecord
 
 BUILD = BuildRecord(succeeded=True, duration_s=1.5, log="fine\n")
+COMPILED = "lib/python3.11/site-packages/node/__pycache__/node.cpython-311.pyc"
 DAY_S = 24 * 3600.0
 
 
 def stored(cache: BuildCache, key: str = "k", content: str = "x = 1\n") -> CachedBuild:
     with cache.unfinished() as folder:
-        (folder / INSTALL / "lib").mkdir(parents=True)
+        (folder / INSTALL / COMPILED).parent.mkdir(parents=True)
         (folder / INSTALL / "lib/node.py").write_text(content)
+        (folder / INSTALL / COMPILED).write_bytes(b"compiled")
         return cache.store(key, folder, BUILD)
 
 
@@ -62,7 +64,9 @@ def test_an_unfinished_build_leaves_nothing(cache: BuildCache, tmp_path: Path) -
     assert names(tmp_path) == set()
 
 
-@pytest.mark.parametrize("damage", ["changed", "added", "removed", "executable", "no record"])
+@pytest.mark.parametrize(
+    "damage", ["changed", "added", "removed", "executable", "compiled", "record", "no record"]
+)
 def test_a_damaged_build_is_not_found_and_replaced(
     cache: BuildCache, tmp_path: Path, damage: str
 ) -> None:
@@ -76,6 +80,11 @@ def test_a_damaged_build_is_not_found_and_replaced(
         (install / "lib/node.py").unlink()
     elif damage == "executable":
         (install / "lib/node.py").chmod(0o755)
+    elif damage == "compiled":
+        (install / COMPILED).write_bytes(b"comp")
+    elif damage == "record":
+        record = install.parent / "build.json"
+        record.write_bytes(record.read_bytes().replace(b"true", b"false", 1))
     else:
         (install.parent / "build.json").write_text("{")
     assert cache.find("k") is None
