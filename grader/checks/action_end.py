@@ -15,18 +15,21 @@ from grader.checks.finding import Finding
 from grader.checks.goals import (
     evidence,
     judged_goals,
-    why_no_result,
     why_raised_in,
     why_rejected,
     why_server_gone,
 )
-from grader.checks.unanswered import why_taken
+from grader.checks.offered import ACTION
+from grader.checks.unanswered import why_one_cpu, why_taken, why_unanswered
 from grader.checks.value import NoSuchField
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 
 # Share of the time from the request to cancel until the end of the goal.
 _AT_THE_END = 0.8
+_TWO_THREADS = (
+    "Spin with a MultiThreadedExecutor, and give the ActionServer a ReentrantCallbackGroup."
+)
 
 
 class Cancels(OfGoals):
@@ -142,13 +145,20 @@ def _why_other_end(recording: Recording, goal: Goal, within_s: float) -> Cause:
     if goal.result_ns is None:
         seen = "the goal was asked to cancel, but neither canceled nor ended"
         gone = why_server_gone(recording, goal, seen)
-        if gone is not None:
-            return gone
-        taken = why_taken(recording, seen, asked_ns, recording.stop_ns, within_s)
-        late = why_no_result(recording, goal, (recording.stop_ns - goal.sent_ns) / NS)
-        if taken or (goal.cancel_accepted is None and late):
-            return taken or late or Cause(seen)
-        return Cause(
+        if gone is None and goal.cancel_answered_ns is None:
+            untold = f"{seen}: the server did not take that in"
+            busy = f"{untold}; its executor cannot while the execute callback runs"
+            return why_one_cpu(recording, untold) or why_unanswered(
+                recording,
+                untold,
+                ACTION,
+                goal.action,
+                asked_ns,
+                within_s,
+                Cause(busy, _TWO_THREADS),
+            )
+        gone = gone or why_taken(recording, seen, asked_ns, recording.stop_ns, within_s)
+        return gone or Cause(
             f"{seen}: it goes on",
             "In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
             "goal_handle.canceled() and return the result.",
@@ -158,12 +168,9 @@ def _why_other_end(recording: Recording, goal: Goal, within_s: float) -> Cause:
     if raised is not None:
         return raised
     if _answered_too_late(goal):
-        return Cause(
-            f"the goal {goal.status} before the server took in that it should cancel: its "
-            "executor cannot while the execute callback runs",
-            "Spin with a MultiThreadedExecutor, and give the ActionServer a "
-            "ReentrantCallbackGroup.",
-            shown,
+        untold = f"the goal {goal.status} before the server took in that it should cancel"
+        return why_one_cpu(recording, untold) or Cause(
+            f"{untold}: its executor cannot while the execute callback runs", _TWO_THREADS, shown
         )
     return Cause(
         f"the server agreed to cancel, but the goal {goal.status}",

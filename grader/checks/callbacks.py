@@ -16,6 +16,8 @@ from grader.checks import testimony
 from grader.checks.callback_run import Reports, read_reports, spans
 from grader.checks.check import Subject, check
 from grader.checks.death import cause_of_death, dead
+from grader.checks.delivery import why_not_sent
+from grader.checks.destroyed import why_unsubscribed
 from grader.checks.finding import Evidence, Finding
 from grader.checks.period import Interval, Limits, forgiven, judge
 from grader.checks.tolerance import TimeTolerance, Tolerance
@@ -279,9 +281,7 @@ def _judge_messages(
     expected = _run_words(parameters)
     sent = recording.sent.get(parameters.stimulus or "", ())
     if not sent:
-        return Finding.error(
-            expected, f"nothing was sent on {code(parameters.stimulus or '')}", disturbed=True
-        )
+        return why_not_sent(recording, parameters.stimulus or "").finding(expected)
     begun, ended = len(reports.of(callback)), len(reports.ended([callback]))
     evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))
     observed = (
@@ -301,6 +301,9 @@ def _judge_messages(
     dying = dead(recording)
     if dying:
         return cause_of_death(recording, dying[0]).after(observed).finding(expected)
+    destroyed = why_unsubscribed(recording, parameters.stimulus or "", observed, sent[-1].stamp_ns)
+    if destroyed is not None:
+        return destroyed.finding(expected)
     work_s = max((item.seconds or 0.0 for item in reports.ended([callback])), default=0.0)
     missing_s = (len(sent) - ended) * work_s
     if recording.taken_s(sent[0].stamp_ns, recording.stop_ns) >= missing_s > 0.0:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from grader.checks import compatibility
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
-from grader.checks.finding import Evidence, Moment
+from grader.checks.destroyed import why_unsubscribed
+from grader.checks.finding import Evidence
 from grader.checks.sighting import endpoints_seen
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.type_confusion import explain
@@ -40,15 +42,30 @@ def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
     )
     if cause is not None:
         return cause
-    if recording.carried(topic):
-        return _gone(recording, topic, subscriptions)
+    carried = recording.carried(topic)
+    if carried and any(
+        (item.vanished_ns or math.inf) > carried[0].stamp_ns for item in subscriptions
+    ):
+        return None
     ended = dead(recording)
     if ended:
         return cause_of_death(recording, ended[0])
-    return Cause(
+    return why_unsubscribed(recording, topic, "nothing was sent while it was there") or Cause(
         f"nothing was sent on {code(topic)}, so there was nothing to receive",
         ours=True,
         disturbed=True,
+    )
+
+
+def why_not_sent(recording: Recording, topic: str) -> Cause:
+    """Why a stimulus published nothing: no subscription of the student's could get it, or ours.
+
+    Args:
+        recording: A run in which the probe should have published on the topic.
+        topic: Fully qualified topic name.
+    """
+    return why_not_delivered(recording, topic) or Cause(
+        f"nothing was sent on {code(topic)}", ours=True, disturbed=True
     )
 
 
@@ -142,28 +159,5 @@ def _refused(
                     offered=publishers[0].qos, requested=subscriptions[0].qos
                 ),
             ),
-        ),
-    )
-
-
-def _gone(recording: Recording, topic: str, subscriptions: tuple[Endpoint, ...]) -> Cause | None:
-    """Every subscription vanished before the first message was sent."""
-    first_ns = recording.carried(topic)[0].stamp_ns
-    ends = [item.vanished_ns for item in subscriptions]
-    if any(end is None or end > first_ns for end in ends):
-        return None
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0])
-    return Cause(
-        f"the subscription to {code(topic)} vanished before the first message came",
-        "Keep the node and its subscription alive while rclpy.spin(node) runs: no "
-        "destroy_subscription() and no destroy_node() before.",
-        Evidence(
-            moments=tuple(
-                Moment(f"subscription to {topic} vanished", recording.since_launch_s(end))
-                for end in ends
-                if end is not None
-            )
         ),
     )

@@ -152,6 +152,7 @@ def _working_from(recording: Recording, node: str) -> int:
         return min(stamps)
     appeared = [item.appeared_ns for item in recording.student_nodes if item.name == node]
     begin_ns = min(appeared or [recording.launched_ns])
+    begin_ns = max(begin_ns, _spun_from(recording, node))
     # Its first publisher was held by us until it had matched, in vain if its type is another one.
     process = testimony.process_of(recording, node)
     held = [
@@ -160,6 +161,26 @@ def _working_from(recording: Recording, node: str) -> int:
         if process is not None and item.process == process.name
     ]
     return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
+
+
+def _spun_from(recording: Recording, node: str) -> int:
+    """When a node's process said that an executor spins, but not after the first answer; or 0.
+
+    Before that its constructor may wait for something, and a node that never answers does not
+    spin, whatever its process says.
+    """
+    process = testimony.process_of(recording, node)
+    spun = [
+        item.time_ns
+        for item in recording.declared("spin")
+        if process is not None and item.process == process.name
+    ]
+    answered = [
+        call.answered_ns
+        for call in recording.calls
+        if call.service in executor_services(node) and call.answered_ns is not None
+    ]
+    return min(*spun, *answered) if spun and answered else 0
 
 
 def _excused(recording: Recording, group: _Answers, parameters: Responsive) -> bool:

@@ -8,11 +8,12 @@ from typing import Any
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
+from grader.checks.destroyed import why_destroyed
 from grader.checks.fields import has_fields
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Moment, Table
-from grader.checks.offered import ACTION, actions, why_not_offered
-from grader.checks.unanswered import why_gone, why_raised, why_unanswered
+from grader.checks.offered import ACTION, offered, why_not_met, why_not_offered
+from grader.checks.unanswered import why_gone, why_raised, why_taken, why_unanswered
 from grader.checks.wording import code
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
@@ -53,19 +54,21 @@ def judged_goals(
         if ended:
             return cause_of_death(recording, ended[0])
         asked = f" with {fields_words(fields)}" if fields else ""
-        return Cause(
-            f"the probe sent no such goal{asked} to {code(action)}", ours=True, disturbed=True
-        )
+        if any(has_fields(goal.goal, fields) for goal in goals):
+            return Cause(
+                f"the scenario cancels or preempts every goal{asked} of {code(action)}, or none: "
+                "none is of the kind that this check judges",
+                "A goal with cancel_after is judged by action.cancels, one with preempt by "
+                "action.preempts, and what comes to its own end by the others.",
+                ours=True,
+            )
+        return Cause(f"the probe sent no goal{asked} to {code(action)}", ours=True, disturbed=True)
     for goal in found:
         if goal.error:
-            return Cause(
-                f"{code(action)} was there for too short a time to be sent a goal",
-                "Keep the server: `self.server = ActionServer(...)`, and the node alive.",
-                evidence(recording, goal),
-            )
+            return why_not_met(recording, ACTION, action, "could not be sent a goal", goal.sent_ns)
         if goal.accepted is None:
             what = f"the goal ({fields_words(goal.goal)}) was neither accepted nor rejected"
-            return _unanswered(recording, goal, what, ANSWER_S)
+            return why_unanswered(recording, what, ACTION, action, goal.sent_ns, ANSWER_S)
     return found
 
 
@@ -85,22 +88,14 @@ def why_no_result(recording: Recording, goal: Goal, within_s: float) -> Cause | 
     """Why a goal that was accepted had no result in time, or None if it had one."""
     if goal.result_ns is None:
         what = f"the goal ({fields_words(goal.goal)}) was accepted, but never had a result"
-        if not dead(recording) and (recording.stop_ns - goal.sent_ns) / NS < within_s:
-            ended = f"{what}: the scenario ended before one was due"
-            return Cause(ended, ours=True, disturbed=True)
-        return _unanswered(recording, goal, what, within_s)
+        return why_unanswered(recording, what, ACTION, goal.action, goal.sent_ns, within_s)
     took_s = (goal.result_ns - goal.sent_ns) / NS
     if took_s <= within_s:
         return None
     what = f"the result came only {format_duration(took_s)} after the goal"
-    taken_s = recording.taken_s(goal.sent_ns, goal.result_ns)
-    if taken_s >= took_s - within_s:
-        return Cause(
-            f"{what}, but the machine took {format_duration(taken_s)} from the process",
-            ours=True,
-            disturbed=True,
-        )
-    return Cause(what, "Look for a sleep that is too long.", evidence(recording, goal))
+    return why_taken(recording, what, goal.sent_ns, goal.result_ns, within_s) or Cause(
+        what, "Look for a sleep that is too long.", evidence(recording, goal)
+    )
 
 
 def why_raised_in(recording: Recording, goal: Goal, what: str) -> Cause | None:
@@ -113,17 +108,11 @@ def why_raised_in(recording: Recording, goal: Goal, what: str) -> Cause | None:
 
 
 def why_server_gone(recording: Recording, goal: Goal, what: str) -> Cause | None:
-    """Why the process that worked on a goal ended early, or None if it did not."""
-    return why_gone(recording, what, _server(recording, goal))
-
-
-def _unanswered(recording: Recording, goal: Goal, what: str, within_s: float) -> Cause:
-    return why_unanswered(recording, what, _server(recording, goal), goal.sent_ns, within_s)
-
-
-def _server(recording: Recording, goal: Goal) -> str:
-    """The node that offers the action of a goal."""
-    return next(item.node for item in actions(recording) if item.name == goal.action)
+    """Why the server that worked on a goal is not there any more, or None if it is."""
+    own = offered(recording, ACTION, goal.action)
+    return why_gone(recording, what, own[-1].node) or why_destroyed(
+        recording, what, f"the action {code(goal.action)}", own
+    )
 
 
 def evidence(recording: Recording, goal: Goal) -> Evidence:

@@ -13,6 +13,7 @@ from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import compatibility_table, refusals
 from grader.checks.death import cause_of_death, dead
+from grader.checks.destroyed import why_unpublished
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.messages import published
 from grader.checks.silence import why_few
@@ -269,6 +270,10 @@ def _too_few(
             "its place in the queue.",
             evidence,
         )
+    if join.matched_ns is None:
+        destroyed = why_unpublished(recording, parameters.topic, _seen(history, before))
+        if destroyed is not None:
+            return destroyed.finding(expected)
     taken_s = recording.taken_s(join.joined_ns, recording.stop_ns)
     if join.matched_ns is None and publishers:
         return Finding.error(

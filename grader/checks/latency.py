@@ -13,6 +13,8 @@ from grader.assignment.name import TopicName
 from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
+from grader.checks.delivery import why_not_sent
+from grader.checks.destroyed import why_unsubscribed
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.silence import why_silent
 from grader.checks.wording import code, counted
@@ -117,15 +119,22 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     if not answers:
         return why_silent(recording, parameters.topic).finding(expected)
     if not sent:
-        return Finding.error(
-            expected, f"nothing was sent on {code(parameters.stimulus)}", disturbed=True
-        )
+        return why_not_sent(recording, parameters.stimulus).finding(expected)
     found = reactions(sent, answers, round(parameters.within * NS))
     times = [item.seconds for item in found if item.seconds is not None]
     missing = [item for item in found if item.answer is None]
     wrong = _too_slow(times, parameters)
     if not wrong and len(missing) <= parameters.unanswered:
         return Finding.passed(expected, _figures(times), _evidence(recording, found, parameters))
+    observed = (
+        f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
+        f"had no answer within {format_duration(parameters.within)}"
+    )
+    if len(missing) > parameters.unanswered:
+        last_ns = missing[-1 - parameters.unanswered].sent.stamp_ns
+        destroyed = why_unsubscribed(recording, parameters.stimulus, observed, last_ns)
+        if destroyed is not None:
+            return destroyed.finding(expected)
     forgiven = [
         max(0.0, item.seconds - _taken_s(recording, item))
         for item in found
@@ -146,9 +155,7 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     if len(missing) > parameters.unanswered:
         return Finding.failed(
             expected,
-            f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
-            f"had no answer within {format_duration(parameters.within)}"
-            + (f"; of the others {_figures(times)}" if times else ""),
+            observed + (f"; of the others {_figures(times)}" if times else ""),
             "Publish one answer in every call of the subscription's callback, with no condition "
             "that leaves one out.",
             evidence,

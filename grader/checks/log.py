@@ -13,6 +13,7 @@ from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
 from grader.checks.blockage import why_slow
 from grader.checks.check import NamedFields, Parameters, Subject, check
+from grader.checks.destroyed import why_unsubscribed
 from grader.checks.echo import Echo, Wanted, echoes, wanted_values
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
@@ -176,9 +177,11 @@ def _too_seldom(
         )
     observed += f", although messages came on {code(parameters.topic)}"
     nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, parameters.topic)}
-    slow = why_slow(recording, observed, nodes)
-    if slow is not None:
-        return slow.finding(expected)
+    cause = why_unsubscribed(recording, parameters.topic, observed) or why_slow(
+        recording, observed, nodes
+    )
+    if cause is not None:
+        return cause.finding(expected)
     return Finding.failed(
         expected,
         observed,

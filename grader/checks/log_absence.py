@@ -9,6 +9,7 @@ from grader.checks.blockage import why_blocked, why_never_spun, why_slow
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_no_history, why_not_delivered
+from grader.checks.destroyed import why_unsubscribed
 from grader.checks.echo import Echo, Wanted, echoes, output_lines, shown
 from grader.checks.field import number_at
 from grader.checks.finding import Evidence, Moment, Table
@@ -57,14 +58,12 @@ def why_not_logged(
         if cause is not None:
             return cause
     if len(wanted) < needed:
-        return Cause(
-            f"only {counted(len(wanted), 'message was', 'messages were')} sent on {code(topic)}",
-            ours=True,
-            disturbed=True,
-        )
+        sent = f"only {counted(len(wanted), 'message was', 'messages were')} sent on {code(topic)}"
+        return why_unsubscribed(recording, topic, sent) or Cause(sent, ours=True, disturbed=True)
     nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
     cause = (
         _disturbed(recording, topic, wanted, needed, decimals, within_ns)
+        or why_unsubscribed(recording, topic, _seen(topic, found))
         or why_never_spun(
             recording,
             f"the callback is never called: the subscription to {code(topic)} is there and its "

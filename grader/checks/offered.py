@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
+from grader.checks.destroyed import why_destroyed
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.near_name import Named, why_misnamed
 from grader.checks.node_absence import why_no_node
@@ -80,6 +81,12 @@ def actions(recording: Recording) -> tuple[Service, ...]:
     )
 
 
+def offered(recording: Recording, word: Word, name: str) -> tuple[Service, ...]:
+    """What the student's nodes offer under a name, parameter services too."""
+    items = recording.services if word is SERVICE else actions(recording)
+    return tuple(item for item in items if item.name == name)
+
+
 def _is_own(name: str, node: str) -> bool:
     prefix, _, base = name.rpartition("/")
     return prefix == node and base in _OWN
@@ -99,7 +106,7 @@ def is_offered(recording: Recording, word: Word, name: str, interface: str | Non
     cause = why_not_offered(recording, word, name, interface)
     if cause is not None:
         return cause.finding(expected)
-    found = next(item for item in _of_students(recording, word) if item.name == name)
+    found = offered(recording, word, name)[0]
     when_s = recording.since_launch_s(found.appeared_ns)
     return Finding.passed(
         expected,
@@ -159,6 +166,26 @@ def why_not_offered(
         f"{nodes} offers {there_words} only" if there else f"{nodes} offers no {word.noun}",
         f"Call {_create(word, name, interface)} in the node's constructor.",
         evidence,
+    )
+
+
+def why_not_met(recording: Recording, word: Word, name: str, what: str, asked_ns: int) -> Cause:
+    """Why something that was offered could not be asked.
+
+    Args:
+        recording: The run.
+        word: What it is.
+        name: Fully qualified.
+        what: What could not be done, in words.
+        asked_ns: When that was noted.
+    """
+    items = offered(recording, word, name)
+    return why_destroyed(recording, f"it {what}", f"the {word.noun} {code(name)}", items) or Cause(
+        f"the {word.noun} {code(name)} {what}: it was there, but no client with the usual QoS met "
+        "it",
+        f"Keep the {word.noun} and its node as long as the program runs, and leave its QoS as it "
+        "is.",
+        Evidence(moments=(Moment("given up", recording.since_launch_s(asked_ns)),)),
     )
 
 

@@ -6,12 +6,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead
+from grader.checks.destroyed import why_destroyed
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.node_absence import why_not_node
 from grader.checks.node_name import node_name
+from grader.checks.offered import SERVICE, offered
 from grader.checks.parameter_calls import (
     Descriptor,
     Range,
@@ -23,11 +26,11 @@ from grader.checks.parameter_calls import (
     readings,
     settings,
 )
-from grader.checks.unanswered import why_unanswered
+from grader.checks.unanswered import why_taken, why_unanswered
 from grader.checks.value import same
 from grader.checks.wording import code, codes, value_text
 from grader.nearest import nearest
-from grader.recording.model import Call, Recording
+from grader.recording.model import NS, Call, Recording
 
 _ANSWER_S = 1.0
 _TOLERANCE = 1e-9
@@ -141,6 +144,8 @@ def why_not_declared(recording: Recording, parameters: OfParameter) -> Cause | N
         return None
     there = names(recording, parameters.node) or []
     evidence = Evidence(moments=_answered(recording, asked[:1]))
+    if parameters.name in there and found is None:
+        return why_not_asked(recording, parameters.node, "what it is was not asked")
     if parameters.name in there:
         return Cause(
             f"{code(parameters.name)} is declared, but without a value",
@@ -162,6 +167,11 @@ def why_services_silent(recording: Recording, node: str, calls: tuple[Call, ...]
     if lost is None:
         return None
     service = lost.service.rpartition("/")[2]
+    if lost.error == "no server":
+        items = offered(recording, SERVICE, lost.service)
+        gone = why_destroyed(recording, "it could not be asked", "its parameter service", items)
+        if gone is not None:
+            return gone
     if lost.error:
         return Cause(
             f"the node has no service {code(service)}"
@@ -173,7 +183,45 @@ def why_services_silent(recording: Recording, node: str, calls: tuple[Call, ...]
             ours=lost.error != "no server",
         )
     what = f"the node's parameter service {code(service)} did not answer"
-    return why_unanswered(recording, what, node, lost.requested_ns, _ANSWER_S)
+    return why_unanswered(recording, what, SERVICE, lost.service, lost.requested_ns, _ANSWER_S)
+
+
+def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
+    """Why the probe asked a node's parameter services no more: an answer that was late or lost.
+
+    Args:
+        recording: The run.
+        node: Fully qualified name.
+        what: What was not asked, in words.
+    """
+    calls = [
+        call
+        for call in recording.calls
+        if call.service.rpartition("/")[0] == node and call.request and not call.error
+    ]
+    ended = dead(recording)
+    if ended:
+        return cause_of_death(recording, ended[0]).after(what)
+    lost = why_services_silent(recording, node, tuple(calls[-1:]))
+    if lost is not None:
+        return lost.after(what)
+    slow = calls[-1] if calls else None
+    took_s = ((slow.answered_ns or 0) - slow.requested_ns) / NS if slow else 0.0
+    if slow is None or took_s <= _ANSWER_S:
+        return Cause(f"{what} by the probe", ours=True, disturbed=True)
+    seen = (
+        f"{what}, because the node's parameter service {code(slow.service.rpartition('/')[2])} "
+        f"answered only after {format_duration(took_s)}"
+    )
+    taken = why_taken(
+        recording, seen, slow.requested_ns, slow.answered_ns or recording.stop_ns, _ANSWER_S
+    )
+    return taken or Cause(
+        seen,
+        "A callback must return soon: no time.sleep() and no waiting in it. The node answers only "
+        "when its executor comes round.",
+        Evidence(moments=(Moment("asked", recording.since_launch_s(slow.requested_ns)),)),
+    )
 
 
 def _why_other_descriptor(found: Descriptor, parameters: Declared, shown: Evidence) -> Cause | None:
@@ -226,7 +274,7 @@ def _why_other_default(
     asked = calls_to(recording, parameters.node, "get_parameters")
     cause = why_services_silent(recording, parameters.node, asked)
     if cause is not None or not values:
-        return cause or Cause(f"the probe did not read {code(parameters.name)}", ours=True)
+        return cause or why_not_asked(recording, parameters.node, "its value was not asked")
     if same_value(parameters.default, values[0].value):
         return None
     return Cause(
@@ -310,9 +358,7 @@ def set_(recording: Recording, parameters: Set) -> Finding:
         if same_value(parameters.value, item.value)
     ]
     if not tried:
-        ended = dead(recording)
-        missing = Cause("the probe did not try to set it", ours=True, disturbed=True)
-        return (cause_of_death(recording, ended[0]) if ended else missing).finding(expected)
+        return why_not_asked(recording, parameters.node, "it was not set").finding(expected)
     asked = tuple(item.call for item in tried)
     cause = why_services_silent(recording, parameters.node, asked)
     for item in tried:

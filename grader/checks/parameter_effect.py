@@ -24,7 +24,13 @@ from grader.checks.fields import (
 )
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.parameter import OfParameter, same_value, why_not_declared
+from grader.checks.parameter import (
+    OfParameter,
+    same_value,
+    why_not_asked,
+    why_not_declared,
+    why_services_silent,
+)
 from grader.checks.parameter_calls import Setting, settings
 from grader.checks.silence import why_silent
 from grader.checks.unanswered import why_taken
@@ -95,15 +101,15 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
     every = settings(recording, parameters.node, parameters.name)
     tried = [item for item in every if same_value(parameters.value, item.value)]
     if not tried:
-        ended = dead(recording)
-        missing = Cause("the probe did not try to set it", ours=True, disturbed=True)
-        return (cause_of_death(recording, ended[0]) if ended else missing).finding(expected)
+        return why_not_asked(recording, parameters.node, "it was not set").finding(expected)
     item = tried[0]
+    lost = why_services_silent(recording, parameters.node, (item.call,))
+    if lost is not None:
+        return lost.finding(expected)
     if not item.accepted:
-        why = item.reason or "without a reason"
         return Finding.failed(
             expected,
-            f"the value was refused: {why}" if item.accepted is False else "it was not answered",
+            f"the value was refused: {item.reason or 'without a reason'}",
             "Look at the callback of add_on_set_parameters_callback() and at the range.",
             _evidence(recording, item),
         )

@@ -11,6 +11,7 @@ from grader.assignment.quantity import Duration
 from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import comparisons, compatibility_table, refusals
+from grader.checks.destroyed import why_unpublished
 from grader.checks.finding import Evidence, Finding
 from grader.checks.sighting import endpoints_seen
 from grader.checks.topic_absence import why_no_endpoint
@@ -133,6 +134,9 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     offered, requested = _sides(kind, endpoints[0], peer)
     evidence = Evidence(tables=(compatibility_table(offered, requested),))
     contradiction = _contradiction(recording, parameters)
+    destroyed = why_unpublished(recording, parameters.topic, "they did not meet")
+    if contradiction and destroyed is not None and parameters.expect == "match":
+        return destroyed.finding(expected)
     if contradiction:
         return Finding.error(expected, contradiction, disturbed=True)
     reasons = refusals(offered, requested)

@@ -23,7 +23,8 @@ from grader.checks.conversion import (
     sine_of_pitch,
 )
 from grader.checks.death import cause_of_death, dead
-from grader.checks.delivery import why_not_delivered
+from grader.checks.delivery import why_not_sent
+from grader.checks.destroyed import why_unsubscribed
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.messages import published
 from grader.checks.rotation_case import Case, Limits, cases
@@ -130,7 +131,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     sent = recording.sent.get(parameters.stimulus, ())
     received = recording.on(parameters.topic)
     if not sent:
-        return _not_asked(recording, parameters).finding(expected)
+        return why_not_sent(recording, parameters.stimulus).finding(expected)
     if not received:
         cause = _elsewhere(recording, parameters) or why_silent(recording, parameters.topic)
         return cause.finding(expected)
@@ -173,13 +174,6 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     if len(judged) < parameters.at_least:
         return _too_few(recording, parameters, found, judged).finding(expected)
     return Finding.passed(expected, _summary(judged), evidence)
-
-
-def _not_asked(recording: Recording, parameters: Answers) -> Cause:
-    cause = why_not_delivered(recording, parameters.stimulus)
-    return cause or Cause(
-        f"nothing was sent on {code(parameters.stimulus)}", ours=True, disturbed=True
-    )
 
 
 def _elsewhere(recording: Recording, parameters: Answers) -> Cause | None:
@@ -409,6 +403,9 @@ def _missing(
     if ended:
         cause = cause_of_death(recording, ended[0])
         return cause.after(observed).finding(expected)
+    destroyed = why_unsubscribed(recording, parameters.stimulus, observed, missing[-1].asked_ns)
+    if destroyed is not None:
+        return destroyed.finding(expected)
     received = recording.on(parameters.topic)
     lost = published(received) - len(received)
     if len(missing) <= lost:
@@ -444,6 +441,9 @@ def _too_few(
     ended = dead(recording)
     if ended:
         return cause_of_death(recording, ended[0]).after(seen)
+    destroyed = why_unsubscribed(recording, parameters.stimulus, seen)
+    if destroyed is not None:
+        return destroyed
     if any(case.behind_s is not None for case in found) or _is_slow(recording, found):
         return Cause(
             f"{seen}, because the answers come late",

@@ -11,7 +11,6 @@ from pydantic import Field
 from grader.assignment.model import InterfaceName, TopicName
 from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
-from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.death import cause_of_death, dead
@@ -27,13 +26,12 @@ from grader.checks.fields import (
 )
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Moment, Table
-from grader.checks.offered import SERVICE, is_offered, services, why_not_offered
-from grader.checks.unanswered import why_taken, why_unanswered
+from grader.checks.offered import SERVICE, is_offered, why_not_met, why_not_offered
+from grader.checks.unanswered import why_one_cpu, why_taken, why_unanswered
 from grader.checks.value import EXACT, NoSuchField
 from grader.checks.wording import code, codes, counted
 from grader.recording.model import NS, Call, Recording
 
-_MULTI = "MultiThreadedExecutor"
 # Of the time that one call takes: two answers so close came from calls that ran side by side,
 # and two so far apart from calls of which one waited for the other.
 _TOGETHER, _APART = 0.5, 0.75
@@ -164,11 +162,7 @@ def judged_calls(
         return Cause(f"the probe sent no call{asked} to {code(service)}", ours=True, disturbed=True)
     lost = next((call for call in found if call.error), None)
     if lost is not None:
-        return Cause(
-            f"{code(service)} was there for too short a time to be called",
-            "Keep the service: `self.service = self.create_service(...)`, and the node alive.",
-            Evidence(moments=(Moment("called", recording.since_launch_s(lost.requested_ns)),)),
-        )
+        return why_not_met(recording, SERVICE, service, "could not be called", lost.requested_ns)
     return found
 
 
@@ -176,19 +170,11 @@ def why_late(
     recording: Recording, service: str, calls: tuple[Call, ...], within_s: float
 ) -> Cause | None:
     """Why one of some calls was not answered in time, or None if all were."""
-    node = next(item.node for item in services(recording) if item.name == service)
     unanswered = [call for call in calls if call.answered_ns is None]
     if unanswered:
         first = unanswered[0]
-        if not dead(recording) and _until_stop_s(recording, first) < within_s:
-            return Cause(
-                f"the scenario ended {format_duration(_until_stop_s(recording, first))} after the "
-                f"call to {code(service)}, before an answer was due",
-                ours=True,
-                disturbed=True,
-            )
         what = f"{_which(calls, first)} to {code(service)} was never answered"
-        return why_unanswered(recording, what, node, first.requested_ns, within_s)
+        return why_unanswered(recording, what, SERVICE, service, first.requested_ns, within_s)
     late = [call for call in calls if _took_s(call) > within_s]
     if not late:
         return None
@@ -206,10 +192,6 @@ def why_late(
         "timer or subscription callback that the same executor runs.",
         _evidence(recording, calls),
     )
-
-
-def _until_stop_s(recording: Recording, call: Call) -> float:
-    return (recording.stop_ns - call.requested_ns) / NS
 
 
 def _which(calls: tuple[Call, ...], call: Call) -> str:
@@ -373,16 +355,7 @@ def _why_otherwise(
             "Give the service a MutuallyExclusiveCallbackGroup, or use rclpy.spin(node).",
             evidence,
         )
-    alone = [item for item in spins if item.get("executor") == _MULTI and item.get("threads") == 1]
-    if alone and testimony.traced(recording):
-        return Cause(
-            f"{seen}: MultiThreadedExecutor() has as many threads as the machine has CPUs, and "
-            "here that is one",
-            "Say how many: MultiThreadedExecutor(num_threads=4).",
-            evidence,
-            ours=True,
-        )
-    return Cause(
+    return why_one_cpu(recording, seen) or Cause(
         f"{seen}, so the second call waited until the first was answered{declared}",
         "Spin with a MultiThreadedExecutor, and give the service a ReentrantCallbackGroup: "
         "self.create_service(..., callback_group=ReentrantCallbackGroup()).",

@@ -8,6 +8,7 @@ from grader.checks.blockage import why_blocked, why_never_spun
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_not_delivered
+from grader.checks.destroyed import why_unpublished
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment
 from grader.checks.sighting import endpoints_seen, until_the_end
@@ -63,7 +64,8 @@ def why_silent(recording: Recording, topic: str) -> Cause:
     asked = _asked_on(recording, topic)
     nodes = {item.node for item in publishers}
     return (
-        _undelivered(recording, topic, asked)
+        why_unpublished(recording, topic, f"no message on {code(topic)}")
+        or _undelivered(recording, topic, asked)
         or (_slow(recording, topic) if not asked else None)
         or _starved(recording, topic)
         or why_never_spun(recording, f"no message on {code(topic)}", nodes)
@@ -122,6 +124,9 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
             ours=True,
             disturbed=True,
         )
+    destroyed = why_unpublished(recording, topic, seen)
+    if destroyed is not None:
+        return destroyed
     periods = [format_duration(timer.period_s) for timer in testimony.timers(recording)]
     unspun = why_never_spun(recording, seen, moments=moments) if periods else None
     if unspun is not None:
@@ -236,9 +241,8 @@ def _asked_on(recording: Recording, topic: str) -> tuple[str, ...]:
 
 def _undelivered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cause | None:
     """What the node should answer never reached it."""
-    if not asked or any(recording.sent[name] for name in asked):
-        return None
-    cause = why_not_delivered(recording, asked[0])
+    causes = [why_not_delivered(recording, name) for name in asked]
+    cause = causes[0] if causes and all(causes) else None
     return cause and cause.after(
         f"no message on {code(topic)}, because what the node should answer, on {code(asked[0])}, "
         "never reached it"

@@ -3,53 +3,71 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.blockage import why_never_spun
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead, ended_early
+from grader.checks.destroyed import why_destroyed
 from grader.checks.failure import interrupted_place, parse_failures, student_place
 from grader.checks.finding import Evidence, Moment
+from grader.checks.offered import Word, offered
 from grader.checks.wording import code
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
 
+_MULTI = "MultiThreadedExecutor"
 _LOG_LINES = 10
+_ROUNDING_S = 1e-6
 _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]+)' was never awaited")
 
 
 def why_unanswered(
-    recording: Recording, what: str, node: str, asked_ns: int, within_s: float
+    recording: Recording,
+    what: str,
+    server: Word,
+    name: str,
+    asked_ns: int,
+    within_s: float,
+    while_busy: Cause | None = None,
 ) -> Cause:
     """Why an answer did not come in time.
 
     Args:
         recording: The run.
         what: That it was not, in words.
-        node: Fully qualified name of the node that should have answered.
+        server: Which kind of server should have answered.
+        name: Its fully qualified name.
         asked_ns: When it was asked.
         within_s: How soon the answer was due.
+        while_busy: What is said of an executor that does not come round, or does not tell; by
+            default in general words.
     """
+    own = offered(recording, server, name)
+    # A parameter service is named after its node.
+    node = own[-1].node if own else name.rpartition("/")[0]
     process = testimony.process_of(recording, node)
     moment = Moment("asked, not answered in time", recording.since_launch_s(asked_ns))
-    gone = why_gone(recording, what, node)
-    if gone is not None:
-        return gone
-    taken = why_taken(recording, what, asked_ns, recording.stop_ns, within_s)
-    if taken is not None:
-        return taken
-    if process is not None:
-        found = why_raised(recording, what, process, asked_ns) or why_never_spun(
+    cause = (
+        why_gone(recording, what, node)
+        or why_destroyed(recording, what, f"the {server.noun} {code(name)}", own)
+        or why_taken(recording, what, asked_ns, recording.stop_ns, within_s)
+    )
+    if cause is None and process is not None:
+        cause = why_raised(recording, what, process, asked_ns) or why_never_spun(
             recording, what, (node,), (process,), (moment,)
         )
-        if found is not None:
-            return found
-    blocked = _blocked(recording, node, asked_ns)
+    if cause is not None:
+        return cause
+    spins = _spins(recording, node, asked_ns)
     place = interrupted_place(recording, process.name) if process else None
     where = f" ({place.file}:{place.line})" if place else ""
     evidence = Evidence(moments=(moment,), places=(place,) if place else ())
-    if blocked:
+    if while_busy is not None and not spins:
+        return replace(while_busy, observed=while_busy.observed + where, evidence=evidence)
+    if spins is False:
         return Cause(
             f"{what}: something keeps the executor from coming round{where}; the node's parameter "
             "services answer no call either",
@@ -59,7 +77,7 @@ def why_unanswered(
             evidence,
         )
     return Cause(
-        f"{what}{where}, although the node's executor spins",
+        f"{what}{where}" + (", although the node's executor spins" if spins else ""),
         "Does the callback come to its end and return the response? A callback that waits for "
         "another one of the same callback group waits for ever.",
         evidence,
@@ -86,6 +104,8 @@ def why_taken(
 ) -> Cause | None:
     """The machine's doing, if it took as much as something was too late; else None.
 
+    An answer that never came was not due where the observation ended before its time.
+
     Args:
         recording: The run.
         what: That it was too late, in words.
@@ -95,12 +115,37 @@ def why_taken(
     """
     taken_s = recording.taken_s(begin_ns, end_ns)
     excess_s = (end_ns - begin_ns) / NS - within_s
+    if excess_s < -_ROUNDING_S:
+        ended = format_duration((end_ns - begin_ns) / NS)
+        return Cause(
+            f"{what}: the run ended {ended} later, before that was due", ours=True, disturbed=True
+        )
     if taken_s <= 0.0 or taken_s < excess_s:
         return None
     return Cause(
         f"{what}, but the machine took {format_duration(taken_s)} from the process meanwhile",
         ours=True,
         disturbed=True,
+    )
+
+
+def why_one_cpu(recording: Recording, what: str) -> Cause | None:
+    """The cause if an executor of several threads has one only because the machine has one CPU.
+
+    Args:
+        recording: The run.
+        what: What came of it, in words.
+    """
+    spins = [item.data for item in recording.declared("spin")]
+    alone = any(item.get("executor") == _MULTI and item.get("threads") == 1 for item in spins)
+    one_cpu = recording.environment.get("cpus", "1") == "1"
+    if not (alone and one_cpu and testimony.traced(recording)):
+        return None
+    return Cause(
+        f"{what}: MultiThreadedExecutor() has as many threads as the machine has CPUs, and here "
+        "that is one",
+        "Say how many: MultiThreadedExecutor(num_threads=4).",
+        ours=True,
     )
 
 
@@ -161,8 +206,8 @@ def why_never_awaited(recording: Recording, what: str) -> Cause | None:
     return None
 
 
-def _blocked(recording: Recording, node: str, asked_ns: int) -> bool:
-    """Whether the node's parameter service answered nothing from a time on, but was asked."""
+def _spins(recording: Recording, node: str, asked_ns: int) -> bool | None:
+    """Whether the node answered what its executor answers, from a time on; None if not asked."""
     calls = [
         call
         for call in recording.calls
@@ -170,4 +215,4 @@ def _blocked(recording: Recording, node: str, asked_ns: int) -> bool:
         and asked_ns <= call.requested_ns <= recording.stop_ns - NS
     ]
     answered = any(call.answered_ns is not None and call.answered_ns > asked_ns for call in calls)
-    return bool(calls) and not answered
+    return answered if calls else None

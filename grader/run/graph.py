@@ -180,6 +180,10 @@ class GraphObserver:
                 appeared_ns=now_ns,
             )
             self.changed_ns = now_ns
+        elif self._endpoints[key].vanished_ns is not None:
+            # A look at the graph may miss what is there, on a busy machine.
+            self._endpoints[key] = dataclasses.replace(self._endpoints[key], vanished_ns=None)
+            self.changed_ns = now_ns
         return key
 
     def _note_vanished(self, nodes: set[tuple[str, str]], gids: set[str], now_ns: int) -> None:
@@ -197,9 +201,12 @@ class GraphObserver:
             namespace, _, base = name.rpartition("/")
             found = self._found(partial(self._services_of, base, namespace or "/"))
             seen |= {(service, kind, name) for service, kinds in found for kind in kinds}
-        for key in seen - self._services.keys():
-            self._services[key] = Service(*key, appeared_ns=now_ns)
-            self.changed_ns = now_ns
+        for key in seen:
+            known = self._services.get(key)
+            if known is None or known.vanished_ns is not None:
+                first_ns = known.appeared_ns if known is not None else now_ns
+                self._services[key] = Service(*key, appeared_ns=first_ns)
+                self.changed_ns = now_ns
         for key in self._services.keys() - seen:
             if self._services[key].vanished_ns is None:
                 self._services[key] = dataclasses.replace(self._services[key], vanished_ns=now_ns)

@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from grader.recording.interaction import EXECUTOR_SERVICES
+from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Call, Endpoint, Kind, Owner
 from grader.run.order import Limits, Topic
@@ -196,6 +196,20 @@ class Probe:
             return
         self._fallbacks.add(topic.name)
         self._subscribe(topic, "best_effort", "volatile")
+
+    def answers(self, node: str) -> bool | None:
+        """Whether a node answered a service that it answers only while it spins.
+
+        Returns:
+            True if it did, False if it was only called, None if it could not be called.
+        """
+        calls = [call for name in executor_services(node) for call in self._calls.get(name, ())]
+        return any(call.answered_ns is not None for call in calls) if calls else None
+
+    def last_called_ns(self, node: str) -> int:
+        """When such a service of a node was called for the last time; 0 for never."""
+        calls = (call for name in executor_services(node) for call in self._calls.get(name, ()))
+        return max((call.requested_ns for call in calls), default=0)
 
     def call_executor(self, node: str, name: str) -> None:
         """Call a service that a node answers only while it spins.

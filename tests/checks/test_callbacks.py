@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from grader.assignment.load import load_assignment
 from grader.checks.callback_run import read_reports
 from grader.checks.finding import Status
+from grader.recording.model import Kind
 from tests.checks.builder import (
     NODE,
     at,
@@ -279,8 +280,11 @@ class TestRun:
         assert "Create one subscription" in words
 
     def test_nothing_was_sent(self):
-        finding = judged("run", run(*parallel()), ["chatter"], stimulus="/chatter")
-        assert finding.status is Status.ERROR
+        ends = (endpoint("/chatter", kind=Kind.SUBSCRIPTION, type=STRING),)
+        subject = run(*parallel(), endpoints=ends)
+        assert judged("run", subject, ["chatter"], stimulus="/chatter").status is Status.ERROR
+        deaf = failed("run", run(*parallel()), ["chatter"], stimulus="/chatter")
+        assert "subscribes to nothing" in deaf
 
     def test_it_must_be_said_what_calls_them(self):
         for more in ({}, {"period": "1 s", "stimulus": "/chatter"}):

@@ -150,7 +150,7 @@ class TestResponds:
         run = serving(asked(4.4, None))
         finding = judge("service.responds", run, **TRUE, within="1 s")
         assert finding.status is Status.ERROR
-        assert "before an answer was due" in finding.observed
+        assert "the run ended 100 ms later, before that was due" in finding.observed
 
     def test_an_interface_that_is_not_installed_is_our_error(self):
         run = serving(asked(answer_s=None, error="the interface x/srv/Y is not installed"))

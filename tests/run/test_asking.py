@@ -133,6 +133,56 @@ def test_a_lifecycle_node_goes_through_its_states(run_node: RunNode) -> None:
     assert finding.status is Status.PASSED, finding
 
 
+DESTROYER = """\
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+
+class Bot(Node):
+    def __init__(self):
+        super().__init__("bot")
+        self.heard = 0
+        self.answer = self.create_publisher(String, "/echo", 10)
+        self.subscription = self.create_subscription(String, "/chatter", self.take, 10)
+        self.service = self.create_service(SetBool, "enable", lambda request, response: response)
+
+    def take(self, message):
+        self.answer.publish(message)
+        self.heard += 1
+        if self.heard == 10:
+            self.destroy_subscription(self.subscription)
+            self.destroy_service(self.service)
+
+rclpy.init()
+rclpy.spin(Bot())
+"""
+
+
+@pytest.mark.ros
+def test_what_a_node_destroys_in_the_middle_is_seen_and_named(run_node: RunNode) -> None:
+    text = "std_msgs/msg/String"
+    chatter = {"publish": "/chatter", "type": text, "message": {"data": "hello"}}
+    recording = run_node(
+        DESTROYER,
+        record=[{"topic": "/echo", "type": text}],
+        stimuli=[
+            {**chatter, "every": "50 ms", "count": 20},
+            {"call": "/enable", "type": SET_BOOL, "after": "1500 ms"},
+        ],
+        until={"stimuli": "done"},
+        timeout="20 s",
+    )
+    latency = {"stimulus": "/chatter", "topic": "/echo", "most": "1 s"}
+    for check, parameters, destroyed in [
+        ("timing.latency", latency, "the subscription to `/chatter` was destroyed"),
+        ("service.responds", {"service": "/enable"}, "the service `/enable` was destroyed"),
+    ]:
+        finding = judge(check, recording, **parameters)
+        assert finding.status is Status.FAILED, finding
+        assert destroyed in finding.observed
+
+
 def ros_with(*packages: str, folder: Path) -> RosInstallation:
     index = folder / "share/ament_index/resource_index/packages"
     index.mkdir(parents=True)

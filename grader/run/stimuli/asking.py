@@ -106,6 +106,10 @@ class Asker:
         self._asked.append(asked)
         return asked
 
+    def wait(self, service: str, type: str, request: Mapping[str, Any], since_ns: int) -> None:
+        """Note a call that waited to be sent since a time: the server's node never spun."""
+        self._asked.append(Asked(service, type, request, since_ns))
+
     def _client(self, service: str, type: str) -> Any:
         key = (service, type)
         if key not in self._clients:

@@ -4,72 +4,122 @@ from __future__ import annotations
 
 import time
 
-from grader.recording.model import Wait
+from grader.recording.model import NS, Wait
 from grader.run.stimuli.asking import NO_SERVER, Asked
-from grader.run.stimuli.orders import CallOrder
+from grader.run.stimuli.orders import CallOrder, GoalOrder, ParametersOrder
 from grader.run.stimuli.stage import Playing, Stage
+from grader.run.stopwatch import Stopwatch
 
 _POLL_S = 0.02
 # The server may match the client, for its answers, a moment later than the client the server.
 _GRACE_S = 0.1
+_LOOK_NS = NS // 2
+"""Time between two looks whether a node spins."""
+_MISSING_S = 1.0
+"""What has not come so long after the graph's last change will hardly come."""
+_UNCALLABLE_S = 1.0
+"""A node that could not be asked for so long has none of the services that would tell."""
 MARGIN_S = 0.25
 """What is waited for is waited for a little longer, so that its time has passed in every clock."""
 
+AskingOrder = CallOrder | ParametersOrder | GoalOrder
+
 
 class Readiness:
-    """Waits until something of the student's is there, or nothing more is to be expected."""
+    """Waits until a server of the student's is there and its node spins, or in vain."""
 
-    def __init__(self, what: str, stage: Stage) -> None:
+    def __init__(self, what: str, service: str, stage: Stage) -> None:
         """Nothing is waited for yet.
 
         Args:
             what: Such as ``a service /add``, for the recording.
+            service: Fully qualified name of a service that the server has.
             stage: Knows how calm the graph is.
         """
         self._what = what
+        self._service = service
         self._stage = stage
         self._began_ns = 0
-        self._ready_s: float | None = None
+        self._there: Stopwatch | None = None
+        self.there_ns = 0
         self.given_up = False
 
     @property
     def is_in_vain(self) -> bool:
         """Whether it is waited for, and is not there."""
-        return self._began_ns > 0 and self._ready_s is None
+        return self._began_ns > 0 and self._there is None
 
-    def met(self, is_there: bool, elapsed_s: float) -> bool:
-        """Whether it has been there for long enough to be used.
+    @property
+    def never_answered(self) -> bool:
+        """Whether it is there, but its node never answered what it answers while it spins."""
+        node = self._stage.server(self._service) if self._there is not None else None
+        return node is not None and self._stage.probe.answers(node) is False
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether it is not there, and probably will not come."""
+        return self._there is None and self._stage.calm_s > _MISSING_S
+
+    def met(self, is_there: bool) -> bool:
+        """Whether it can be asked.
+
+        What is asked while a constructor waits for something would be late through no fault of
+        the server's: its node has to answer another call first, unless it does not in the time
+        that it has to start.
 
         Args:
             is_there: Whether it is there now.
-            elapsed_s: On the player's clock.
         """
         self._began_ns = self._began_ns or time.time_ns()
-        if is_there:
-            self.given_up = False
-            if self._ready_s is None:
-                self._ready_s = elapsed_s
-            return elapsed_s - self._ready_s >= _GRACE_S
-        self._ready_s = None
-        settle_s = self._stage.limits.settle_s
-        if not self.given_up and self._stage.calm_s > settle_s:
-            self.given_up = True
-            self._stage.waits.append(Wait(self._what, settle_s, self._began_ns))
-        return False
+        if not is_there:
+            self._there = None
+            settle_s = self._stage.limits.settle_s
+            if not self.given_up and self._stage.calm_s > settle_s:
+                self.given_up = True
+                self._stage.waits.append(Wait(self._what, settle_s, self._began_ns))
+            return False
+        self.given_up = False
+        if self._there is None:
+            self._there, self.there_ns = Stopwatch(self._stage.meter), time.time_ns()
+        if self._there.elapsed_s < _GRACE_S:
+            return False
+        spins = self.look()
+        limit_s = _UNCALLABLE_S if spins is None else self._stage.limits.discovery_s
+        return bool(spins) or self._there.elapsed_s > limit_s
+
+    def look(self) -> bool | None:
+        """Ask the server's node for something that it answers only while it spins.
+
+        Returns:
+            Whether it has ever answered that; None if it cannot be asked.
+        """
+        node = self._stage.server(self._service)
+        if node is None:
+            return None
+        if time.time_ns() - self._stage.probe.last_called_ns(node) > _LOOK_NS:
+            self._stage.call_executor(node)
+        return self._stage.probe.answers(node)
 
 
 class Asking(Playing):
-    """A stimulus that asks something of a service; one waits for those that come before it."""
+    """A stimulus that asks something of a server, when what is asked before it was answered."""
 
-    def __init__(self, after_s: float, stage: Stage) -> None:
+    def __init__(self, order: AskingOrder, what: str, service: str, stage: Stage) -> None:
         """Take a place in the order of what is asked.
 
         Args:
-            after_s: When it is due, on the player's clock.
+            order: When it is due, and how long to wait for an answer.
+            what: Of the server, in words.
+            service: Fully qualified name of a service that it has.
             stage: Knows the others.
         """
-        self.after_s = after_s
+        self.after_s = order.after_s
+        self._within_s = order.within_s
         self._stage = stage
+        self._ready = Readiness(what, service, stage)
+        self._since_asked: Stopwatch | None = None
+        self._now_s = 0.0
+        self._place = len(stage.asking)
         stage.asking.append(self)
 
     @property
@@ -79,13 +129,46 @@ class Asking(Playing):
 
     @property
     def is_through(self) -> bool:
-        """Whether what is due later need not wait for it any more."""
+        """Whether what comes after it need not wait for it any more."""
         return self.is_done
 
     @property
-    def _is_turn(self) -> bool:
+    def due_s(self) -> float | None:
+        """When to look next."""
+        return None if self.is_done else max(self.after_s, self._now_s + _POLL_S)
+
+    def holds_up(self, other: Asking) -> bool:
+        """Whether another one has to wait for it: it is due before, or stands before it.
+
+        Of those that are due at once, one that is not there holds up none.
+        """
+        if self.is_through or self._place == other._place:
+            return False
+        if self.after_s == other.after_s:
+            return self._place < other._place and not self._ready.is_missing
         # On a busy machine a service may be found later than another one that is due later.
-        return all(item.is_through for item in self._stage.asking if item.after_s < self.after_s)
+        return self.after_s < other.after_s
+
+    @property
+    def _is_turn(self) -> bool:
+        return not any(item.holds_up(self) for item in self._stage.asking)
+
+    def _wait_for_answer(self) -> None:
+        """Begin to wait; what the machine takes meanwhile does not count."""
+        self._since_asked = Stopwatch(self._stage.meter)
+
+    @property
+    def _waits(self) -> bool:
+        """Whether the answer may still come."""
+        since = self._since_asked
+        return since is not None and since.elapsed_s < self._within_s + MARGIN_S
+
+    def _go_on(self, elapsed_s: float) -> None:
+        """Note the time; where an answer is waited for, see whether the node spins meanwhile."""
+        self._now_s = elapsed_s
+        since = self._since_asked
+        if since is not None and since.elapsed_s > _GRACE_S and not self.is_done:
+            self._ready.look()
 
 
 class Calling(Asking):
@@ -93,13 +176,11 @@ class Calling(Asking):
 
     def __init__(self, order: CallOrder, stage: Stage) -> None:
         """Nothing is called yet."""
-        super().__init__(order.after_s, stage)
+        super().__init__(order, f"a service {order.service}", order.service, stage)
         self._order = order
-        self._ready = Readiness(f"a service {order.service}", stage)
         self._started = False
         self._sent = 0
         self._sent_s = 0.0
-        self._now_s = 0.0
         self._round: list[Asked] = []
         self._failed: str | None = None
 
@@ -118,30 +199,25 @@ class Calling(Asking):
     @property
     def due_s(self) -> float | None:
         """When to look next."""
-        if self.is_done:
-            return None
-        if (
-            self._started
-            and self._order.every_s is not None
-            and self._sent < len(self._order.requests)
-        ):
-            return self._sent_s + self._order.every_s
-        return max(self._order.after_s, self._now_s + _POLL_S)
+        every_s = self._order.every_s
+        if every_s is not None and 0 < self._sent < len(self._order.requests):
+            return self._sent_s + every_s
+        return super().due_s
 
     def tick(self, elapsed_s: float | None) -> None:
         """Call when it is due."""
         order = self._order
         if elapsed_s is None or elapsed_s < order.after_s or self._failed is not None:
             return
-        self._now_s = elapsed_s
+        self._go_on(elapsed_s)
         if not self._started:
             try:
                 there = self._stage.asker.is_ready(order.service, order.type)
             except ImportError as error:
                 self._failed = f"the interface {order.type} is not installed ({error})"
                 return
-            self._started = self._ready.met(there, elapsed_s)
-        if not self._started or self._sent >= len(order.requests) or not self._is_turn:
+            self._started = self._ready.met(there) and self._is_turn
+        if not self._started or self._sent >= len(order.requests):
             return
         if self._sent and not self._is_next_due():
             return
@@ -151,13 +227,17 @@ class Calling(Asking):
         ]
         self._sent += 1
         self._sent_s = elapsed_s
+        self._wait_for_answer()
 
     def finish(self) -> None:
         """Note what could not be sent, unless it was not due yet."""
+        order = self._order
         if self._failed is not None or self._ready.is_in_vain:
-            order = self._order
             error = self._failed or NO_SERVER
             self._stage.asker.fail(order.service, order.type, order.requests[self._sent], error)
+        elif self._ready.never_answered and not self._started:
+            request = order.requests[0]
+            self._stage.asker.wait(order.service, order.type, request, self._ready.there_ns)
 
     def _is_next_due(self) -> bool:
         if self._order.every_s is not None:
@@ -166,5 +246,4 @@ class Calling(Asking):
 
     def _is_over(self) -> bool:
         """Whether the newest calls were answered, or have had their time for it."""
-        answered = all(item.is_over for item in self._round)
-        return answered or self._now_s - self._sent_s >= self._order.within_s + MARGIN_S
+        return all(item.is_over for item in self._round) or not self._waits

@@ -10,13 +10,14 @@ from typing import Any
 from grader.recording.interaction import Feedback, Goal
 from grader.run.probe import import_interface
 from grader.run.stimuli.asking import NO_SERVER
-from grader.run.stimuli.calling import MARGIN_S, Readiness
+from grader.run.stimuli.calling import Asking
 from grader.run.stimuli.filling import filled, plain
 from grader.run.stimuli.orders import GoalOrder
-from grader.run.stimuli.stage import Playing, Stage
+from grader.run.stimuli.stage import Stage
 
-_POLL_S = 0.02
 _MOST_FEEDBACK = 5000
+_ACCEPT_S = 1.0
+"""How soon a server says whether it accepts a goal: its callback only decides."""
 # action_msgs/msg/GoalStatus
 _STATUSES = {
     1: "accepted",
@@ -78,51 +79,53 @@ class SentGoal:
         )
 
 
-class SendingGoal(Playing):
+class SendingGoal(Asking):
     """One goal, from its sending to its result."""
 
     def __init__(self, order: GoalOrder, stage: Stage) -> None:
         """Nothing is sent yet."""
+        super().__init__(
+            order, f"an action {order.action}", f"{order.action}/_action/send_goal", stage
+        )
         self._order = order
-        self._stage = stage
-        self._ready = Readiness(f"an action {order.action}", stage)
         # Those of the orders before it are there already, and are waited for.
-        self._before = [item for item in stage.goal_orders if item._order.action == order.action]
-        stage.goal_orders.append(self)
+        self._before = [
+            item
+            for item in stage.asking
+            if isinstance(item, SendingGoal) and item._order.action == order.action
+        ][:-1]
         self._client: Any = None
         self._handle: Any = None
         self._sent: SentGoal | None = None
         self._failed: str | None = None
-        self._sent_s = 0.0
-        self._now_s = 0.0
-
-    @property
-    def asks(self) -> bool:
-        """It does."""
-        return True
 
     @property
     def is_done(self) -> bool:
         """Whether it has ended, or was waited for; or nobody was there."""
         if self._failed is not None or self._ready.given_up:
             return True
-        if self._sent is None:
-            return False
-        return self._sent.is_over or self._now_s - self._sent_s >= self._order.within_s + MARGIN_S
+        return self._sent is not None and (self._sent.is_over or not self._waits)
 
     @property
-    def due_s(self) -> float | None:
-        """When to look next."""
-        return None if self.is_done else max(self._order.after_s, self._now_s + _POLL_S)
+    def is_through(self) -> bool:
+        """Whether it was answered; what comes after it goes out while it is worked on."""
+        if self.is_done or self._sent is None or self._since_asked is None:
+            return self.is_done
+        return self._sent.accepted is not None or self._since_asked.elapsed_s > _ACCEPT_S
+
+    def holds_up(self, other: Asking) -> bool:
+        """A goal may wait for the end of another one: it holds up only what is due at once."""
+        is_goal = isinstance(other, SendingGoal) and other._order.action == self._order.action
+        return self.after_s == other.after_s and not is_goal and super().holds_up(other)
 
     def tick(self, elapsed_s: float | None) -> None:
         """Send it, and ask to cancel it, when that is due."""
         if elapsed_s is None or elapsed_s < self._order.after_s or self._failed is not None:
             return
-        self._now_s = elapsed_s
+        self._go_on(elapsed_s)
         if self._sent is None:
-            if self._is_ready(elapsed_s) and self._is_turn():
-                self._send(elapsed_s)
+            if self._is_ready() and self._is_turn and self._is_free:
+                self._send()
             return
         self._follow(self._sent)
 
@@ -131,8 +134,10 @@ class SendingGoal(Playing):
         if self._failed is not None or self._ready.is_in_vain:
             error = self._failed or NO_SERVER
             self._note(SentGoal(self._order, self._order.goal, time.time_ns(), error=error))
+        elif self._ready.never_answered and self._sent is None:
+            self._note(SentGoal(self._order, self._order.goal, self._ready.there_ns))
 
-    def _is_ready(self, elapsed_s: float) -> bool:
+    def _is_ready(self) -> bool:
         from rclpy.action.client import ActionClient
 
         if self._client is None:
@@ -143,18 +148,17 @@ class SendingGoal(Playing):
                 return False
             node = self._stage.probe.node
             self._client = ActionClient(node, interface, self._order.action)
-        return self._ready.met(bool(self._client.server_is_ready()), elapsed_s)
+        return self._ready.met(bool(self._client.server_is_ready()))
 
-    def _is_turn(self) -> bool:
-        earlier = [item for item in self._stage.asking if item.after_s < self._order.after_s]
-        if not all(item.is_through for item in earlier):
-            return False
-        if not self._order.preempt:
-            return all(item.is_done for item in self._before)
-        # To preempt a goal, that must have been begun.
-        return all(item.is_done or item._handle is not None for item in self._before)
+    @property
+    def _is_free(self) -> bool:
+        """Whether the goals before it have ended; those that it is to preempt have begun."""
+        return all(
+            item.is_done or (self._order.preempt and item._handle is not None)
+            for item in self._before
+        )
 
-    def _send(self, elapsed_s: float) -> None:
+    def _send(self) -> None:
         if self._order.preempt:
             for item in self._before:
                 if item._sent is not None and not item._sent.is_over:
@@ -163,7 +167,7 @@ class SendingGoal(Playing):
         message = filled(import_interface(self._order.type).Goal(), self._order.goal, now_ns)
         sent = self._sent = SentGoal(self._order, plain(message), now_ns)
         self._note(sent)
-        self._sent_s = elapsed_s
+        self._wait_for_answer()
 
         def take(message: Any) -> None:
             if self._stage.probe.recording and len(sent.feedback) < _MOST_FEEDBACK:
@@ -205,6 +209,8 @@ class SendingGoal(Playing):
         now_ns = time.time_ns()
         if now_ns - (sent.answered_ns or now_ns) >= cancel_s * 1e9:
             sent.canceled_ns = now_ns
+            # A server that works on the goal to its end takes that in only then.
+            self._wait_for_answer()
             self._handle.cancel_goal_async().add_done_callback(
                 lambda done: self._cancel(sent, done)
             )

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import time
 
-from grader.recording.interaction import EXECUTOR_SERVICES
-from grader.recording.model import NS, Owner
+from grader.recording.model import Owner
 from grader.run.stimuli.orders import ListParametersOrder
 from grader.run.stimuli.stage import Playing, Stage
-
-_SETTLED_NS = NS // 2
-"""A node whose other services were seen so long ago has no parameter services."""
 
 
 class ListingParameters(Playing):
@@ -41,17 +37,4 @@ class ListingParameters(Playing):
     def _call(self) -> None:
         for node in self._stage.graph.nodes:
             if node.owner is Owner.STUDENT and node.vanished_ns is None:
-                self._stage.probe.call_executor(node.name, self._name(node.name))
-
-    def _name(self, node: str) -> str:
-        """Which service to call."""
-        first, second = EXECUTOR_SERVICES
-        seen = {
-            service.name: service.appeared_ns
-            for service in self._stage.graph.services
-            if service.node == node
-        }
-        appeared_ns = seen.get(f"{node}/{second}")
-        if f"{node}/{first}" in seen or appeared_ns is None:
-            return first
-        return second if time.time_ns() - appeared_ns > _SETTLED_NS else first
+                self._stage.call_executor(node.name)

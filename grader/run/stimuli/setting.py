@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from grader.run.stimuli.asking import NO_SERVER, Asked
-from grader.run.stimuli.calling import MARGIN_S, Asking, Readiness
+from grader.run.stimuli.calling import Asking
 from grader.run.stimuli.orders import ParametersOrder
 from grader.run.stimuli.stage import Stage
 
-_POLL_S = 0.02
+_EVERY: Mapping[str, Any] = {"prefixes": [], "depth": 0}
 _TYPES = {
     "list_parameters": "rcl_interfaces/srv/ListParameters",
     "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
@@ -24,13 +24,11 @@ class SettingParameters(Asking):
 
     def __init__(self, order: ParametersOrder, stage: Stage) -> None:
         """Nothing is asked yet."""
-        super().__init__(order.after_s, stage)
+        what = f"parameter services of {order.node}"
+        super().__init__(order, what, f"{order.node}/list_parameters", stage)
         self._order = order
-        self._ready = Readiness(f"parameter services of {order.node}", stage)
         self._steps: Iterator[Asked] | None = None
         self._asked: Asked | None = None
-        self._asked_s = 0.0
-        self._now_s = 0.0
         self._done = False
 
     @property
@@ -38,42 +36,37 @@ class SettingParameters(Asking):
         """Whether every call was answered, or waited for; or the node has no such services."""
         return self._done or self._ready.given_up
 
-    @property
-    def due_s(self) -> float | None:
-        """When to look next."""
-        return None if self.is_done else max(self._order.after_s, self._now_s + _POLL_S)
-
     def tick(self, elapsed_s: float | None) -> None:
         """Ask the next, when the one before it was answered."""
         if elapsed_s is None or elapsed_s < self._order.after_s or self._done:
             return
-        self._now_s = elapsed_s
+        self._go_on(elapsed_s)
         if self._steps is None:
             there = all(
                 self._stage.asker.is_ready(f"{self._order.node}/{service}", interface)
                 for service, interface in _TYPES.items()
             )
-            if not self._ready.met(there, elapsed_s) or not self._is_turn:
+            if not self._ready.met(there) or not self._is_turn:
                 return
             self._steps = self._conversation()
         if self._asked is not None and not self._asked.is_over:
             # A node that does not answer one call is not asked more.
-            self._done = elapsed_s - self._asked_s >= self._order.within_s + MARGIN_S
+            self._done = not self._waits
             return
         self._asked = next(self._steps, None)
-        self._asked_s = elapsed_s
+        self._wait_for_answer()
         self._done = self._asked is None
 
     def finish(self) -> None:
         """Note that nothing could be asked, unless it was not due yet."""
+        service, type = f"{self._order.node}/list_parameters", _TYPES["list_parameters"]
         if self._ready.is_in_vain:
-            service = f"{self._order.node}/list_parameters"
-            self._stage.asker.fail(
-                service, _TYPES["list_parameters"], {"prefixes": [], "depth": 0}, NO_SERVER
-            )
+            self._stage.asker.fail(service, type, _EVERY, NO_SERVER)
+        elif self._ready.never_answered and self._steps is None:
+            self._stage.asker.wait(service, type, _EVERY, self._ready.there_ns)
 
     def _conversation(self) -> Iterator[Asked]:
-        listed = self._ask("list_parameters", {"prefixes": [], "depth": 0})
+        listed = self._ask("list_parameters", _EVERY)
         yield listed
         names = _names(listed)
         if names:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from grader.recording.interaction import EXECUTOR_SERVICES
 from grader.recording.model import NS, Endpoint, Intervention, Join, Kind, Owner, Wait
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.graph import GraphObserver
@@ -20,10 +21,12 @@ from grader.run.student import StudentProcesses
 
 if TYPE_CHECKING:
     from grader.run.stimuli.calling import Asking
-    from grader.run.stimuli.goal_sending import SendingGoal, SentGoal
+    from grader.run.stimuli.goal_sending import SentGoal
 
 # A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
 _SET_UP_S = 0.5
+# A node whose other services were seen so long ago has no parameter services.
+_SETTLED_NS = NS // 2
 
 
 @dataclass
@@ -41,8 +44,7 @@ class Stage:
         joins: Late joiners so far, by name.
         interventions: What was done to processes so far.
         goals: Goals so far.
-        goal_orders: What sends goals, in the order of the YAML.
-        asking: What asks something of a service.
+        asking: What asks something of a service or an action, in the order of the YAML.
     """
 
     probe: Probe
@@ -55,7 +57,6 @@ class Stage:
     joins: dict[str, Join] = field(default_factory=dict)
     interventions: list[Intervention] = field(default_factory=list)
     goals: list[SentGoal] = field(default_factory=list)
-    goal_orders: list[SendingGoal] = field(default_factory=list)
     asking: list[Asking] = field(default_factory=list)
     _calm: tuple[int, Stopwatch] | None = None
 
@@ -74,6 +75,24 @@ class Stage:
             and item.topic == topic
             and item.vanished_ns is None
         ]
+
+    def server(self, service: str) -> str | None:
+        """The student's node that offers a service at the moment, or None."""
+        offered = (item for item in self.graph.services if item.name == service)
+        return next((item.node for item in offered if item.vanished_ns is None), None)
+
+    def call_executor(self, node: str) -> None:
+        """Call a service of a node that it answers only while it spins.
+
+        That is the first of :data:`EXECUTOR_SERVICES`, and the second where a node was made
+        without the first.
+        """
+        first, second = EXECUTOR_SERVICES
+        seen = {item.name: item.appeared_ns for item in self.graph.services if item.node == node}
+        appeared_ns = seen.get(f"{node}/{second}")
+        settled = appeared_ns is not None and time.time_ns() - appeared_ns > _SETTLED_NS
+        lacks_first = f"{node}/{first}" not in seen and settled
+        self.probe.call_executor(node, second if lacks_first else first)
 
     @property
     def calm_s(self) -> float:

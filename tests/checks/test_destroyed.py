@@ -1,0 +1,142 @@
+"""What the student's code destroyed is a finding, by name; what we or the machine ended is not."""
+
+from dataclasses import replace
+
+import pytest
+
+from grader.checks.finding import Status
+from grader.recording.model import Intervention, Kind
+from tests.checks.asking import acting, action, asked, goal, parameters_read, service, serving
+from tests.checks.builder import (
+    BOT,
+    LAUNCH_NS,
+    RELIABLE,
+    at,
+    died,
+    endpoint,
+    every,
+    failing,
+    join,
+    judge,
+    messages,
+    node,
+    reader,
+    recording,
+    sent,
+    silent,
+    stimulus,
+    taken,
+)
+
+LATCHED = replace(RELIABLE, durability="transient_local")
+LISTENER = endpoint("/chatter", kind=Kind.SUBSCRIPTION, type="std_msgs/msg/String")
+LATENCY = {"stimulus": "/chatter", "topic": "/cmd_vel", "most": "100 ms"}
+LOGGED = {"topic": "/chatter", "fields": ["data"], "at_least": 2, "sent": "after_launch"}
+FIRST_TEN = sent(every(-0.5 / 10, 10, -0.1))
+WORDS = "was destroyed 0.90 s after launch, while the process ran on"
+
+
+def gone(item, time_s=0.9):
+    """What vanished at a time."""
+    return replace(item, vanished_ns=at(time_s))
+
+
+def deaf(**changes):
+    """A run in which the subscription to /chatter was destroyed."""
+    return recording(**{"endpoints": (gone(LISTENER), endpoint(), reader(), stimulus()), **changes})
+
+
+def test_a_subscription_that_was_destroyed_before_anything_was_sent():
+    found = failing("timing.latency", deaf(sent={"/chatter": ()}), **LATENCY)
+    assert f"the subscription to `/chatter` {WORDS}" in found
+
+
+def test_a_subscription_that_was_destroyed_after_the_first_messages():
+    # At any load: what was sent after it cannot have been answered.
+    slow = taken(0.5, 2.6, waited_s=1.0)
+    run = deaf(
+        sent=sent(every(0.1, 20, 0.5)), messages=messages(every(0.1, 4, 0.51)), disturbance=slow
+    )
+    assert f"the subscription to `/chatter` {WORDS}" in failing("timing.latency", run, **LATENCY)
+
+
+def test_a_subscription_that_was_destroyed_after_what_was_sent_before_the_launch():
+    found = failing("log.follows", deaf(sent=FIRST_TEN), **LOGGED)
+    assert f"the subscription to `/chatter` {WORDS}" in found
+
+
+def test_a_publisher_that_was_destroyed():
+    ends = (gone(endpoint()), reader())
+    for run in (silent(endpoints=ends), recording(endpoints=ends, messages=messages([0.7, 0.8]))):
+        assert f"the publisher on `/cmd_vel` {WORDS}" in failing(
+            "messages.count", run, topic="/cmd_vel", at_least=5
+        )
+
+
+def test_a_publisher_that_was_destroyed_before_somebody_joined():
+    run = recording(
+        endpoints=(gone(endpoint(qos=LATCHED), 4.0), reader()),
+        joins=(replace(join(4.2), matched_ns=None),),
+        joined={"late": ()},
+    )
+    for check, more in (
+        ("qos.late_joiner", {"last": 5}),
+        ("qos.compatible", {"kind": "publisher"}),
+    ):
+        found = failing(check, run, topic="/cmd_vel", joiner="late", **more)
+        assert "the publisher on `/cmd_vel` was destroyed 4.00 s after launch" in found
+
+
+@pytest.mark.parametrize("error", ["", "no server"])
+def test_a_service_that_was_destroyed(error):
+    run = serving(asked(1.0, None, error=error), services=(gone(service()),))
+    found = failing("service.responds", run, service="/enable")
+    assert f"the service `/enable` {WORDS}" in found
+
+
+@pytest.mark.parametrize("error", ["", "no server"])
+def test_an_action_server_that_was_destroyed(error):
+    run = acting(goal(accepted=None, error=error), services=(gone(action()),))
+    found = failing("action.result", run, action="/fibonacci", within="2 s")
+    assert f"the action `/fibonacci` {WORDS}" in found
+
+
+def test_an_action_server_that_was_destroyed_while_it_worked():
+    run = acting(goal(end_s=None), services=(gone(action(), 1.2),))
+    found = failing("action.result", run, action="/fibonacci", within="2 s")
+    assert "the action `/fibonacci` was destroyed 1.20 s after launch" in found
+
+
+def test_a_node_that_was_destroyed_before_its_parameters_were_read():
+    own = [
+        gone(service(f"/bot_publisher/{name}"))
+        for name in ("list_parameters", "describe_parameters", "get_parameters", "set_parameters")
+    ]
+    lost = replace(
+        parameters_read(speed=1.0)[0], answered_ns=None, response=None, error="no server"
+    )
+    run = recording(calls=(lost,), services=tuple(own), nodes=(node(vanished_s=0.9),))
+    found = failing("parameter.declared", run, node="bot_publisher", name="speed")
+    assert f"its parameter service was destroyed with its node {WORDS[14:]}" in found
+
+
+def test_what_vanished_with_its_process_was_not_destroyed():
+    run = deaf(sent={"/chatter": ()}, processes=(died(-11, 0.9),))
+    found = failing("timing.latency", replace(run, messages={}), **LATENCY)
+    assert "SIGSEGV" in found
+    assert "while the process ran on" not in found
+
+
+def test_what_the_scenario_ended_was_not_destroyed():
+    killed = Intervention(at(0.8), BOT, "kill", "SIGINT")
+    finding = judge(
+        "timing.latency", deaf(sent={"/chatter": ()}, interventions=(killed,)), **LATENCY
+    )
+    assert finding.status is Status.ERROR
+
+
+def test_what_is_there_was_not_destroyed():
+    ends = (gone(LISTENER), LISTENER, endpoint(), reader(), stimulus())
+    run = deaf(sent={"/chatter": ()}, endpoints=ends)
+    assert (ends[0].vanished_ns or 0) > LAUNCH_NS
+    assert judge("timing.latency", run, **LATENCY).status is Status.ERROR
