@@ -12,6 +12,11 @@ from grader.assignment.source import Model
 from grader.checks.node_name import node_name
 
 MOST_CALLS = 1000
+_AFTER = (
+    "Not before so long after the first match, nor before the answers to what is asked earlier. "
+    "What has the same `after` is asked in the order of the list; a goal is answered when it was "
+    "accepted or rejected."
+)
 
 QualifiedNode = Annotated[str, AfterValidator(node_name)]
 
@@ -31,7 +36,7 @@ class ListParameters(Model):
 class CallService(Model):
     """Call a service.
 
-    The first call goes out when the service is there, and never before. What was asked and
+    The first call goes out when the service is there and its node spins. What was asked and
     answered is in the recording's `calls`. Values may use `$name` of `random` and quantities
     such as `30 deg` (in SI units); a field that is left out is zero.
     """
@@ -44,8 +49,7 @@ class CallService(Model):
     )
     after: DurationOrZero = Field(
         0.0,
-        description="Not before so long after the first match, nor before the answers to what is "
-        "asked earlier.",
+        description=_AFTER,
         validate_default=False,
     )
     every: Duration | None = Field(
@@ -85,8 +89,7 @@ class ReadParameters(Model):
     )
     after: DurationOrZero = Field(
         0.0,
-        description="Not before so long after the first match, nor before the answers to what is "
-        "asked earlier.",
+        description=_AFTER,
         validate_default=False,
     )
     within: Duration = Field(
@@ -108,8 +111,7 @@ class SetParameters(Model):
     )
     after: DurationOrZero = Field(
         0.0,
-        description="Not before so long after the first match, nor before the answers to what is "
-        "asked earlier.",
+        description=_AFTER,
         validate_default=False,
     )
     within: Duration = Field(
@@ -131,8 +133,7 @@ class SendGoal(Model):
     goal: dict[str, Any] = Field(default_factory=dict, description="The fields of the goal.")
     after: DurationOrZero = Field(
         0.0,
-        description="Not before so long after the first match, nor before the answers to what is "
-        "asked earlier.",
+        description=_AFTER,
         validate_default=False,
     )
     cancel_after: Duration | None = Field(

@@ -186,6 +186,31 @@ class TestCancels:
         lost = acting(canceled(cancel_answered_ns=None, cancel_accepted=None, status="succeeded"))
         assert "its executor cannot while" in failing("action.cancels", lost, **FIB)
 
+    def test_an_executor_that_is_blocked_until_the_end_is_the_student_s_on_any_machine(self):
+        blocked = canceled(end_s=None, cancel_accepted=None, cancel_answered_ns=None)
+        run = acting(blocked, calls=(), disturbance=taken(2.0, 2.1, waited_s=0.037))
+        found = failing("action.cancels", run, **FIB)
+        assert "did not take that in; its executor cannot while the execute callback" in found
+        assert "spins" not in found
+        # What the machine may have taken all of is no finding.
+        starved = acting(blocked, calls=(), disturbance=taken(2.0, 2.1, waited_s=3.0))
+        assert judge("action.cancels", starved, **FIB).status is Status.ERROR
+
+    def test_a_run_that_ends_before_the_goal_had_its_time(self):
+        blocked = canceled(end_s=None, cancel_accepted=None, cancel_answered_ns=None)
+        finding = judge("action.cancels", acting(blocked, stop_s=2.0), **FIB)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
+        assert "before that was due" in finding.observed
+
+    def test_threads_that_only_this_machine_lacks_cost_nothing(self):
+        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
+        blocked = canceled(end_s=None, cancel_accepted=None, cancel_answered_ns=None)
+        for cpus, status in (("1", Status.ERROR), ("4", Status.FAILED)):
+            run = acting(
+                blocked, declarations=(declared("started"), spin), environment={"cpus": cpus}
+            )
+            assert judge("action.cancels", run, **FIB).status is status
+
     def test_late(self):
         run = acting(canceled(end_s=2.21))
         assert "was canceled only 2 s after" in failing("action.cancels", run, **FIB)

@@ -53,6 +53,19 @@ class TestGood:
         run = recording(calls=(*early, *calls()))
         assert responsive(run).status is Status.PASSED
 
+    def test_a_node_that_publishes_nothing_counts_from_when_it_spins(self):
+        waits = tuple(call(0.5 * n, 3.1 - 0.5 * n if n < 7 else 0.002) for n in range(1, 9))
+        quiet = {"messages": {}, "endpoints": ()}
+        for spin_s, calls_, status in (
+            (3.1, waits, Status.PASSED),
+            (0.4, waits, Status.FAILED),
+            # The word of a process that never answers counts for nothing.
+            (3.1, calls(None), Status.FAILED),
+        ):
+            said = (declared("started"), declared("spin", spin_s))
+            run = recording(calls=calls_, declarations=said, **quiet)
+            assert responsive(run).status is status
+
     def test_a_call_too_late_to_be_answered_before_the_end(self):
         run = recording(calls=(*calls(), call(4.2, None)))
         assert responsive(run).status is Status.PASSED

@@ -1,8 +1,11 @@
 """parameter.*: declared, set or refused, and with an effect; lifecycle.state."""
 
+from dataclasses import replace
+
 import pytest
 
 from grader.checks.finding import Status
+from grader.recording.model import NS
 from tests.checks.asking import asked, parameter_set, parameters_read, service
 from tests.checks.builder import (
     NODE,
@@ -81,6 +84,19 @@ class TestDeclared:
         )  # fmt: skip
         run = recording(calls=(silent,), declarations=(declared("started"),))
         assert "rclpy.spin() was never called" in failing("parameter.declared", run, **SPEED)
+
+    def test_an_answer_that_came_too_late_to_ask_on_is_no_missing_value(self):
+        listed = parameters_read(speed=0.5)[0]
+        late = replace(listed, answered_ns=listed.requested_ns + round(2.6 * NS))
+        for check, more in (
+            ("parameter.declared", {}),
+            ("parameter.set", {"value": 0.5}),
+            ("parameter.takes_effect", {"value": 0.5, "topic": "/cmd_vel", "period": "1 s"}),
+        ):
+            found = failing(check, recording(calls=(late,)), **SPEED, **more)
+            assert "service `list_parameters` answered only after 2.6 s" in found
+            slow = recording(calls=(late,), disturbance=taken(1.0, 3.0, waited_s=1.7))
+            assert judge(check, slow, **SPEED, **more).status is Status.ERROR
 
     def test_a_node_without_parameter_services(self):
         lost = asked(

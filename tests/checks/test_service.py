@@ -132,6 +132,11 @@ class TestResponds:
         run = serving(asked(answer_s=None), *silent)
         assert "keeps the executor from coming round" in failing("service.responds", run, **TRUE)
 
+    def test_nothing_is_said_of_an_executor_that_was_not_asked(self):
+        found = failing("service.responds", serving(asked(1.0, None)), **TRUE)
+        assert "was never answered" in found
+        assert "spins" not in found
+
     def test_a_callback_that_does_not_return_while_the_executor_spins(self):
         run = serving(asked(answer_s=None), *(call(1.5 + 0.5 * n) for n in range(4)))
         found = failing("service.responds", run, **TRUE)

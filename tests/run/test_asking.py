@@ -133,6 +133,80 @@ def test_a_lifecycle_node_goes_through_its_states(run_node: RunNode) -> None:
     assert finding.status is Status.PASSED, finding
 
 
+PATIENT = SERVER.replace(
+    'self.create_service(SetBool, "enable", self.enable)',
+    """self.create_service(SetBool, "enable", self.enable)
+        self.create_client(SetBool, "nowhere").wait_for_service(3.0)""",
+)
+NEVER_SPINS = SERVER.replace("rclpy.spin(Bot())", "bot = Bot()\ntime.sleep(60)")
+
+ASKED = [
+    {"call": "/enable", "type": SET_BOOL, "request": {"data": True}},
+    {"set_parameters": {"speed": 0.75}, "node": "bot"},
+    {"call": "list_parameters", "every": "500 ms"},
+]
+ASKING_CHECKS = [
+    ("service.responds", {"service": "/enable", "response": {"success": True}}),
+    ("parameter.declared", {"node": "bot", "name": "speed", "default": 0.5}),
+    ("parameter.set", {"node": "bot", "name": "speed", "value": 0.75}),
+    ("executor.responsive", {}),
+]
+
+
+@pytest.mark.ros
+def test_a_node_whose_constructor_waits_is_asked_when_it_spins(run_node: RunNode) -> None:
+    recording = run_node(
+        PATIENT, record=[], stimuli=ASKED, until={"stimuli": "done"}, timeout="20 s"
+    )
+    assert recording.ending is Ending.UNTIL
+    for name, parameters in ASKING_CHECKS:
+        finding = judge(name, recording, **parameters)
+        assert finding.status is Status.PASSED or finding.disturbed, finding
+
+
+@pytest.mark.ros
+def test_a_node_that_never_spins_is_found_out(run_node: RunNode) -> None:
+    recording = run_node(
+        NEVER_SPINS, record=[], stimuli=ASKED, until={"stimuli": "done"}, timeout="6 s"
+    )
+    for name, parameters in ASKING_CHECKS:
+        finding = judge(name, recording, **parameters)
+        assert finding.status is Status.FAILED, finding
+        assert "rclpy.spin() was never called" in finding.observed
+
+
+@pytest.mark.ros
+def test_what_is_due_at_once_is_asked_in_the_order_of_the_list(run_node: RunNode) -> None:
+    """One callback takes 200 ms; the values of the calls tell their order."""
+    values = [True, False, True, True, False]
+    recording = run_node(
+        SERVER.replace("rclpy.spin(Bot())", "rclpy.spin(Bot(), MultiThreadedExecutor(4))").replace(
+            "import time, rclpy", "import time, rclpy\nfrom rclpy.executors import *"
+        ),
+        record=[],
+        stimuli=[
+            *(
+                {"call": "/enable", "type": SET_BOOL, "request": {"data": value}}
+                for value in values[:3]
+            ),
+            {"set_parameters": {"speed": 0.75}, "node": "bot"},
+            *(
+                {"call": "/enable", "type": SET_BOOL, "request": {"data": value}}
+                for value in values[3:]
+            ),
+        ],
+        until={"stimuli": "done"},
+        timeout="20 s",
+    )
+    calls = [call for call in recording.calls if call.request is not None]
+    assert [call.request["data"] for call in calls if call.service == "/enable"] == values
+    ends = [call.answered_ns or 0 for call in calls]
+    assert all(call.requested_ns >= end for call, end in zip(calls[1:], ends, strict=False))
+    services = [call.service.rpartition("/")[2] for call in calls]
+    assert services[:4] == ["enable"] * 3 + ["list_parameters"]
+    assert services[-2:] == ["enable"] * 2
+
+
 DESTROYER = """\
 import rclpy
 from rclpy.node import Node
