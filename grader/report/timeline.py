@@ -33,6 +33,8 @@ LANE = 36
 TRACK = 12
 SIDE = 6
 MOST_NODES = 4
+_LEAST_HELD_S = 0.01
+_MOST_HELD_S = 60.0
 _OWN_SERVICE = "parameter service"
 """Lane of what the grader asks every node again and again, until the end."""
 _COMPLAINTS = ("Traceback (most recent call last)", "[ERROR]", "[FATAL]")
@@ -74,6 +76,8 @@ def draw_timeline(recording: Recording, moments: Sequence[Moment], name: str) ->
     flags = _flags(recording)
     lanes = _lanes(recording, moments)
     caption = "Each stroke is one event; × marks what went wrong, or what a finding points at."
+    if any(_held(recording, topic) for topic in recording.messages):
+        caption += " Held: create_publisher() returned only when the publisher was matched."
     return Figure(
         caption,
         _draw(recording, flags, lanes, end_s, f"{name}-wide", WIDE),
@@ -105,6 +109,20 @@ def _flags(recording: Recording) -> tuple[Flag, ...]:
     return tuple(sorted(flags, key=lambda flag: flag.time_s))
 
 
+def _held(recording: Recording, topic: str) -> str:
+    """How long the tracer let a publisher wait until it was matched, in words; empty if hardly."""
+    waits = [
+        item.data.get("waited_s", 0.0)
+        for item in recording.declared("held")
+        if item.data.get("topic") == topic
+    ]
+    # It is the student's process that reports it.
+    longest_s = max((wait for wait in waits if isinstance(wait, float)), default=0.0)
+    if not _LEAST_HELD_S <= longest_s <= _MOST_HELD_S:
+        return ""
+    return f", held {longest_s:.2f} s"
+
+
 def _exit(process: Process) -> str:
     if process.exit_code is not None and process.exit_code < 0:
         return f"ended by signal {-process.exit_code} at"
@@ -122,7 +140,8 @@ def _lanes(recording: Recording, moments: Sequence[Moment]) -> list[Lane]:
     lanes += _graph(recording)
     for topic, messages in sorted(recording.messages.items()):
         times = tuple(since(message.stamp_ns) for message in messages)
-        lanes.append(Lane(topic, counted(len(times), "message"), ticks=times))
+        held = _held(recording, topic)
+        lanes.append(Lane(topic, f"{counted(len(times), 'message')}{held}", ticks=times))
     for topic, messages in sorted(recording.sent.items()):
         times = tuple(since(message.stamp_ns) for message in messages)
         lanes.append(Lane(f"to {topic}", f"{counted(len(times), 'message')} sent", ticks=times))

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.finding import Moment, Plot
-from grader.recording.model import Call, Ending, Message, Process
+from grader.recording.model import Call, Declaration, Ending, Message, Process
 from grader.report.flags import Flag, place
 from grader.report.plot import draw_plot
 from grader.report.svg import NARROW, WIDE, Scale, fitted, ticks
@@ -178,6 +178,12 @@ class TestTimeline:
             "findings: 1 moment",
         ):
             assert text in description
+
+    def test_a_publisher_that_was_held_until_it_was_matched_is_said_to_be(self):
+        held = Declaration(at(0.5), PROCESS, "held", {"topic": "/cmd_vel", "waited_s": 0.184})
+        figure = draw_timeline(make_run(declarations=(held,)), (), "t")
+        assert "4 messages, held 0.18 s" in words(figure.wide)
+        assert "create_publisher() returned only when the publisher was matched" in figure.caption
 
     def test_a_call_goes_wrong_unless_the_end_cuts_it_off(self):
         service = "/bot_publisher/list_parameters"
