@@ -53,8 +53,8 @@ class Runs(Reported):
 
     @model_validator(mode="after")
     def _one_way(self) -> Runs:
-        if (self.period is None) == (self.stimulus is None):
-            raise ValueError("say what calls them: give either 'period' or 'stimulus'")
+        if self.period is not None and self.stimulus is not None:
+            raise ValueError("say what calls them: give either 'period' or 'stimulus', or neither")
         return self
 
 
@@ -65,7 +65,8 @@ def run(recording: Recording, parameters: Runs) -> Finding:
     A timer's callback starts once in each `period` (the median of the times between its starts);
     a subscription's callback runs once for each message that the probe sent; messages that still
     wait at the end because other callbacks work without a pause do not count. Each run must have
-    reported its start and its end. A start that is late because callbacks worked without a pause
+    reported its start and its end. Without `period` and `stimulus` it is enough that each
+    callback ran `at_least` times. A start that is late because callbacks worked without a pause
     until then counts as on time: whether they should have run at once is judged elsewhere. One
     that comes before its time is never right, whatever the median is.
 
@@ -74,10 +75,17 @@ def run(recording: Recording, parameters: Runs) -> Finding:
     """
     expected = _run_words(parameters)
     reports = read_reports(recording.on(parameters.topic))
-    cause = why_unreported(recording, parameters.topic, parameters.callbacks, reports)
+    free = parameters.period is None and parameters.stimulus is None
+    cause = why_unreported(
+        recording,
+        parameters.topic,
+        parameters.callbacks,
+        reports,
+        parameters.at_least if free else 1,
+    )
     if cause is not None:
         return cause.finding(expected)
-    for callback in parameters.callbacks:
+    for callback in () if free else parameters.callbacks:
         if parameters.period is not None:
             finding = _judge_period(recording, parameters, reports, callback, parameters.period)
         else:
@@ -102,8 +110,13 @@ def _run_words(parameters: Runs) -> str:
             f"{names} {each}start every {format_duration(parameters.period)} (median within "
             f"{parameters.tolerance}), and report start and end on {code(parameters.topic)}"
         )
+    if parameters.stimulus is None:
+        return (
+            f"{names} {each}run {counted(parameters.at_least, 'time')} or more, and report start "
+            f"and end on {code(parameters.topic)}"
+        )
     return (
-        f"{names} {each}run once for each message on {code(parameters.stimulus or '')}, and report "
+        f"{names} {each}run once for each message on {code(parameters.stimulus)}, and report "
         f"start and end on {code(parameters.topic)}"
     )
 

@@ -286,10 +286,14 @@ class TestRun:
         deaf = failed("run", run(*parallel()), ["chatter"], stimulus="/chatter")
         assert "subscribes to nothing" in deaf
 
-    def test_it_must_be_said_what_calls_them(self):
-        for more in ({}, {"period": "1 s", "stimulus": "/chatter"}):
-            with pytest.raises(ValueError, match="either 'period' or 'stimulus'"):
-                judged("run", run(*parallel()), TIMERS, **more)
+    def test_only_one_thing_calls_them(self):
+        with pytest.raises(ValueError, match="either 'period' or 'stimulus'"):
+            judged("run", run(*parallel()), TIMERS, period="1 s", stimulus="/chatter")
+
+    def test_without_a_period_or_messages_it_is_enough_that_they_ran(self):
+        runs = only(parallel(), "timer_1")[:2]
+        assert judged("run", run(*runs), ["timer_1"], at_least=2).status is Status.PASSED
+        assert "ran only 2 times" in failed("run", run(*runs), ["timer_1"], at_least=3)
 
 
 class TestNearMisses:
