@@ -128,17 +128,25 @@ def package_files(
     Args:
         package: What it is called, how it is built, what it needs.
         description: One line for its manifest.
-        nodes: Python code by executable.
+        nodes: Code by executable: C++ where :func:`is_cpp`, else Python.
         interfaces: Definitions in it.
 
     Returns:
         Contents by path inside the package, without the definitions.
     """
-    known = {"package": package, "description": description, "programs": programs(package)}
+    cpp = is_cpp(package)
+    if cpp and "rclcpp" not in package.depends:
+        package = package.model_copy(update={"depends": ("rclcpp", *package.depends)})
+    known = {
+        "package": package,
+        "description": description,
+        "programs": programs(package),
+        "cpp": cpp,
+    }
     files = {"package.xml": rendered("starter/package.xml", interfaces=interfaces, **known)}
     if package.build_type == "ament_cmake":
         files["CMakeLists.txt"] = rendered("starter/CMakeLists.txt", interfaces=interfaces, **known)
-        code = "scripts"
+        code = "src" if cpp else "scripts"
     else:
         files["setup.py"] = rendered("starter/setup.py", **known)
         files["setup.cfg"] = rendered("starter/setup.cfg", **known)
@@ -146,8 +154,17 @@ def package_files(
         files[f"{package.name}/__init__.py"] = ""
         code = package.name
     for program in programs(package):
-        files[f"{code}/{program.module}.py"] = nodes[program.executable]
+        files[f"{code}/{program.module}.{'cpp' if cpp else 'py'}"] = nodes[program.executable]
     return files
+
+
+def is_cpp(package: Package) -> bool:
+    """Whether the programs of a package are written in C++.
+
+    As `ros2 pkg create` has it for a package that CMake builds, unless it needs rclpy.
+    """
+    scripts = all(name.endswith(".py") for name in package.executables)
+    return package.build_type == "ament_cmake" and "rclpy" not in package.depends and not scripts
 
 
 def programs(package: Package) -> tuple[Program, ...]:
@@ -164,7 +181,7 @@ def _package(
 ) -> Iterator[tuple[str, str]]:
     nodes = {
         program.executable: rendered(
-            "starter/node.py",
+            f"starter/node.{'cpp' if is_cpp(package) else 'py'}",
             package=package,
             program=program,
             node=_node_name(assignment, package, program) or program.module,

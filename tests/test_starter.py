@@ -104,8 +104,24 @@ def test_an_interface_package_generates_what_the_visible_checks_name(tmp_path: P
     assert [group.name for group in manifest.member_of_groups] == ["rosidl_interface_packages"]
 
 
-def test_a_package_for_cmake_installs_its_programs(tmp_path: Path) -> None:
+def test_a_package_for_cmake_has_programs_in_cpp(tmp_path: Path) -> None:
     files = starter_files(lesson(tmp_path))
+    assert not any(name.endswith(".py") for name in files if name.startswith("talker_msgs/"))
+    node = files["talker_msgs/src/talker_msgs.cpp"]
+    assert "class TalkerMsgs : public rclcpp::Node" in node and ': Node("talker_msgs")' in node
+    cmake = files["talker_msgs/CMakeLists.txt"]
+    assert "add_executable(tool src/talker_msgs.cpp)" in cmake
+    assert "ament_target_dependencies(tool rclcpp std_msgs)" in cmake
+    assert "install(TARGETS tool\n  DESTINATION lib/${PROJECT_NAME}\n)" in cmake
+    manifest = parse_package_string(files["talker_msgs/package.xml"])
+    assert [one.name for one in manifest.build_depends] == ["rclcpp", "std_msgs"]
+
+
+def test_a_package_for_cmake_that_needs_rclpy_installs_its_programs(tmp_path: Path) -> None:
+    text = LESSON.replace("depends: [std_msgs]", "depends: [std_msgs, rclpy]")
+    (tmp_path / "lesson").mkdir()
+    (tmp_path / "lesson" / "assignment.yaml").write_text(text.format(title="Talk"))
+    files = starter_files(load_assignment(tmp_path / "lesson"))
     assert files["talker_msgs/scripts/talker_msgs.py"].startswith("#!/usr/bin/env python3\n")
     assert "RENAME tool" in files["talker_msgs/CMakeLists.txt"]
 
