@@ -64,13 +64,8 @@ class Progress:
             finally:
                 self._status = None
 
-    def say(self, text: str, *, passing: bool = False) -> None:
-        """Say what happens now.
-
-        Args:
-            text: A few words.
-            passing: Not worth a line of its own where lines stay.
-        """
+    def say(self, text: str) -> None:
+        """Say in a few words what happens now."""
         if self._quiet or text == self._last:
             return
         self._last = text
@@ -78,5 +73,5 @@ class Progress:
             from rich.text import Text
 
             self._status.update(Text(text))  # type: ignore[attr-defined]
-        elif not passing:
+        else:
             print(f"rosgrade: {text}", file=sys.stderr, flush=True)

@@ -168,16 +168,11 @@ class GradingProgress(Progress):
             ended.set()
             reminder.join()
 
-    def say(self, text: str, *, passing: bool = False) -> None:
-        """Say what happens now, besides the scenarios.
-
-        Args:
-            text: A few words.
-            passing: Not worth a line of its own where lines stay.
-        """
+    def say(self, text: str) -> None:
+        """Say in a few words what happens now, besides the scenarios."""
         with self._lock:
             is_new = self._activity.say(text, time.monotonic())
-        if self._live is None and is_new and not passing:
+        if self._live is None and is_new:
             self._print(text)
 
     def narrate(self, scenario: str, event: Mapping[str, Any]) -> None:

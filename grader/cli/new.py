@@ -14,7 +14,9 @@ def new(
     name: Annotated[
         str,
         typer.Argument(
-            metavar="ID", help="Name of the assignment: lower case letters, digits, underscores."
+            metavar="ID",
+            help="Name of the assignment: lower case letters, digits, underscores; or its folder, "
+            "which is called so.",
         ),
     ],
     folder: Annotated[
@@ -29,7 +31,9 @@ def new(
     """
     from grader.scaffold import write_assignment
 
-    written = write_assignment(name, folder)
+    # A name alone is its own last part, and leaves the folder as it is.
+    place = folder / name
+    written = write_assignment(place.name or name, place.parent)
     console = output_console()
     console.print(f"Written: {written}", soft_wrap=True)
     console.print("\nNext, look at assignment.yaml in it, and after each change:\n")

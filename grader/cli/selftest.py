@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from grader.batch.grading import Graded
     from grader.batch.selftest import TrialResult
 
-_TOLD_EACH = 10
-"""Of so many submissions one has a line of its own where lines stay."""
-
 
 def selftest(
     assignments: Annotated[
@@ -82,9 +79,8 @@ def selftest(
             ):
                 results.append(result)
                 progress.say(
-                    f"{loaded.assignment.id}: {len(results)} of {wanted} graded, "
-                    f"last {result.trial.id}",
-                    passing=len(results) % _TOLD_EACH != 0,
+                    f"{loaded.assignment.id}: {len(results)} of {wanted} graded: "
+                    f"{result.trial.id}: {'ok' if result.verdict.right else 'WRONG'}"
                 )
         if record:
             console.print(kept[0], soft_wrap=True)

@@ -77,12 +77,25 @@ def test_a_new_assignment_is_valid_and_leaves_no_doubt(rosgrade: Rosgrade, tmp_p
     assert ended.stderr == ""
 
 
+@pytest.mark.parametrize("name", ["course/lesson", "./course/lesson/", "{here}/course/lesson"])
+def test_a_new_assignment_is_named_by_its_folder_as_well(
+    rosgrade: Rosgrade, tmp_path: Path, name: str
+) -> None:
+    written = rosgrade("new", name.format(here=tmp_path))
+    assert written.returncode == 0, written.stderr
+    assert rosgrade("validate", tmp_path / "course" / "lesson").returncode == 0
+    assert rosgrade("new", "course/My-Lesson").returncode == 2
+
+
 @pytest.mark.ros
 @pytest.mark.slow
 def test_a_new_assignment_tells_right_from_wrong(rosgrade: Rosgrade) -> None:
     rosgrade("new", "lesson")
-    ended = rosgrade("selftest", "lesson", "--quiet")
+    ended = rosgrade("selftest", "lesson")
     assert ended.returncode == 0, ended.stdout + ended.stderr
+    # Where there is no terminal, each program has a line as soon as it is judged.
+    counts = [line.split()[2:5] for line in ended.stderr.splitlines() if " graded: " in line]
+    assert counts and [int(one) for one, _, _ in counts] == [*range(1, int(counts[0][2]) + 1)]
     assert "2 of 2 right solutions with full points" in ended.stdout
     assert "8 of 8 mutants judged as they must: mutation score 100 %" in ended.stdout
 
