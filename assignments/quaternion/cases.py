@@ -32,7 +32,9 @@ def axis_angle(seed: int) -> list[dict]:
     other = [((1.0, 0.0, 1.0), QUARTER), ((0.0, 0.0, 2.0), QUARTER), ((1.0, 1.0, 1.0), 2.0)]
     # Its sum is 0, but it is no zero axis.
     other.append(((1.0, -1.0, 0.0), 1.2))
-    for _ in range(46):
+    # Short and long, but no zero axis.
+    other += [(_scaled(_direction(chance), length), 2.2) for length in (0.01, 100.0)]
+    for _ in range(44):
         length = 10.0 ** chance.uniform(-2.0, 2.0)
         other.append((_scaled(_direction(chance), length), _angle(chance)))
     return [_turn(axis, angle) for axis, angle in unit + other]
@@ -43,10 +45,12 @@ def rpy(seed: int) -> list[dict]:
     chance = random.Random(f"{seed}/rpy")
     found = [(QUARTER, 0.0, 0.0), (0.0, QUARTER, 0.0), (0.0, 0.0, QUARTER), (0.1, 0.2, 0.3)]
     found += [(-4.0, 2.5, 9.0), (0.004, -0.002, 0.001), (math.pi, 0.0, -math.pi)]
-    found += [(_angle(chance), _angle(chance), _angle(chance)) for _ in range(53)]
+    # Small, but no 0.
+    found.append((-0.0006, 0.0005, 0.0004))
+    found += [(_angle(chance), _angle(chance), _angle(chance)) for _ in range(52)]
     found += [
-        (chance.uniform(-3.0, 3.0), chance.choice((-QUARTER, QUARTER)), chance.uniform(-3.0, 3.0))
-        for _ in range(10)
+        (chance.uniform(-3.0, 3.0), pitch, chance.uniform(-3.0, 3.0))
+        for pitch in 5 * (-QUARTER, QUARTER)
     ]
     return [_vector(angles) for angles in found]
 
@@ -68,8 +72,10 @@ def scaled(seed: int) -> list[dict]:
     """Quaternions whose length is not 1."""
     chance = random.Random(f"{seed}/scaled")
     found = [(0.0, 0.0, 1.0, 1.0), (2.0, 0.0, 0.0, 2.0)]
+    # Who does not scale these takes a sine of 8 for that of the pitch, or one of 0.008.
+    found += [_scaled(_pitched(pitch, chance), size) for pitch, size in ((1.0, 3.2), (-1.0, 0.1))]
     found += [
-        _scaled(_unit_quaternion(chance), 10.0 ** chance.uniform(-1.0, 1.0)) for _ in range(28)
+        _scaled(_unit_quaternion(chance), 10.0 ** chance.uniform(-1.0, 1.0)) for _ in range(26)
     ]
     return [_quaternion(item) for item in found]
 
@@ -112,22 +118,25 @@ def gimbal_lock(seed: int) -> list[dict]:
 
 
 def zero_axis(seed: int) -> list[dict]:
-    """A zero axis, which says no rotation, among others."""
+    """A zero axis, which says no rotation, among others that turn by much.
+
+    So the answer to the message before is never right for a zero axis.
+    """
     chance = random.Random(f"{seed}/zero_axis")
     found = []
     for angle in (0.0, QUARTER, -2.0):
         found += [((0.0, 0.0, 0.0), angle)]
-        found += [(_direction(chance), _angle(chance)) for _ in range(3)]
+        found += [(_direction(chance), chance.uniform(0.5, 2.5)) for _ in range(3)]
     return [_turn(axis, angle) for axis, angle in found]
 
 
 def zero_quaternion(seed: int) -> list[dict]:
-    """A quaternion of zeros, which is no rotation, among others."""
+    """A quaternion of zeros, which is no rotation, among others that turn by much."""
     chance = random.Random(f"{seed}/zero_quaternion")
     found = []
     for _ in range(2):
         found += [(0.0, 0.0, 0.0, 0.0)]
-        found += [_unit_quaternion(chance) for _ in range(3)]
+        found += [_pitched(chance.uniform(-1.0, 1.0), chance) for _ in range(3)]
     return [_quaternion(item) for item in found]
 
 

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from grader.assignment.model import TopicName
 from grader.checks import slip
 from grader.checks.check import NamedFields, Parameters, Subject, check
+from grader.checks.delivery import why_not_sent
 from grader.checks.fields import FieldTolerance, toleranced
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.silence import why_few, why_silent, why_unreadable
@@ -27,6 +28,10 @@ from grader.checks.wording import code, codes, counted, value_text
 from grader.recording.model import Kind, Message, Recording
 
 _MOST_FIELDS = 8
+_ANSWER_HINT = (
+    "Publish once in each call of the callback. Look for a second publish(), and for one that "
+    "sends an answer again, such as that to the message before."
+)
 # rmw gives the largest number where it does not know a sequence number.
 _SEQUENCE_LIMIT = 2**62
 
@@ -38,6 +43,11 @@ class Count(Parameters):
     exactly: int | None = Field(None, ge=0, description="So many messages, no more, no fewer.")
     at_least: int | None = Field(None, ge=1, description="At least so many messages.")
     at_most: int | None = Field(None, ge=0, description="At most so many messages.")
+    stimulus: TopicName | None = Field(
+        None,
+        description="Topic on which the probe publishes: so many messages for each of the probe's. "
+        "What came before the first of these does not count.",
+    )
 
     @model_validator(mode="after")
     def _sensible(self) -> Count:
@@ -69,15 +79,17 @@ class Count(Parameters):
             text = f"{low} to {high} messages"
         else:
             text = f"at most {counted(high, 'message')}"
-        return f"{text} on {code(self.topic)}"
+        each = f" for each message on {code(self.stimulus)}" if self.stimulus else ""
+        return f"{text} on {code(self.topic)}{each}"
 
 
 @check("messages.count", Subject.RECORDING, Count)
 def count(recording: Recording, parameters: Count) -> Finding:
     """The right number of messages is published.
 
-    Counts the messages on the topic in the whole observation. A message that the writer
-    numbered but that was lost on its way counts as published.
+    Counts the messages on the topic in the whole observation, or since the first message of a
+    stimulus that they answer. A message that the writer numbered but that was lost on its way
+    counts as published.
 
     Explains a publisher that is silent: another topic or type, QoS that does not match, a
     process that died, a timer whose period was given in milliseconds, an executor that never
@@ -85,21 +97,31 @@ def count(recording: Recording, parameters: Count) -> Finding:
     publishers that were there.
     """
     expected = parameters.words
-    messages = recording.on(parameters.topic)
+    everything = recording.on(parameters.topic)
+    messages, each, per = everything, 1, ""
+    if parameters.stimulus is not None:
+        sent = recording.sent.get(parameters.stimulus, ())
+        if not sent:
+            return why_not_sent(recording, parameters.stimulus).finding(expected)
+        messages = tuple(item for item in everything if item.stamp_ns >= sent[0].stamp_ns)
+        each = len(sent)
+        per = f" for {counted(each, 'message')} on {code(parameters.stimulus)}"
     low, high = parameters.bounds
-    number = published(messages)
-    if number < low:
-        return why_few(recording, parameters.topic, low).finding(expected)
+    early = len(everything) - len(messages)
+    number = published(everything) - early
+    if number < low * each:
+        return why_few(recording, parameters.topic, low * each + early).finding(expected)
     moments = tuple(
         Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
         for index, message in enumerate(messages[:10], start=1)
     )
     lost = number - len(messages)
     observed = counted(number, "message") + (f" ({lost} of them lost on the way)" if lost else "")
-    if high is not None and number > high:
-        return Finding.failed(
-            expected, observed + _why_many(recording, parameters.topic), *_many_hint(high, moments)
-        )
+    observed += per
+    if high is not None and number > high * each:
+        hint = _ANSWER_HINT if per else _many_hint(high)
+        why = _why_many(recording, parameters.topic)
+        return Finding.failed(expected, observed + why, hint, Evidence(moments=moments))
     return Finding.passed(expected, observed, Evidence(moments=moments))
 
 
@@ -119,13 +141,10 @@ def _why_many(recording: Recording, topic: str) -> str:
     return ""
 
 
-def _many_hint(high: int, moments: tuple[Moment, ...]) -> tuple[str, Evidence]:
-    hint = (
-        "Publish once, in the constructor, and call no timer and no second publish."
-        if high == 1
-        else "Look for a second timer, a second publish() or a loop around it."
-    )
-    return hint, Evidence(moments=moments)
+def _many_hint(high: int) -> str:
+    if high == 1:
+        return "Publish once, in the constructor, and call no timer and no second publish."
+    return "Look for a second timer, a second publish() or a loop around it."
 
 
 class Equal(Parameters):

@@ -29,6 +29,7 @@ from tests.checks.builder import (
     output,
     reader,
     recording,
+    sent,
     silent,
     taken,
     traceback,
@@ -116,6 +117,37 @@ class TestCount:
         run = recording(endpoints=(endpoint(), endpoint(kind=Kind.SUBSCRIPTION)))
         found = failing("messages.count", run, topic="/cmd_vel", at_most=6)
         assert "may answer its own messages" in found
+
+    @pytest.mark.parametrize(
+        ("answers_s", "status"),
+        [
+            ((1.1, 1.6, 2.1), Status.PASSED),
+            # A greeting is no answer, and one that is missing is not counted here.
+            ((0.5, 1.1, 2.1), Status.PASSED),
+            ((1.1, 1.6, 1.61, 2.1), Status.FAILED),
+        ],
+    )
+    def test_one_message_for_each_of_a_stimulus(self, answers_s, status):
+        asked = sent((1.0, 1.5, 2.0))
+        finding = count(
+            recording(messages=messages(answers_s), sent=asked), stimulus="/chatter", at_most=1
+        )
+        assert finding.status is status
+        assert finding.expected.endswith("on `/cmd_vel` for each message on `/chatter`")
+        assert "for 3 messages on `/chatter`" in finding.observed
+
+    def test_the_answer_before_once_more_is_one_answer_too_many(self):
+        run = recording(
+            messages=messages((1.01, 1.51, 1.52, 2.01, 2.02)), sent=sent((1.0, 1.5, 2.0))
+        )
+        found = failing("messages.count", run, topic="/cmd_vel", stimulus="/chatter", at_most=1)
+        assert "5 messages for 3 messages on `/chatter`" in found
+        assert "such as that to the message before" in found
+
+    def test_a_stimulus_that_nothing_was_sent_of(self):
+        run = recording(sent={"/chatter": ()})
+        found = failing("messages.count", run, topic="/cmd_vel", stimulus="/chatter", at_most=1)
+        assert "subscribes to nothing" in found
 
     def test_too_few_because_it_died(self):
         run = recording(
