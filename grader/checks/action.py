@@ -120,8 +120,8 @@ def rejects(recording: Recording, parameters: Rejects) -> Finding:
     return Finding.failed(
         expected,
         f"the goal ({fields_words(taken[0].goal)}) was accepted{then}",
-        "Give the ActionServer a goal_callback that looks at the request and returns "
-        "GoalResponse.REJECT; without one every goal is accepted.",
+        "The ActionServer's goal_callback decides: it looks at the request and returns "
+        "GoalResponse.REJECT. Without one every goal is accepted.",
         evidence(recording, taken[0]),
     )
 

@@ -89,7 +89,7 @@ def _why_not_canceled(recording: Recording, goal: Goal, within_s: float) -> Caus
     if goal.cancel_accepted is False and not _answered_too_late(goal):
         return Cause(
             "the server refused to cancel the goal",
-            "Give the ActionServer a cancel_callback that returns CancelResponse.ACCEPT; without "
+            "The ActionServer's cancel_callback decides: it returns CancelResponse.ACCEPT. Without "
             "one rclpy refuses.",
             shown,
         )

@@ -36,6 +36,7 @@ _TIMER_HINT = (
     "create_timer takes the period first, a number of seconds, then the function: "
     "self.create_timer(0.5, self.timer_callback)."
 )
+_NO_INTEGER = re.compile(r"'(\w+)' object cannot be interpreted as an integer")
 # Parts of a message -> what to try. The names in them are rclpy's own, or those of Python.
 _HINTS = {
     "no running event loop": "rclpy runs coroutines itself, without asyncio, so that "
@@ -129,6 +130,12 @@ def slip_hint(failure: Failure) -> str | None:
             "The line that publishes is right, but a field that is itself a message was given a "
             f"plain value before: set what is in it, msg.field.{plain[1]} = 1.0 instead of "
             "msg.field = 1.0."
+        )
+    number = _NO_INTEGER.match(failure.message)
+    if number and raised_in.endswith("rclpy/publisher.py"):
+        return (
+            f"The line that publishes is right, but a field of integers was given a {number[1]} "
+            "before: write int(value)."
         )
     if "'property' object" in failure.message and raised_in.endswith("rclpy/executors.py"):
         return (

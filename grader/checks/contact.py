@@ -40,8 +40,8 @@ _CONTRADICTED_HINT = (
     "that publishes the speed again and again, and let one place alone decide."
 )
 _STUCK_HINT = (
-    "A loop in a callback never sees a newer scan, because the next one waits for its end: decide "
-    "once for each scan, publish once and return."
+    "A loop in a callback never sees a newer scan, nor does a time.sleep(), because the next one "
+    "waits for its end: decide once for each scan, publish once and return."
 )
 _SLOW_HINT = (
     "A time.sleep() in the callback lets scans wait in the queue, and what is decided then is from "
@@ -130,12 +130,12 @@ def why_touched(recording: Recording) -> Cause | None:
 
 
 def _stuck(recording: Recording) -> tuple[str, str] | None:
-    """A callback that never returned: words for it, and what to try."""
+    """A callback that was at work when it was interrupted: words for it, and what to try."""
     place = stuck_callback(recording)
     if place is None:
         return None
     return (
-        f"; a callback did not return, it was at {place.file}:{place.line} when it was interrupted",
+        f"; a callback was at {place.file}:{place.line} when it was interrupted",
         _STUCK_HINT,
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from grader.recording.model import LogLine, Recording
 from grader.submission.record import SourceError, SubmissionRecord
@@ -68,6 +68,8 @@ def parse_failures(lines: Sequence[str]) -> tuple[Failure, ...]:
     """
     found: list[Failure] = []
     linked = ignored = False
+    # What C code raised has no frames: the next failure, which has, is what came of it.
+    said, origin = "", ""
     index = 0
     while index < len(lines):
         line = lines[index]
@@ -75,15 +77,26 @@ def parse_failures(lines: Sequence[str]) -> tuple[Failure, ...]:
             start = index + 1 if line.strip() == _HEADER else index
             failure, index = _parse_one(lines, start, linked, ignored)
             if failure is not None:
-                found.append(failure)
+                found.append(_raised_by(failure, origin))
                 linked = ignored = False
+            said, origin = "", ""
             continue
         if line.strip() in _LINKS:
-            linked = True
+            linked, origin = True, said
         elif line.startswith(_IGNORED):
             ignored = True
+        said = line.rstrip() if line.strip() else said
         index += 1
     return tuple(found)
+
+
+def _raised_by(failure: Failure, origin: str) -> Failure:
+    """A failure with what was raised before it without frames, if there is that."""
+    raised = _RAISED.fullmatch(origin)
+    if raised is None or not raised["message"]:
+        return failure
+    short = raised["type"].rpartition(".")[2]
+    return replace(failure, type=short, message=raised["message"], linked=False)
 
 
 def _parse_one(

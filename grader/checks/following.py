@@ -195,7 +195,7 @@ def _failure(
         )
         hint = (
             f"Publish from the callback of {code(parameters.source)}, or store its newest message "
-            "there and publish that."
+            "there and publish that. A callback that sleeps lets the newer ones wait."
         )
     elif not bad:
         observed = f"the values are of different moments of {code(parameters.source)}"

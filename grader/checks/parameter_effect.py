@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import statistics
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic import Field, model_validator
@@ -33,8 +33,8 @@ from grader.checks.parameter import (
 )
 from grader.checks.parameter_calls import Setting, settings
 from grader.checks.silence import why_silent
-from grader.checks.unanswered import why_taken
-from grader.checks.value import EXACT, NoSuchField
+from grader.checks.unanswered import why_raised, why_taken
+from grader.checks.value import EXACT, Difference, NoSuchField
 from grader.checks.wording import code, counted, percent, value_text
 from grader.recording.model import NS, Message, Recording
 
@@ -163,11 +163,26 @@ def _why_no_effect(
         seen = f"{format_duration(late_s)} after it was set a message has {difference_words(wrong)}"
         return why_taken(recording, seen, set_ns, message.stamp_ns, parameters.within) or Cause(
             seen,
-            f"Read the parameter where it is used: self.get_parameter('{parameters.name}').value "
-            "in the callback, or keep the new value in add_post_set_parameters_callback().",
+            _no_effect_hint(recording, parameters, item, wrong),
             Evidence(shown.moments, tables=(difference_table("That message", wrong),)),
         )
     return _why_other_period(recording, parameters, found, shown)
+
+
+def _no_effect_hint(
+    recording: Recording, parameters: TakesEffect, item: Setting, wrong: Sequence[Difference]
+) -> str:
+    """What to try where the fields of a message are not what the new value should make of them."""
+    before = [
+        one for one in recording.on(parameters.topic) if one.stamp_ns < item.call.requested_ns
+    ]
+    if before and wrong == unlike(before[-1].value, parameters.fields, parameters.tolerance):
+        return (
+            "The message is as it was before: read "
+            f"self.get_parameter('{parameters.name}').value in the callback, or keep the new value "
+            "in add_post_set_parameters_callback()."
+        )
+    return f"Look what the node makes of {code(parameters.name)} where it publishes."
 
 
 def _too_few(
@@ -186,9 +201,15 @@ def _too_few(
     if taken_s > 0.0 and watched_s - taken_s <= due_s:
         return Cause(f"{seen}, but the machine took {format_duration(taken_s)}", ours=True,
                      disturbed=True)  # fmt: skip
+    for process in recording.processes:
+        raised = why_raised(recording, seen, process, item.call.requested_ns)
+        if raised is not None:
+            return raised
     return Cause(
         seen,
-        "A timer whose period changes has to be made anew: self.timer.cancel(), then "
+        "Publish in every call of the callback, whatever the value of the parameter is."
+        if parameters.period is None
+        else "A timer whose period changes has to be made anew: self.timer.cancel(), then "
         "self.create_timer(period, self.callback); or set self.timer.timer_period_ns.",
         _evidence(recording, item),
     )

@@ -62,7 +62,7 @@ def explain(
     if often:
         return often
     if verdict.period_good:
-        return _irregular(measured, verdict)
+        return _irregular(measured, verdict, declared)
     return _wrong_period(recording, topic, verdict, limits, declared)
 
 
@@ -229,7 +229,9 @@ def _too_fast(recording: Recording, topic: str, limits: Limits) -> Explanation:
     return Explanation("messages come too often", _ONE_TIMER)
 
 
-def _irregular(measured: tuple[Interval, ...], verdict: Verdict) -> Explanation:
+def _irregular(
+    measured: tuple[Interval, ...], verdict: Verdict, declared: list[float]
+) -> Explanation:
     ratios = [
         measured[index].seconds / verdict.median_s if verdict.median_s else 0.0
         for index in verdict.irregular
@@ -246,6 +248,12 @@ def _irregular(measured: tuple[Interval, ...], verdict: Verdict) -> Explanation:
             "messages are left out",
             "Publish in every call of the callback, without a condition, and let no callback work "
             "or sleep for longer than the period: the timer cannot call meanwhile.",
+        )
+    if declared:
+        return Explanation(
+            "",
+            "Publish in the timer's callback only, in every call, and let no callback work or "
+            "sleep for long: the timer cannot call meanwhile.",
         )
     return Explanation(
         "",

@@ -127,24 +127,24 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
     destroyed = why_unpublished(recording, topic, seen)
     if destroyed is not None:
         return destroyed
-    periods = [format_duration(timer.period_s) for timer in testimony.timers(recording)]
+    period_s = [timer.period_s for timer in testimony.timers(recording)]
+    periods = list(map(format_duration, period_s))
     unspun = why_never_spun(recording, seen, moments=moments) if periods else None
     if unspun is not None:
         return unspun
     timers = f"; the process declared a timer of {listing(periods)}" if periods else ""
     silent_s = (recording.stop_ns - messages[-1].stamp_ns) / NS
-    if periods and silent_s > _ENDED_PERIODS * max(
-        timer.period_s for timer in testimony.timers(recording)
-    ):
+    if period_s and silent_s > _ENDED_PERIODS * max(period_s):
         return Cause(
             f"{seen}, none in the last {format_duration(silent_s)}{timers}",
             ENDED_HINT,
             Evidence(moments=moments),
         )
+    slow = _SECONDS_HINT if needed * min(period_s, default=0.0) > watched_s else ENDED_HINT
     return Cause(
         seen + timers,
-        _SECONDS_HINT
-        if periods
+        slow
+        if period_s
         else "Publish from the callback of a timer, which goes on as long as the node spins.",
         Evidence(moments=moments),
     )

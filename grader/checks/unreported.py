@@ -115,6 +115,6 @@ def _incomplete(
     return Cause(
         f"{code(name)} ran only {counted(ended, 'time')} in {format_duration(watched_s)}, of "
         f"{at_least} that are needed",
-        SECONDS_HINT,
+        f"{SECONDS_HINT} A callback that works for long lets the others of its group wait.",
         evidence,
     )

@@ -489,6 +489,11 @@ class TestAlive:
                 "First the class of the messages",
             ),
             (
+                "TypeError: 'float' object cannot be interpreted as an integer",
+                "publisher.py",
+                "a field of integers was given a float before: write int(value)",
+            ),
+            (
                 "TypeError: float() argument must be a string or a real number, not 'method'",
                 "node.py",
                 "create_timer takes the period first",

@@ -172,7 +172,12 @@ class TestTakesEffect:
     def test_read_once(self):
         found = failing("parameter.takes_effect", moving(0.5), **SPEED, **self.DATA)
         assert "after it was set a message has data = 0.5 instead of 0.9" in found
-        assert "in the callback" in found
+        assert "The message is as it was before" in found
+
+    def test_another_value_than_before_was_not_read_once(self):
+        found = failing("parameter.takes_effect", moving(0.7), **SPEED, **self.DATA)
+        assert "has data = 0.7 instead of 0.9" in found
+        assert "as it was before" not in found
 
     def test_an_attempt_that_is_refused_later_changes_nothing(self):
         run = moving(0.9)
@@ -196,7 +201,8 @@ class TestTakesEffect:
 
     def test_silence_after_it(self):
         run = moving(0.9, until_s=2.0)
-        assert "0 messages in the" in failing("parameter.takes_effect", run, **SPEED, **self.DATA)
+        found = failing("parameter.takes_effect", run, **SPEED, **self.DATA)
+        assert "0 messages in the" in found and "made anew" not in found
 
     def test_late_because_of_the_machine(self):
         run = recording(

@@ -380,7 +380,12 @@ class TestMistakes:
     def test_an_irregular_stream(self):
         found = wrong([0.3, 0.21, 0.39, 0.3, 0.25, 0.42, 0.3, 0.2, 0.37])
         assert "differ from the median by more than 30 ms" in found
-        assert "Let a timer call the callback" in found
+        assert "let no callback work or sleep for long" in found
+        assert "Let a timer call" not in found
+
+    def test_an_irregular_stream_without_a_timer(self):
+        irregular = [0.3, 0.21, 0.39, 0.3, 0.25, 0.42, 0.3, 0.2, 0.37]
+        assert "Let a timer call the callback" in wrong(irregular, declarations=())
 
     def test_a_burst_at_the_start(self):
         found = wrong([0.0002, 0.0001, *[0.3] * 12])
