@@ -20,8 +20,6 @@ from grader.checks.silence import why_few
 from grader.checks.wording import code, counted
 from grader.recording.model import NS, Join, Kind, Message, Recording
 
-# The match is noted in the round after it.
-_NOTED_NS = NS // 10
 _SHOWN = 50
 _ONE_PUBLISHER_HINT = (
     "Call create_publisher once, in the constructor of the node, and not in a callback."
@@ -72,10 +70,9 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
             return _not_judged(recording, parameters, join, before.number, expected)
         return _waited(recording, parameters, join, before, expected)
     evidence = _evidence(recording, join, before.messages, history)
-    meanwhile = sum(
-        join.joined_ns < item.stamp_ns <= (join.matched_ns or join.joined_ns) + _NOTED_NS
-        for item in heard or got
-    )
+    # What is kept arrives with the match, so that what was published later is live.
+    first_ns = min((item.received_ns for item in got), default=join.joined_ns)
+    meanwhile = sum(join.joined_ns < item.stamp_ns <= first_ns for item in heard or got)
     least = max(0, parameters.last - meanwhile)
     if least <= len(history) <= parameters.last and _is_newest(history, before.messages):
         return Finding.passed(expected, _seen(history, before), evidence)

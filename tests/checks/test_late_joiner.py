@@ -33,7 +33,10 @@ def joined(kept, *, qos=LATCHED, depth=10, missed=0, **changes):
     before = [item for item in published if item.stamp_ns <= join(JOINED_S).joined_ns]
     assert len(before) == 12
     live = [item for item in published if item not in before][missed:]
+    (late,) = changes.get("joins") or (join(JOINED_S),)
     got = before[len(before) - kept :] if kept else []
+    # What is kept arrives with the match.
+    got = [replace(item, received_ns=late.matched_ns) for item in got]
     defaults = {
         "messages": {"/cmd_vel": published},
         "joins": (join(JOINED_S),),
@@ -58,6 +61,14 @@ def test_a_message_while_it_is_matched_counts_on_either_side():
     late = join(JOINED_S, matched_s=6.72)
     assert judge("qos.late_joiner", joined(9, joins=(late,)), **LAST_10).status is Status.PASSED
     assert judge("qos.late_joiner", joined(10, joins=(late,)), **LAST_10).status is Status.PASSED
+
+
+def test_a_message_right_after_the_match_counts_for_nothing_of_the_past():
+    late = join(JOINED_S, matched_s=6.69)
+    assert judge("qos.late_joiner", joined(9, joins=(late,)), **LAST_10).status is Status.ERROR
+    assert "got 9 of the 12" in failing(
+        "qos.late_joiner", joined(9, depth=9, joins=(late,)), **LAST_10
+    )
 
 
 def test_a_longer_queue():
@@ -160,8 +171,11 @@ def unheard(kept, published, **changes):
     """Nothing was subscribed to the topic until the join: so many had been published by then."""
     times = every(PERIOD_S, published + 3, first_s=JOINED_S - PERIOD_S * published + 0.3)
     sent = messages(times)["/cmd_vel"]
-    got = sent[max(published - kept, 0) :]
-    return joined(0, messages={}, joined={"late": got}, **changes)
+    got = [
+        replace(item, received_ns=max(item.received_ns, join(JOINED_S).matched_ns))
+        for item in sent[max(published - kept, 0) :]
+    ]
+    return joined(0, messages={}, joined={"late": tuple(got)}, **changes)
 
 
 def test_where_nothing_is_subscribed_before_the_messages_numbers_tell_how_many_came():
