@@ -15,7 +15,7 @@ from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import Comparison, comparisons, duration_words
 from grader.checks.finding import Evidence, Finding, Moment, Table
-from grader.checks.sighting import endpoints_seen
+from grader.checks.sighting import endpoints_seen, first_seen
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.wording import code, counted
 from grader.recording.model import Kind, Qos, Recording
@@ -280,7 +280,8 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
         return cause.finding(expected)
     declared = testimony.queues(recording, kind, parameters.topic)
     own = recording.student_endpoints(kind, parameters.topic)
-    evidence = Evidence(moments=endpoints_seen(recording, own))
+    seen = endpoints_seen(recording, own) or first_seen(recording, recording.on(parameters.topic))
+    evidence = Evidence(moments=seen)
     for queue in declared:
         if queue.history == "keep_all":
             return Finding.failed(

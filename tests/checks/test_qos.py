@@ -197,6 +197,11 @@ class TestDepth:
         assert "depth 1, declared by the process" in found
         assert "third argument of create_publisher" in found
 
+    def test_another_depth_of_a_publisher_that_was_never_seen_points_to_its_messages(self):
+        run = recording(declarations=declarations(depth=1), endpoints=())
+        finding = judge("qos.depth", run, topic="/cmd_vel", depth=10)
+        assert finding.evidence.moments[0].label == "first message on /cmd_vel"
+
     def test_the_way_to_a_depth_keeps_the_other_policies(self):
         item = declared("subscription", topic="/scan", history="keep_last", depth=5)
         latched = replace(RELIABLE, durability="transient_local")
