@@ -26,6 +26,7 @@ _SIGNALS = {
     signal.SIGILL: "illegal instruction",
     signal.SIGFPE: "arithmetic error in native code",
     signal.SIGKILL: "killed: by itself, or for too much memory",
+    signal.SIGSTOP: "stopped: it waited for SIGCONT",
     signal.SIGXCPU: "too much CPU time",
     signal.SIGXFSZ: "wrote a larger file than is allowed",
     signal.SIGSYS: "a system call that no node needs",
@@ -38,6 +39,7 @@ _SIGNAL_HINTS = {
     signal.SIGABRT: "A C++ exception or an assertion ended it: the last lines of output name it.",
     signal.SIGKILL: "Look for os.kill or os.killpg, or for a list or an image that grows without "
     "end.",
+    signal.SIGSTOP: "Look for os.kill, os.killpg and signal.raise_signal with SIGSTOP.",
     signal.SIGTERM: "Look for os.kill, os.killpg or subprocess calls that end their own group.",
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 from grader.checks.lateness import taken_s
 from grader.recording.model import NS, Recording
 
@@ -20,9 +22,22 @@ def is_doubtful(family: str, recording: Recording) -> bool:
         family: Of the check that failed: the first part of its name.
         recording: The run.
     """
+    if _was_signalled(recording):
+        return True
     if family in _CONTROL:
         return _was_out_of_hand(recording)
     return family in _ASKING and _did_not_meet(recording)
+
+
+def _was_signalled(recording: Recording) -> bool:
+    """Whether a signal ended a process that somebody else may have sent.
+
+    What a process does to itself it does again.
+    """
+    return not any(breach.ended for breach in recording.breaches) and any(
+        process.stopped_by == "itself" and process.exit_code in (-signal.SIGKILL, -signal.SIGSTOP)
+        for process in recording.processes
+    )
 
 
 def _was_out_of_hand(recording: Recording) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import tempfile
 import threading
@@ -85,6 +86,8 @@ class CellProcess:
             told = self._errors.read_text(encoding="utf-8", errors="replace")
             ended = f"the cell of scenario {order.scenario!r} ended with status "
             ended += str(self._forked.returncode)
+            if self._forked.returncode == -signal.SIGKILL:
+                ended += " (it was killed, or stopped by a signal such as SIGSTOP)"
             # Whoever is killed, perhaps because memory ran out, has no last words.
             last_words = told[-_SHOWN_ERROR:].strip()
             raise GraderFault(f"{ended}:\n{last_words}" if last_words else ended)

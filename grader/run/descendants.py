@@ -86,6 +86,15 @@ def _parent(pid: str, *, of_zombie: bool = True) -> int | None:
     return int(parent) if of_zombie or state not in (b"Z", b"X") else None
 
 
+def is_stopped(pid: int) -> bool:
+    """Whether a signal such as SIGSTOP has stopped a process, so that it waits for SIGCONT."""
+    try:
+        stat = (_PROC / str(pid) / "stat").read_bytes()
+    except OSError:
+        return False
+    return stat[stat.rindex(b")") + 2 :].startswith(b"T")
+
+
 def command_line(pid: int) -> str:
     """Command line of a process, for people: of a very long one the beginning."""
     try:

@@ -33,7 +33,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.run.descendants import kill_tree
+from grader.run.descendants import descendants, is_stopped, kill_tree
 from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
 from grader.run.readable import readable
 from grader.run.stall import Stall
@@ -52,6 +52,8 @@ _TOLD = struct.Struct("=id")
 _FORK_LIMIT_S = 10.0
 _CLOSING_LIMIT_S = 20.0
 """More than a cell may take to end what it started."""
+_STOPPED_S = 3.0
+"""Time between two looks for what was stopped, in which a cell ends what is its student's."""
 _ORPHANED_LIMIT_S = 30.0
 """More than whoever needs cells waits before it kills them itself."""
 _ALWAYS = (
@@ -167,6 +169,8 @@ class Nursery:
                 pass_fds=(theirs.fileno(),),
                 start_new_session=True,
             )
+        self._closed = threading.Event()
+        threading.Thread(target=self._end_stopped, name="stopped cells", daemon=True).start()
 
     @property
     def is_alive(self) -> bool:
@@ -248,7 +252,23 @@ class Nursery:
         except subprocess.TimeoutExpired:
             kill_tree(self._popen.pid)
             self._popen.wait()
+        self._closed.set()
         self._cells.remove()
+
+    def _end_stopped(self) -> None:
+        """Kill what a signal such as SIGSTOP has stopped: whoever waits for it would hang.
+
+        That is this process, a cell or an interpreter that imported ahead. A cell itself ends
+        student's processes that are stopped, and sooner.
+        """
+        before: frozenset[int] = frozenset()
+        while not self._closed.wait(_STOPPED_S):
+            pids = (self._popen.pid, *descendants(self._popen.pid))
+            stopped = frozenset(filter(is_stopped, pids))
+            for pid in stopped & before:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            before = stopped
 
     def _kill(self, pid: int) -> None:
         if self._sandbox is None:

@@ -8,13 +8,20 @@ import signal
 import subprocess
 import time
 import types
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from grader.recording.model import NS, Process
-from grader.run.descendants import descendants, is_init, kill_descendants, reap
+from grader.run.descendants import (
+    descendants,
+    is_init,
+    is_stopped,
+    kill_descendants,
+    kill_tree,
+    reap,
+)
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.enclosure import EnclosedProcess, Enclosure
 from grader.run.forked import ForkedProcess, NotForked
@@ -27,6 +34,10 @@ from grader.run.zygote import key_of
 
 _AFTERMATH_S = 0.5
 _STOP_TICK_S = 0.005
+_LOOK_S = 0.2
+"""Time between two looks whether a process was stopped by a signal."""
+_SUSPENDED_NS = NS // 2
+"""What was stopped for so long will not go on by itself."""
 
 
 @dataclass
@@ -39,6 +50,23 @@ class _Running:
     killed_ns: int | None = None
     stopped_by: str = "itself"
     stop_s: float | None = None
+    suspended_ns: int | None = None
+    is_ended: bool = False
+
+    def end_if_suspended(self) -> None:
+        """Kill it if a signal such as SIGSTOP stopped it some time ago: it would wait for ever."""
+        if not any(map(is_stopped, self._own_pids())):
+            self.suspended_ns = None
+        elif self.suspended_ns is None:
+            self.suspended_ns = time.time_ns()
+        elif time.time_ns() - self.suspended_ns > _SUSPENDED_NS:
+            self.is_ended = True
+            kill_tree(self.popen.pid)
+
+    def _own_pids(self) -> Iterable[int]:
+        """Its processes, as far as they are found without looking at all of the machine's."""
+        init = self.popen.init if isinstance(self.popen, EnclosedProcess) else None
+        return (self.popen.pid, *([] if init is None else (init, *descendants(init))))
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to its process group, if that is still there."""
@@ -50,7 +78,9 @@ class _Running:
 
     @property
     def exit_code(self) -> int | None:
-        """As in :mod:`subprocess`."""
+        """As in :mod:`subprocess`; of a process that was stopped, SIGSTOP ended it."""
+        if self.is_ended:
+            return -signal.SIGSTOP
         if isinstance(self.popen, EnclosedProcess):
             return self.popen.exit_code
         return self.popen.returncode
@@ -84,6 +114,7 @@ class StudentProcesses:
         self._running: list[_Running] = []
         self._pids: frozenset[int] = frozenset()
         self._survivors: tuple[str, ...] = ()
+        self._next_look_s = 0.0
 
     def launch(
         self,
@@ -187,7 +218,12 @@ class StudentProcesses:
 
     def poll(self) -> bool:
         """Note ended processes; whether any is still running."""
+        looks = time.monotonic() >= self._next_look_s
+        if looks:
+            self._next_look_s = time.monotonic() + _LOOK_S
         for process in self._running:
+            if looks and process.exited_ns is None and process.stopped_by == "itself":
+                process.end_if_suspended()
             if process.exited_ns is None and process.popen.poll() is not None:
                 process.exited_ns = time.time_ns()
                 if process.killed_ns is not None:
@@ -285,6 +321,7 @@ class StudentProcesses:
             for process in self._running
             if isinstance(process.popen, EnclosedProcess)
             and process.stopped_by == "itself"
+            and not process.is_ended
             and not process.popen.was_set_up
         )
 

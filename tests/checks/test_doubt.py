@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
 from grader.checks.doubt import is_doubtful
-from grader.recording.model import NS, Call, Disturbance, Recording, Truth
-from tests.checks.builder import LAUNCH_NS, recording, taken
+from grader.recording.model import NS, Breach, Call, Disturbance, Recording, Truth
+from tests.checks.builder import LAUNCH_NS, process, recording, taken
 
 SERVICE = "/bot_publisher/list_parameters"
 
@@ -67,3 +70,23 @@ def test_silence_on_a_busy_machine_is_doubtful(
     noise = taken(0.5, 4.4, waited_s=waited_s) if waited_s else ()
     run = recording(calls=calls, disturbance=noise)
     assert is_doubtful(family, run) is (doubtful and family != "timing")
+
+
+@pytest.mark.parametrize(
+    ("ended", "doubtful"),
+    [
+        ({"exit_code": -9}, True),
+        ({"exit_code": -19}, True),
+        ({"exit_code": -11}, False),
+        ({"exit_code": 1}, False),
+        ({"exit_code": -9, "stopped_by": "SIGKILL"}, False),
+    ],
+)
+def test_a_signal_that_anybody_may_have_sent_must_come_twice(
+    ended: dict[str, Any], doubtful: bool
+) -> None:
+    killed = recording(processes=(process(**{"exited_s": 1.2, "stopped_by": "itself", **ended}),))
+    for family in ("node", "messages", "motion"):
+        assert is_doubtful(family, killed) is doubtful
+    memory = Breach(LAUNCH_NS + NS, "memory", "1056 MiB of memory", "1024 MiB")
+    assert not is_doubtful("node", replace(killed, breaches=(memory,)))

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import itertools
+import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 import pytest
 
 from grader import ros
 from grader.checks import testimony
+from grader.checks.doubt import is_doubtful
+from grader.checks.finding import Status
+from grader.errors import GraderFault
 from grader.recording.model import NS, Ending, Kind, Owner, Recording
+from grader.run.descendants import command_line
 from grader.run.environment import cell_environment
+from tests.checks.builder import judge
 from tests.run import nodes
 from tests.run.conftest import RunNode
 
@@ -339,3 +347,47 @@ def test_a_node_that_ends_at_once_is_seen_every_time(run_node: RunNode, source: 
         assert [node.name for node in recording.student_nodes] == ["/bot_publisher"]
         assert recording.student_endpoints(Kind.PUBLISHER, "/cmd_vel")
         assert recording.ending is Ending.EXITED
+
+
+def running(marker: str) -> list[int]:
+    """Processes of this machine whose command line holds a text."""
+    found = [int(path.name) for path in Path("/proc").glob("[0-9]*")]
+    return [pid for pid in found if pid != os.getpid() and marker in command_line(pid)]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_what_a_signal_from_outside_does_to_a_node_is_recorded_at_once(
+    run_node: RunNode, tmp_path: Path, number: signal.Signals
+) -> None:
+    sent = []
+
+    def progress(_scenario: str, event: Mapping[str, Any]) -> None:
+        if event["event"] == "recording" and not sent:
+            sent.extend(running(f"{tmp_path}/0/install"))
+            for pid in sent:
+                os.kill(pid, number)
+
+    recording = run_node(
+        nodes.timed(), progress, until={"elapsed": "60 s"}, timeout="60 s", discovery="30 s"
+    )
+    (process,) = recording.processes
+    assert (recording.ending, process.exit_code) == (Ending.EXITED, -number)
+    finding = judge("node.alive", recording)
+    assert finding.status is Status.FAILED
+    assert number.name in finding.observed
+    assert is_doubtful("node", recording)
+
+
+def test_a_cell_that_is_stopped_is_a_fault_of_the_machine_within_bounds(
+    run_node: RunNode, tmp_path: Path
+) -> None:
+    def progress(_scenario: str, event: Mapping[str, Any]) -> None:
+        if event["event"] == "recording":
+            for pid in running(f"{tmp_path}/0/install"):
+                os.kill(int(Path(f"/proc/{pid}/stat").read_text().split()[3]), signal.SIGSTOP)
+
+    began_s = time.monotonic()
+    with pytest.raises(GraderFault, match="killed, or stopped by a signal such as SIGSTOP"):
+        run_node(nodes.timed(), progress, until={"elapsed": "300 s"}, timeout="300 s")
+    assert time.monotonic() - began_s < 120.0
+    assert run_node(nodes.timed()).ending is Ending.UNTIL
