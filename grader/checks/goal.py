@@ -12,12 +12,13 @@ from grader.assignment.unit import format_duration
 from grader.checks.approach import Approach, approach
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
+from grader.checks.contact import why_touched
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.immobility import why_not_moved
+from grader.checks.immobility import why_cut_short, why_not_moved
 from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
 from grader.checks.missed_goal import why_not_aligned, why_not_there
-from grader.checks.off_course import why_off_course
+from grader.checks.off_course import why_off_course, why_unsteered
 from grader.checks.reference import GoalPose
 from grader.checks.sighting import until_the_end
 from grader.checks.track import final_rest, is_at_rest, speed_plot, way_m
@@ -120,7 +121,7 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     took_s = (end.time_ns - truth[0].time_ns) / NS
     if rest is not None and took_s <= parameters.within:
         return Finding.passed(expected, f"after {format_duration(took_s)}", evidence)
-    deeper = why_off_course(recording)
+    deeper = why_cut_short(recording) or why_touched(recording)
     if deeper is not None:
         return deeper.finding(expected)
     lost_s = taken_s(recording, truth[0].time_ns, end.time_ns)
@@ -131,6 +132,9 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
             f"{seen}; the machine took up to {format_duration(lost_s)} from the run",
             disturbed=True,
         )
+    deeper = why_unsteered(recording)
+    if deeper is not None:
+        return deeper.finding(expected)
     if rest is None:
         return Finding.failed(
             expected,

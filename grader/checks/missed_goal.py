@@ -12,12 +12,14 @@ from grader.assignment.unit import format_duration
 from grader.checks.approach import NO_SPEED_M_S, Approach
 from grader.checks.blockage import stuck_callback
 from grader.checks.cause import Cause
+from grader.checks.contact import why_touched
 from grader.checks.detour import WRAP_HINT, away
 from grader.checks.finding import Evidence, Moment
+from grader.checks.immobility import why_cut_short
 from grader.checks.lateness import taken_s
 from grader.checks.measure import degrees, metres, point, speed, turn
 from grader.checks.misread_yaw import misread_yaw
-from grader.checks.off_course import why_off_course
+from grader.checks.off_course import why_off_course, why_unsteered
 from grader.checks.sighting import until_the_end
 from grader.checks.track import is_at_rest, turned_rad, turns_one_way
 from grader.recording.model import NS, Ending, Truth
@@ -59,7 +61,7 @@ def why_not_there(run: Approach, position_m: float) -> Cause | None:
     left_m = run.distance_m(last)
     if left_m <= position_m:
         return None
-    deeper = why_off_course(run.recording)
+    deeper = why_cut_short(run.recording) or why_touched(run.recording)
     if deeper is not None:
         return deeper
     nearest = min(range(len(truth)), key=lambda i: run.distance_m(truth[i]))
@@ -108,6 +110,9 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
             ours=True,
             disturbed=True,
         )
+    unsteered = why_unsteered(recording)
+    if unsteered is not None:
+        return unsteered.after(seen)
     moving = f"at {speed(last.linear_m_s)} and {turn(last.angular_rad_s)}"
     stuck = stuck_callback(recording)
     if stuck is not None:

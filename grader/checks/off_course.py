@@ -20,10 +20,10 @@ def why_off_course(recording: Recording) -> Cause | None:
 
     A process that ended, commands that are not finite, contact, or no command for long.
     """
-    return why_cut_short(recording) or why_touched(recording) or _why_unsteered(recording)
+    return why_cut_short(recording) or why_touched(recording) or why_unsteered(recording)
 
 
-def _why_unsteered(recording: Recording) -> Cause | None:
+def why_unsteered(recording: Recording) -> Cause | None:
     """The longest time without a command in which the robot moved on; None if it is short."""
     end_ns = recording.truth[-1].time_ns
     sent = commands(recording)

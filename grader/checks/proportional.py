@@ -18,6 +18,7 @@ from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.command import command_topic, commands
 from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.immobility import why_cut_short
 from grader.checks.law import Law, Sample, Verdict, examine
 from grader.checks.measure import metres
 from grader.checks.misread_yaw import misread_yaw
@@ -98,10 +99,12 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     evidence = Evidence(moments=(moment,), plots=(_plot(samples, phase),))
     if good:
         return _judge_gain(verdict, parameters, expected, evidence)
-    deeper = why_off_course(recording)
+    # One that had hardly an error to correct need not have sent a command for long.
+    idle = verdict.law is Law.NOTHING_TO_DO
+    deeper = why_cut_short(recording) if idle else why_off_course(recording)
     if deeper is not None and len(samples) < LEAST_SAMPLES:
         return deeper.finding(expected)
-    if verdict.law is Law.NOTHING_TO_DO:
+    if idle:
         return Finding.passed(
             expected,
             f"there was hardly an error to correct, and hardly a turn was commanded "

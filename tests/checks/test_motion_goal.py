@@ -528,6 +528,20 @@ class TestMistakes:
         said = failing("motion.path_length", run, goal=yaml((-0.8, 0.1, 0.0)), most="20 %")
         assert "longer" in said and "with the goal more than 45° to the side" in said
 
+    def test_one_command_for_a_straight_way_is_no_silence(self):
+        said = [None]
+
+        def law(senses):
+            if senses.odometry is None:
+                return None
+            command = (0.2 if senses.odometry.pose.x_m < 0.75 else 0.0, 0.0)
+            known, said[0] = said[0], command
+            return None if command == known else command
+
+        run = drive(law, seconds=10)
+        finding = judge("motion.proportional", run, goal=yaml((0.8, 0.0, 0.0)), phase="position")
+        assert finding.status is Status.PASSED
+
     def test_a_callback_that_sleeps_while_the_robot_turns(self):
         student, until_s = Student(GOAL), [0.0]
 
