@@ -7,7 +7,7 @@ point.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Annotated, Literal
@@ -152,24 +152,29 @@ def _below(name: str, files: Mapping[str, bytes]) -> list[str]:
     return [path for path in files if path == name or path.startswith(f"{name}/")]
 
 
-def expected_statuses(assignment: Assignment, change: Change) -> dict[str, Status]:
+def expected_statuses(
+    assignment: Assignment, change: Change, put_right: Collection[str] = ()
+) -> dict[str, Status]:
     """How each check must end for a mutant or a variant.
 
     Args:
         assignment: With valid ``requires``.
         change: What was changed.
+        put_right: Ids of checks that failed by a wrong name which the runs put right.
 
     Returns:
         By id of the check, in the author's order: ``failed`` for those that the mutant names,
-        ``skipped`` for those that require one of them, directly or not, else ``passed``.
+        ``skipped`` for those that require one of them, directly or not, else ``passed``. What
+        requires only what was put right is ``passed`` as well.
     """
     loses = change.loses if isinstance(change, Mutant) else ()
     requires = {spec.id: spec.requires for spec in assignment.checks}
     lost = {spec.id for spec in assignment.checks if spec.id in loses}
+    stopping = lost.difference(put_right)
     statuses = {}
     for check in requires:
         status = Status.FAILED if check in lost else Status.PASSED
-        statuses[check] = Status.SKIPPED if required_by(check, requires) & lost else status
+        statuses[check] = Status.SKIPPED if required_by(check, requires) & stopping else status
     return statuses
 
 

@@ -158,7 +158,8 @@ def run_trial(
     elif trial.change is None:
         outcome = verdict(dict.fromkeys(actual, Status.PASSED), actual)
     else:
-        outcome = verdict(expected_statuses(loaded.assignment, trial.change), actual)
+        put_right = [result.id for result in graded.grade.results if result.put_right]
+        outcome = verdict(expected_statuses(loaded.assignment, trial.change, put_right), actual)
     return TrialResult(
         trial=trial,
         verdict=outcome,

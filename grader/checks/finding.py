@@ -168,6 +168,8 @@ class Finding:
         evidence: Where to see it.
         disturbed: The run is worth repeating. For an error: the host took so much that the
             verdict would not be fair. For a failure: the host may have had a part in it.
+        remap: Of a failure that is a wrong name and nothing else: the rule that puts it right, such
+            as ``/cmdvel:=/cmd_vel``, so that everything else can be judged in a run with it.
     """
 
     status: Status
@@ -177,6 +179,7 @@ class Finding:
     credit: float = 0.0
     evidence: Evidence = field(default_factory=Evidence)
     disturbed: bool = False
+    remap: str = ""
 
     @classmethod
     def passed(cls, expected: str, observed: str, evidence: Evidence | None = None) -> Finding:

@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
 
 from grader.assignment.model import InterfaceName, TopicName
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.topic_absence import why_no_endpoint
+from grader.checks.finding import Evidence, Finding, Moment, Status
+from grader.checks.topic_absence import misnamed, why_no_endpoint
 from grader.checks.type_confusion import explain
 from grader.checks.wording import code, codes
 from grader.recording.model import Endpoint, Kind, Recording
 
 
-class Topic(Parameters):
-    """Parameters of topic.published and topic.subscribed."""
-
+class _Named(Parameters):
     topic: TopicName = Field(description="Fully qualified topic name.")
+    remap: bool = Field(
+        False,
+        description="Where the node has the right type on another topic that nobody asked for, run "
+        "again with that topic remapped to this one. This check fails, and what requires it is "
+        "judged all the same: a wrong name costs the points of one check.",
+    )
+
+
+class Topic(_Named):
+    """Parameters of topic.published and topic.subscribed."""
 
 
 @check("topic.published", Subject.RECORDING, Topic)
@@ -32,7 +41,7 @@ def published(recording: Recording, parameters: Topic) -> Finding:
     (`/bot_publisher/cmd_vel`), upper and lower case, a subscription where a publisher is
     expected, the right type on another topic, and a node that publishes nothing at all.
     """
-    return _presence(recording, Kind.PUBLISHER, parameters.topic)
+    return _presence(recording, Kind.PUBLISHER, parameters)
 
 
 @check("topic.subscribed", Subject.RECORDING, Topic)
@@ -43,14 +52,15 @@ def subscribed(recording: Recording, parameters: Topic) -> Finding:
 
     Explains the same mistakes as topic.published, with the ends exchanged.
     """
-    return _presence(recording, Kind.SUBSCRIPTION, parameters.topic)
+    return _presence(recording, Kind.SUBSCRIPTION, parameters)
 
 
-def _presence(recording: Recording, kind: Kind, topic: str) -> Finding:
+def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
+    topic = parameters.topic
     expected = f"a {kind.value} on {code(topic)}"
-    cause = why_no_endpoint(recording, kind, topic)
-    if cause is not None:
-        return cause.finding(expected)
+    finding = _absence(recording, kind, parameters, expected)
+    if finding is not None:
+        return finding
     endpoints = recording.student_endpoints(kind, topic)
     if not endpoints:
         return Finding.passed(expected, "messages came from one, too short-lived for the graph")
@@ -64,10 +74,34 @@ def _presence(recording: Recording, kind: Kind, topic: str) -> Finding:
     )
 
 
-class Type(Parameters):
+def _absence(
+    recording: Recording, kind: Kind, parameters: Topic | Type, expected: str
+) -> Finding | None:
+    """The finding of an endpoint that is not there, or only under another name."""
+    cause = why_no_endpoint(recording, kind, parameters.topic)
+    if cause is not None:
+        finding = cause.finding(expected)
+        remap = misnamed(recording, kind, parameters.topic) if parameters.remap else ""
+        return replace(finding, remap=remap) if finding.status is Status.FAILED else finding
+    for remap in recording.remaps:
+        found, _, name = remap.partition(":=")
+        if parameters.remap and name == parameters.topic:
+            return replace(
+                Finding.failed(
+                    expected,
+                    f"one on {code(found)} instead; everything else was judged in a run with "
+                    f"`--ros-args -r {remap}`, which puts the name right",
+                    f"Write the topic's name as '{name.lstrip('/')}'.",
+                    Evidence(moments=_moments(recording, recording.student_endpoints(kind, name))),
+                ),
+                remap=remap,
+            )
+    return None
+
+
+class Type(_Named):
     """Parameters of topic.type."""
 
-    topic: TopicName = Field(description="Fully qualified topic name.")
     type: InterfaceName = Field(description="Interface, such as geometry_msgs/msg/Twist.")
     kind: Literal["publisher", "subscription"] = Field(
         "publisher", description="Which end of the student's to judge."
@@ -86,9 +120,9 @@ def type_(recording: Recording, parameters: Type) -> Finding:
     """
     kind = Kind(parameters.kind)
     expected = f"a {kind.value} of {code(parameters.type)} on {code(parameters.topic)}"
-    cause = why_no_endpoint(recording, kind, parameters.topic)
-    if cause is not None:
-        return cause.finding(expected)
+    finding = _absence(recording, kind, parameters, expected)
+    if finding is not None:
+        return finding
     types = _types(recording, kind, parameters.topic)
     wrong = [name for name in types if name != parameters.type]
     if not wrong:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from grader.checks import testimony
@@ -17,6 +18,9 @@ from grader.recording.model import Endpoint, Kind, Owner, Recording
 
 # Every rclpy node has these by itself; they say nothing of what the student wrote.
 OWN_TOPICS = frozenset({"/rosout", "/parameter_events", "/clock"})
+
+# The name becomes an argument, and a DDS participant that is not of ROS may use any.
+_NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 _CREATE = {Kind.PUBLISHER: "create_publisher", Kind.SUBSCRIPTION: "create_subscription"}
 _DOES = {Kind.PUBLISHER: "publishes on", Kind.SUBSCRIPTION: "subscribes to"}
@@ -81,6 +85,30 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
             evidence,
         )
     return _elsewhere(recording, kind, topic, own, evidence)
+
+
+def misnamed(recording: Recording, kind: Kind, topic: str) -> str:
+    """The remapping rule for the one endpoint of the right type on a topic that nobody else has.
+
+    Args:
+        recording: A run without such an endpoint on the topic.
+        kind: Publisher or subscription.
+        topic: What it should be called.
+
+    Returns:
+        Such as ``/cmdvel:=/cmd_vel``; empty where there is no such endpoint, or more than one, or
+        where the rule has been tried.
+    """
+    others = [item for item in recording.endpoints if item.owner is not Owner.STUDENT]
+    wanted = {item.type for item in others if item.topic == topic}
+    asked_for = {item.topic for item in others} | OWN_TOPICS
+    found = {
+        item.topic
+        for item in recording.student_endpoints(kind)
+        if item.type in wanted and item.topic not in asked_for and _NAME.fullmatch(item.topic)
+    }
+    rule = f"{found.pop()}:={topic}" if len(found) == 1 else ""
+    return "" if rule in recording.remaps else rule
 
 
 def _only_students_publish(recording: Recording, topic: str) -> bool:

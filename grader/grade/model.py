@@ -47,6 +47,7 @@ class CheckResult:
         findings: One per scenario in the assignment's order, at least one in all.
         waits_for: Ids of the failed or errored checks at the bottom of a skip.
         hint: The author's own hint.
+        put_right: It failed by a wrong name that the runs put right, so nothing waits for it.
     """
 
     id: str
@@ -59,6 +60,7 @@ class CheckResult:
     findings: tuple[ScenarioFinding, ...]
     waits_for: tuple[str, ...] = ()
     hint: str = ""
+    put_right: bool = False
 
     @property
     def decisive(self) -> ScenarioFinding:
@@ -152,6 +154,16 @@ class Grade:
             [result.id for result in self.results if not result.max_points],
         )
         return self.result(first) if first is not None else None
+
+    @property
+    def remaps(self) -> frozenset[str]:
+        """Rules that put right the names that are wrong."""
+        return frozenset(
+            item.finding.remap
+            for result in self.results
+            for item in result.findings
+            if item.finding.remap
+        )
 
     def disturbed_scenarios(self, status: Status) -> tuple[str, ...]:
         """Scenarios that are worth repeating alone, because the host disturbed them.

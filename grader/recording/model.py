@@ -471,7 +471,7 @@ class Recording:
         scene: World and robot, or None in a scenario without a world.
         values: Random values of the scenario by name, in SI units.
         environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; where it
-            is known and there are any, ``other_domains`` that the student joined.
+            is known and there are any, ``other_domains`` that the student joined, and ``remaps``.
     """
 
     scenario: str
@@ -506,6 +506,11 @@ class Recording:
     scene: Scene | None = None
     values: Mapping[str, float] = field(default_factory=dict)
     environment: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def remaps(self) -> tuple[str, ...]:
+        """Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right in this run."""
+        return tuple(self.environment.get("remaps", "").split())
 
     def on(self, topic: str) -> tuple[Message, ...]:
         """Messages on a topic, oldest first."""

@@ -215,6 +215,7 @@ class Runner:
         underlays: tuple[Path, ...] = (),
         type_support: tuple[Path, ...] = (),
         alone: bool = False,
+        remaps: Sequence[str] = (),
     ) -> None:
         """Run one scenario and leave its recording.
 
@@ -229,6 +230,7 @@ class Runner:
             underlays: Install spaces of ours that the submission was built with.
             type_support: Install spaces of ours with interfaces that the probe needs.
             alone: Let no other cell of ours run meanwhile.
+            remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right.
 
         Raises:
             GraderFault: The cell failed, through no fault of the student's.
@@ -246,6 +248,7 @@ class Runner:
                     cell.folder,
                     seed,
                     worlds,
+                    remaps,
                 )
                 if order.enclosure is not None and order.enclosure.may_fork:
                     self._expect(order, order.enclosure.calls["seccomp"])
@@ -344,6 +347,7 @@ class Runner:
         folder: Path,
         seed: int,
         worlds: Path,
+        remaps: Sequence[str],
     ) -> CellOrder:
         from grader.assignment.drawing import draw_values
 
@@ -351,8 +355,14 @@ class Runner:
         scratch.mkdir()
         values = draw_values(scenario, seed)
         ros = replace(self.ros, underlays=underlays or self.ros.underlays)
+        names = dict(rule.split(":=") for rule in remaps)
         commands = tuple(
-            self.command(launch, assignment.packages[0].name, install, values)
+            self.command(
+                launch.model_copy(update={"remap": {**launch.remap, **names}}),
+                assignment.packages[0].name,
+                install,
+                values,
+            )
             for launch in scenario.launch
         )
         # A definition of ours comes before one of the student's.
@@ -384,6 +394,7 @@ class Runner:
                 "sandbox": "none",
                 # As many threads as rclpy's MultiThreadedExecutor takes by itself.
                 "cpus": str(cpu_count()),
+                **({"remaps": " ".join(remaps)} if remaps else {}),
             },
             type_support=tuple(map(str, type_support)),
             tells_output=self.verbose,

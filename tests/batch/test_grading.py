@@ -97,10 +97,12 @@ class ScriptedRunner(Runner):
         super().__init__(ros.RosInstallation("wheels", Path("python"), ()))
         self._outcomes: Iterator[Recording | Exception] = iter(outcomes)
         self.alone: list[bool] = []
+        self.remaps: list[object] = []
 
     def run(self, *arguments: object, alone: bool = False, **more: object) -> None:
         outcome = next(self._outcomes)
         self.alone.append(alone)
+        self.remaps.append(more["remaps"])
         if isinstance(outcome, Exception):
             raise outcome
         file = arguments[4]
@@ -149,6 +151,31 @@ def test_a_disturbed_run_is_repeated_alone(grade: Grade) -> None:
     assert graded.grade.full_points
     assert runner.alone == [False, True]
     assert graded.runs == {"run": 2}
+
+
+def test_a_wrong_name_is_put_right_in_one_more_run(tmp_path: Path) -> None:
+    asked = "with: {topic: /cmd_vel, remap: true}, points: 1"
+    folder = tmp_path / "lesson"
+    folder.mkdir()
+    (folder / "assignment.yaml").write_text(
+        f"{YAML}  - {{id: topic, uses: topic.published, {asked}}}\n", encoding="utf-8"
+    )
+    right = recording()
+    probe = dataclasses.replace(
+        right.endpoints[0], kind=Kind.SUBSCRIPTION, owner=Owner.PROBE, node="/probe", gid="02"
+    )
+    wrong = dataclasses.replace(right.endpoints[0], topic="/cmdvel")
+    rule = "/cmdvel:=/cmd_vel"
+    runner = ScriptedRunner(
+        dataclasses.replace(right, endpoints=(wrong, probe)),
+        dataclasses.replace(right, environment={"remaps": rule}),
+    )
+    grading = Grading(load_assignment(folder), runner, tmp_path / "cache")
+    prepared = Prepared(record=SUBMISSION, install=tmp_path / "install")
+    graded = grading.grade_prepared(prepared, tmp_path / "recordings")
+    assert runner.remaps == [[], [rule]]
+    assert graded.grade.result("topic").put_right
+    assert graded.grade.score == 2.0
 
 
 def test_a_failure_of_a_robot_that_the_host_held_up_counts_if_it_happens_again(

@@ -37,6 +37,42 @@ def with_endpoints(*endpoints, **changes):
     )
 
 
+class TestRemap:
+    """A wrong name costs the points of one check."""
+
+    def rule(self, *endpoints, **changes):
+        run = with_endpoints(*endpoints, **changes)
+        return judge("topic.published", run, topic="/cmd_vel", remap=True).remap
+
+    def test_the_one_topic_of_the_right_type_is_taken_for_the_one_that_was_meant(self):
+        assert self.rule(endpoint("/cmdvel")) == "/cmdvel:=/cmd_vel"
+        assert self.rule(endpoint("/speed")) == "/speed:=/cmd_vel"
+
+    def test_nothing_is_guessed(self):
+        assert not self.rule()
+        assert not self.rule(endpoint("/cmdvel", type="geometry_msgs/msg/Vector3"))
+        assert not self.rule(endpoint("/cmdvel"), endpoint("/speed"))
+        assert not self.rule(endpoint("/cmdvel"), reader("/cmdvel"))
+
+    def test_a_name_that_is_none_becomes_no_argument(self):
+        assert not self.rule(endpoint("/cmd -r __node"))
+
+    def test_a_rule_that_did_not_help_is_not_tried_again(self):
+        assert not self.rule(endpoint("/cmdvel"), environment={"remaps": "/cmdvel:=/cmd_vel"})
+
+    def test_it_is_off_unless_the_author_wants_it(self):
+        run = with_endpoints(endpoint("/cmdvel"))
+        assert not judge("topic.published", run, topic="/cmd_vel").remap
+
+    @pytest.mark.parametrize("check", ["topic.published", "topic.type"])
+    def test_in_the_run_that_puts_it_right_the_name_is_still_wrong(self, check):
+        run = recording(environment={"remaps": "/cmdvel:=/cmd_vel"})
+        more = {"type": TWIST} if check == "topic.type" else {}
+        finding = judge(check, run, topic="/cmd_vel", remap=True, **more)
+        assert (finding.status, finding.remap) == (Status.FAILED, "/cmdvel:=/cmd_vel")
+        assert finding.observed.startswith("one on `/cmdvel` instead")
+
+
 class TestPublished:
     def test_a_publisher_on_the_topic_passes_though_nothing_came(self):
         assert judge("topic.published", silent(), topic="/cmd_vel").status is Status.PASSED

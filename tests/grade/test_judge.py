@@ -361,3 +361,13 @@ class TestNotRun:
             finding = grade(loaded, submission, recordings).result("node").decisive.finding
             assert finding.status is expected
             assert ("`rclcpp`" in finding.observed) == (launched == "cpp" or other is rests)
+
+
+@pytest.mark.parametrize("put_right", [True, False])
+def test_what_requires_a_name_is_judged_where_the_run_put_the_name_right(put_right):
+    rule = "/cmdvel:=/cmd_vel"
+    run = make_recording(environment={"remaps": rule} if put_right else {})
+    checks = (Told("topic", replace(FAIL, remap=rule)), Told("sent", requires=("topic",)))
+    result = judge(*checks, recordings={"listen": run})
+    assert statuses(result) == {"topic": "failed", "sent": "passed" if put_right else "skipped"}
+    assert result.remaps == {rule}
