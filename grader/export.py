@@ -15,7 +15,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutation import MUTANTS_FILE, REFERENCE_FOLDER
 from grader.assignment.selection import visible_part
 from grader.errors import UsageError
-from grader.report.files import refuse_inputs, write_whole
+from grader.report.files import refuse_inputs, refuse_part, write_whole
 
 _CHECKOUT = ("pyproject.toml", "requirements.lock", "README.md", "LICENSE")
 _PACKAGES = ("grader", "sim", "templates")
@@ -57,7 +57,7 @@ def gradescope(loaded: LoadedAssignment, out: Path) -> Path:
         **_rosgrade(loaded),
     }
     file = out / f"gradescope-{loaded.assignment.id}.zip"
-    _refuse_inside(loaded, file)
+    refuse_part(file, loaded.folder, f"the assignment in {loaded.folder}")
     write_whole(file, _zipped(members))
     return file
 
@@ -76,7 +76,7 @@ def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
     """
     _refuse_hidden(loaded, "everybody can read the files of a Classroom 50 autograder")
     folder = out / f"classroom50-{loaded.assignment.id}"
-    _refuse_inside(loaded, folder)
+    refuse_part(folder, loaded.folder, f"the assignment in {loaded.folder}")
     members = {
         "autograder.py": _template("classroom50-autograder.py", loaded),
         **_rosgrade(loaded),
@@ -128,15 +128,6 @@ def _refuse_hidden(loaded: LoadedAssignment, why: str) -> None:
         raise UsageError(
             f"the assignment {loaded.assignment.id!r} has checks that are not visible ({hidden}), "
             f"and {why}: export a copy without them, and grade with them yourself"
-        )
-
-
-def _refuse_inside(loaded: LoadedAssignment, output: Path) -> None:
-    """What is written into an assignment's folder becomes a part of the assignment."""
-    refuse_inputs([output], [loaded.folder])
-    if output.resolve().is_relative_to(loaded.folder.resolve()):
-        raise UsageError(
-            f"{output}: would be a part of the assignment in {loaded.folder}; name another folder"
         )
 
 

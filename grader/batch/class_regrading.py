@@ -109,7 +109,8 @@ def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Res
         return _not_judged(entry, before, str(error).partition("\n")[0])
     graded = regrade(loaded, found)
     changes = tuple(compare(before, graded.grade))
-    if changes or before.assignment.sha256 != loaded.sha256:
+    version = (before.assignment.sha256, before.assignment.location)
+    if changes or version != (loaded.sha256, loaded.location):
         keep_earlier(folder / RESULT_FILE)
         write_graded(graded, folder, Clock())
     return Regraded(Done(entry, ledger.result(entry.key), fresh=True), before, changes)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader import __version__
-from grader.batch.grading import RECORDINGS_FOLDER, Graded
+from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.errors import UsageError
 from grader.report.facts import Clock, RunFacts
 from grader.report.files import write_whole
@@ -96,6 +96,24 @@ def _write_student_copy(graded: Graded, file: Path, facts: RunFacts) -> None:
     # The recordings stay with whoever grades.
     facts = replace(facts, recordings={})
     write_whole(file, render_report(grade, graded.recordings, facts, graded.references))
+
+
+def refuse_foreign(folder: Path, *, keep: bool) -> None:
+    """Let no report replace recordings, or an install space, that are not of an earlier report.
+
+    Args:
+        folder: For the report.
+        keep: Whether the install space will be kept in it.
+
+    Raises:
+        UsageError: It would.
+    """
+    recordings = folder / RECORDINGS_FOLDER
+    foreign = any(recordings.glob("*.mcap")) and not (recordings / SUBMISSION_FILE).is_file()
+    install = folder / INSTALL_FOLDER
+    if foreign or (keep and install.exists() and not (folder / RESULT_FILE).is_file()):
+        other = recordings if foreign else install
+        raise UsageError(f"{other}: is not of a report, and is left as it is; name another folder")
 
 
 def keep_install(graded: Graded, folder: Path) -> Path | None:

@@ -462,22 +462,26 @@ class _Names:
                     known[prefix] = known.get(prefix, 0) + 1
         most = max(shared.values(), default=0)
         found = [prefix for prefix, count in shared.items() if count == most > 1]
+        if most <= len(stems) / 2:
+            return ""
         fitting = [prefix for prefix in found if prefix in known]
         if len(fitting) != 1 or (len(found) > 1 and known[fitting[0]] == 1):
             return ""
         return fitting[0]
 
     def exact(self, entry: _Entry) -> set[str]:
-        """Students whom one of its names names; the first name that anybody has decides."""
+        """Students whom its names name; several where two of its names contradict each other."""
+        keys: set[str] = set()
         for name in entry.names:
-            keys = {
+            found = {
                 student.key
                 for form in name_forms(name)
                 for student in self._alike.get(resemblance(form), ())
                 if written(form) in student.logins or written(form) in student.names
             }
-            if keys:
-                return keys
+            keys = keys & found or keys | found
+        if keys:
+            return keys
         stem = _stem(entry.path)
         if self.prefix and stem.startswith(self.prefix):
             return self._by_login(stem.removeprefix(self.prefix))

@@ -102,14 +102,14 @@ def find(path: Path) -> Found:
     return Found(report, recordings, files, submission, result)
 
 
-def stored_assignment(path: Path, name: str, location: str | None, command: str) -> str:
+def stored_assignment(path: Path, name: str, location: str | None, *command: str) -> str:
     """Name the assignment that something was graded with, to load it again.
 
     Args:
         path: What was graded.
         name: The assignment's id.
         location: Where it lay; None for one of rosgrade's own, or where it is not known.
-        command: Of rosgrade, for the message.
+        command: Of rosgrade, without the assignment, for the message.
 
     Raises:
         UsageError: It is not there.
@@ -122,7 +122,7 @@ def stored_assignment(path: Path, name: str, location: str | None, command: str)
     lay = f" in {location}, which is not there any more" if location else ""
     raise UsageError(
         f"{path}: was graded with the assignment {name!r}{lay}; name its folder: "
-        f"`rosgrade {command} {shlex.quote(str(path))} FOLDER`"
+        f"`{shlex.join(('rosgrade', *command))} FOLDER`"
     )
 
 

@@ -149,7 +149,8 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
 
 
 def _stored(folder: Path, result: Result) -> str:
-    return stored_assignment(folder, result.assignment.id, result.assignment.location, "report")
+    assignment = result.assignment
+    return stored_assignment(folder, assignment.id, assignment.location, "report", str(folder))
 
 
 def _changed(result: Result, grade: Grade) -> list[str]:

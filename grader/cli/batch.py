@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import time
 from collections import Counter
@@ -73,7 +72,7 @@ def batch(
     from grader.batch.crew import CrewLost, DaskCrew, LocalCrew
     from grader.batch.ledger import Ledger
     from grader.batch.worker import Order, make_grading
-    from grader.report.files import check_folder, refuse_inputs
+    from grader.report.files import check_folder, refuse_inputs, refuse_part
     from grader.run.admission import Admission
 
     at_once = _at_once(jobs)
@@ -82,7 +81,7 @@ def batch(
     refuse_inputs([out], [*assignment_places(assignment), submissions, roster])
     check_folder(out)
     loaded = load_assignment(assignment)
-    _refuse_part(out, loaded.folder, f"the assignment in {loaded.folder}")
+    refuse_part(out, loaded.folder, f"the assignment in {loaded.folder}")
     order = Order(str(loaded.folder.resolve()), loaded.sha256, seed, sandbox)
     admission = Admission(cells=at_once)
     # Before anything is read or written: without a sandbox there is no batch.
@@ -176,16 +175,13 @@ def _refuse_within(out: Path, rows: Sequence[HandedIn]) -> None:
     Raises:
         UsageError: They would.
     """
+    from grader.report.files import refuse_part
+
     around = {folder.name for folder in (out.absolute(), *out.absolute().parents)}
     for row in rows:
         # To resolve each path of a class takes long.
         if row.path is not None and (row.path.name in around or row.path.is_symlink()):
-            _refuse_part(out, row.path, f"the submission of {row.key}")
-
-
-def _refuse_part(out: Path, folder: Path, what: str) -> None:
-    if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(folder)):
-        raise UsageError(f"{out}: would be a part of {what}; name another folder")
+            refuse_part(out, row.path, f"the submission of {row.key}")
 
 
 def _refuse_more(submissions: Path, others: Sequence[str]) -> None:

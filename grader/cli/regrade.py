@@ -60,7 +60,9 @@ def _one(path: Path, assignment: str | None) -> None:
     from grader.report.terminal import print_grade
 
     found = find(path)
-    name = assignment or stored_assignment(path, found.assignment, found.location, "regrade")
+    batch = Ledger.around(found.folder) if found.result is not None else None
+    location = batch.location() if batch is not None else found.location
+    name = assignment or stored_assignment(path, found.assignment, location, "regrade", str(path))
     loaded = load_assignment(name)
     if found.result is not None:
         refuse_other(found.folder, found.result.assignment.id, loaded)
@@ -72,7 +74,6 @@ def _one(path: Path, assignment: str | None) -> None:
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
             console.print(line, markup=False)
-        batch = Ledger.around(found.folder)
         if batch is None:
             report = write_graded(graded, found.folder, clock).report
             console.print(f"Report: {report}", soft_wrap=True)
@@ -115,7 +116,9 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     rows = []
     with Ledger(path).opened() as ledger, ClassProgress(quiet) as progress:
         name, entries = ledger.read()
-        stored = assignment or stored_assignment(path, name, ledger.location(), "regrade")
+        stored = assignment or stored_assignment(
+            path, name, ledger.location(), "regrade", str(path)
+        )
         loaded = load_assignment(stored)
         console.print(f"Assignment: {loaded.file}", soft_wrap=True)
         progress.begin("judging", len(entries))

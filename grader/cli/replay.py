@@ -34,6 +34,7 @@ def replay(
 
     from grader import ros
     from grader.assignment.load import load_assignment
+    from grader.batch.regrading import find, stored_assignment
     from grader.batch.type_support import TypeSupport
     from grader.errors import UsageError
     from grader.grade.unrun import why_not_run
@@ -43,10 +44,11 @@ def replay(
     from grader.submission.prepare import prepare
 
     recorded = read_recording(recording)
-    name = assignment or recorded.environment.get("assignment")
-    if name is None:
-        raise UsageError(f"{recording}: it does not say for which assignment; name it")
-    loaded = load_assignment(name)
+    found = find(recording)
+    words = ("replay", str(recording), str(submission))
+    loaded = load_assignment(
+        assignment or stored_assignment(recording, found.assignment, found.location, *words)
+    )
     check_path(submission)
     progress = GradingProgress(quiet)
     installation = ros.find()

@@ -50,9 +50,11 @@ def selftest(
     """
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
+    from grader.assignment.mutation import reference_of
     from grader.batch.grading import Grading
     from grader.batch.selftest import Role, Trial, mutation_score, trials
     from grader.batch.selftest import selftest as run_selftest
+    from grader.report.files import refuse_part
     from grader.run.load import cpu_count
     from grader.run.runner import Runner
 
@@ -64,6 +66,10 @@ def selftest(
     chosen = chosen_sandbox(sandbox, Progress(quiet))
     for name in assignments or list_assignments():
         loaded = load_assignment(name)
+        if keep is not None:
+            refuse_part(keep, loaded.folder, f"the assignment in {loaded.folder}")
+            reference = reference_of(loaded.assignment.id, loaded.folder)
+            refuse_part(keep, reference, f"the reference solution in {reference}")
         results: list[TrialResult] = []
         kept: list[str] = []
         wanted = sum(chosen_trial(trial) for trial in trials(loaded))

@@ -71,6 +71,7 @@ def watch(
     from grader import ros
     from grader.assignment.load import load_assignment, refuse_swapped
     from grader.assignment.selection import select, visible_part
+    from grader.batch.files import refuse_foreign
     from grader.cli.browser import open_page
     from grader.cli.page import ReportPage
     from grader.errors import UsageError
@@ -89,6 +90,7 @@ def watch(
     loaded = load()
     check_path(submission)
     check_folder(report)
+    refuse_foreign(report, keep=False)
     progress = GradingProgress(quiet, verbose)
     runner = Runner(
         ros.find(),

@@ -35,10 +35,15 @@ def write_whole(file: Path, content: str | bytes) -> None:
         GraderFault: The disk is full or broken.
     """
     data = content.encode() if isinstance(content, str) else content
+    # Such as /dev/null or /dev/stdout, which must stay what they are.
+    special = file.exists() and not (file.is_file() or file.is_dir())
     draft = file.with_name(f".{file.name}.{secrets.token_hex(4)}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         try:
+            if special:
+                file.write_bytes(data)
+                return
             # "x" and not mkstemp: the file gets the permissions that the user's umask gives.
             with draft.open("xb") as stream:
                 stream.write(data)
@@ -75,6 +80,21 @@ def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None])
         if any(_is_same(output, other) for other in written):
             raise UsageError(f"{output}: is named for two outputs")
         written.append(output)
+
+
+def refuse_part(output: Path, folder: Path, what: str) -> None:
+    """See that nothing is written into a folder that is read as a whole: it would be a part of it.
+
+    Args:
+        output: File or folder that is written.
+        folder: What is read.
+        what: What that is, for the message.
+
+    Raises:
+        UsageError: It would.
+    """
+    if Path(os.path.realpath(output)).is_relative_to(os.path.realpath(folder)):
+        raise UsageError(f"{output}: would be a part of {what}; name another folder")
 
 
 def _is_same(one: Path, other: Path) -> bool:

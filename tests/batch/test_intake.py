@@ -288,6 +288,38 @@ def test_nobody_is_given_by_a_guess_what_may_be_somebody_else_s(
         assert name in rows["ada"].problem and "may be theirs" in rows["ada"].problem
 
 
+def test_what_the_names_of_one_submission_contradict_is_given_to_nobody(
+    course: Path, staging: Path
+) -> None:
+    archive(course / "lopezana_34_1_ws.zip")
+    archive(course / "ngwei_35_2_ws.zip")
+    students = (
+        Student(2, id="34", name="Ng, Wei"),
+        Student(3, id="12", name="Lopez, Ana"),
+        Student(4, id="35", name="Ng, Wei"),
+    )
+    rows = {row.key: row for row in take_in(course, staging, Roster(students))}
+    assert rows["lopezana_34"].problem == "may be 12 or 34"
+    # Of two with one name the number decides.
+    assert rows["35"].path is not None and not rows["35"].problem
+
+
+@pytest.mark.parametrize("others", [0, 3])
+def test_a_few_names_with_the_same_beginning_are_no_repositories(
+    course: Path, staging: Path, others: int
+) -> None:
+    for name in ("smith-ada", "smith-bob", *(f"student{number}" for number in range(others))):
+        folder(course / name)
+    rows = {
+        row.key: row
+        for row in take_in(
+            course, staging, Roster((Student(2, login="ada"), Student(3, login="bob")))
+        )
+    }
+    # Half of a class and more: that is how GitHub Classroom names them.
+    assert (rows["ada"].path is None) == (others == 3)
+
+
 def test_a_name_is_the_same_however_its_accents_are_encoded(course: Path, staging: Path) -> None:
     folder(course / unicodedata.normalize("NFD", "Núñez, Ana"))
     folder(course / "muller")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import shutil
 from pathlib import Path
@@ -16,10 +17,12 @@ from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.batch.ledger import Entry, Ledger
 from grader.grade import grade
 from grader.recording.fact import to_json
+from grader.recording.mcap_writer import write_recording
 from grader.report.facts import Clock
 from grader.submission.prepare import Prepared
 from grader.submission.record import SubmissionRecord
-from tests.cli.conftest import Rosgrade
+from tests.batch.test_grading import recording
+from tests.cli.conftest import ROOT, Rosgrade
 
 YAML = """\
 rosgrade: 1
@@ -131,6 +134,7 @@ def test_an_assignment_that_is_not_where_it_was_is_asked_for(
         assert f"name its folder: `rosgrade {command} {path} FOLDER`" in ended.stderr or (
             path == out and "FOLDER`" in ended.stderr
         )
+    for path in (out / "submissions" / "ana", out):
         assert rosgrade(command, path, moved).returncode in (0, 1)
 
 
@@ -203,6 +207,7 @@ def test_no_other_command_overwrites_what_it_reads(
         ("check", lesson, folder, "--gradescope", "a.json", "--markdown", "./a.json"),
         ("check", lesson, folder, "--gradescope", "m", "--gradescope-metadata", "m"),
         ("watch", lesson, folder, "--report", folder),
+        ("selftest", "qos", "--keep", ROOT / "reference" / "qos" / "kept"),
         ("batch", lesson, folder.parent, "--out", folder.parent),
         ("batch", lesson, folder.parent, "--out", folder / "results"),
         ("batch", lesson, folder.parent, "--out", lesson / "results"),
@@ -220,3 +225,36 @@ def test_no_other_command_overwrites_what_it_reads(
         ), (arguments, ended.stderr)
     assert {file: file.read_bytes() for file in before} == before
     assert [item.name for item in folder.iterdir()] == ["package.xml"]
+
+
+@pytest.mark.parametrize(
+    ("kept", "options"), [("recordings/my.mcap", ()), ("install/a", ("--keep",))]
+)
+def test_a_report_replaces_no_recordings_or_install_space_of_others(
+    rosgrade: Rosgrade, tmp_path: Path, lesson: Path, kept: str, options: tuple[str, ...]
+) -> None:
+    mine = tmp_path / "mine" / kept
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine")
+    (tmp_path / "work").mkdir()
+    arguments = ("check", lesson, tmp_path / "work", "--report", tmp_path / "mine", *options)
+    ended = rosgrade(*arguments, "--sandbox", "none")
+    assert ended.returncode == 2
+    assert "is not of a report, and is left as it is" in ended.stderr
+    assert mine.read_text() == "mine"
+
+
+def test_one_recording_is_judged_and_replayed_with_the_assignment_it_was_made_for(
+    rosgrade: Rosgrade, tmp_path: Path
+) -> None:
+    file = tmp_path / "run.mcap"
+    made = dataclasses.replace(recording(), environment={"assignment": "my_lesson"})
+    write_recording(file, made, (), {})
+    for command, more in (("regrade", ()), ("replay", (tmp_path,))):
+        ended = rosgrade(command, file, *more)
+        assert ended.returncode == 2
+        words = " ".join(map(str, (command, file, *more)))
+        assert (
+            f"{file}: was graded with the assignment 'my_lesson'; name its folder: " in ended.stderr
+        )
+        assert f"`rosgrade {words} FOLDER`" in ended.stderr

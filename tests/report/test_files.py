@@ -102,6 +102,16 @@ def test_an_output_of_an_earlier_run_is_replaced_also_within_a_submission(tmp_pa
     refuse_inputs([output], [tmp_path])
 
 
+def test_a_device_stays_a_device(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_whole(pipe, "result")
+    assert os.read(reader, 10) == b"result"
+    os.close(reader)
+    assert pipe.is_fifo()
+
+
 def test_two_outputs_do_not_take_each_other_s_place(tmp_path):
     with pytest.raises(UsageError, match="is named for two outputs"):
         refuse_inputs([tmp_path / "a", tmp_path / "b" / ".." / "a"], [])
