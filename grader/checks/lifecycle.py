@@ -81,7 +81,9 @@ def state(recording: Recording, parameters: State) -> Finding:
         expected,
         f"{observed}, after the transition {refused} failed" if refused else observed,
         "The callback of a transition (on_configure, on_activate, ...) must return "
-        "TransitionCallbackReturn.SUCCESS, and call super() where it activates publishers.",
+        "TransitionCallbackReturn.SUCCESS, and call super() where it activates publishers."
+        if refused
+        else "Does the node begin unconfigured, and change no state by itself?",
         shown,
     )
 

@@ -191,7 +191,8 @@ def _why_no_executable(package: PackageRecord, name: str) -> Cause | None:
     if name in scripts:
         return Cause(
             f"setup.py defines {code(name)}, but the build did not install it",
-            "Run `colcon build` again from a clean workspace (without build/ and install/).",
+            "setup() must be given it in entry_points={'console_scripts': [...]}, and setup.cfg "
+            f"the folder: install_scripts=$base/lib/{package.name}.",
             setup,
         )
     match = nearest(name, scripts)

@@ -67,7 +67,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     return Finding.failed(
         expected,
         f"{counted(len(messages), 'message was', 'messages were')} published, but the process "
-        f"declared no timer{rate}: a thread or a loop calls publish()",
+        f"declared no timer{rate}: something else calls publish(), such as a thread or a loop",
         _HINT,
         Evidence(moments=first_seen(recording, messages)),
     )

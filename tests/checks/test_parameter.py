@@ -242,6 +242,12 @@ class TestLifecycle:
         found = failing("lifecycle.state", run, **self.WANTED)
         assert "at the call 2 of get_state it is unconfigured" in found
         assert "after the transition configure failed" in found
+        assert "TransitionCallbackReturn.SUCCESS" in found
+
+    def test_no_callback_is_blamed_where_no_transition_failed(self):
+        run = states("inactive", "inactive")
+        found = failing("lifecycle.state", run, **self.WANTED)
+        assert "it is inactive" in found and "TransitionCallbackReturn" not in found
 
     def test_a_plain_node(self):
         run = states("unconfigured", services=())
