@@ -48,6 +48,8 @@ _BREACH_HINTS = {
     "cpu time": "Look for a loop without a pause: a node waits in rclpy.spin() and costs nothing "
     "while nothing happens.",
     "open files": "Look for files, sockets or processes that a loop opens and nothing closes.",
+    "descriptors in flight": "Receive at once what socket.send_fds() or multiprocessing sends.",
+    "escaped processes": "Write to no process but your own.",
     "sessions": "Look for a loop that starts processes with start_new_session=True or setsid.",
     "output": "Look for a print() or a log call in a loop that nothing slows down.",
     "forbidden call": "Look for os.kill(os.getppid(), ...), and for whatever else is aimed at the "

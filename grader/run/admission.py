@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from grader.run.load import Load, cpu_count
+from grader.sandbox.limits import raise_open_files
 
 _CELLS_PER_CPU = 24
 """At 16, one second of the first five of a class passed with both CPUs half idle."""
@@ -143,15 +144,9 @@ class Ticket:
 
 
 def _with_descriptors(cells: int) -> int:
-    """Get descriptors for so many cells; how many cells there are enough for.
-
-    Most shells allow 1024, and up to some larger number whoever asks: see getrlimit(2).
-    """
+    """Get descriptors for so many cells; how many cells there are enough for."""
     wanted = _FILES_PER_CELL * cells + _OTHER_FILES
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    soft = raise_open_files(wanted)
     if soft == resource.RLIM_INFINITY or soft >= wanted:
         return cells
     return max(1, (soft - _OTHER_FILES) // _FILES_PER_CELL)

@@ -112,6 +112,7 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
         # What can be written to comes first: Python may be installed below /tmp.
         *bubblewrap.bound((*writable, *python, *binds)),
         *hide(python),
+        *bubblewrap.HIDDEN_INIT,
         *("--remount-ro", "/", "--remount-ro", "/dev"),
     ]
 

@@ -28,6 +28,8 @@ HOME = "/home/student"
 # A shell reports a signal so, and bubblewrap does as well.
 _SIGNALLED = 128
 _STATUS_BYTES = 4096
+_AROUND = 1024
+"""Processes and threads of the cell, and of the other sandboxes in it."""
 _FORMATS = (b"\x7fELF", b"#!")
 
 
@@ -106,6 +108,8 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         try:
             super().__init__(
                 [
+                    # The sandbox's own first process has limits as well.
+                    *enclosure.limits.prlimit(_AROUND),
                     *("bwrap", "--args", str(given), "--json-status-fd", str(status)),
                     *("--seccomp", str(rules), "--"),
                     *(*enclosure.limits.prlimit(), "--", *argv),

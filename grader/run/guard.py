@@ -20,11 +20,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TypeVar
 
-from grader.sandbox.seccomp import told_of
+from grader.sandbox.seccomp import MOST_COUNTED, is_counted, told_of
 
 # linux/seccomp.h
 _SET_MODE_FILTER, _NEW_LISTENER = 1, 1 << 3
 _NOTIF_RECV, _NOTIF_SEND = 0xC050_2100, 0xC018_2101
+_CONTINUE = 1
 # linux/prctl.h
 _PR_SET_NO_NEW_PRIVS = 38
 _INSTRUCTION_BYTES = 8
@@ -55,6 +56,7 @@ class Guard:
         listener = self._starter.submit(_install, program, calls["seccomp"]).result()
         self._listeners = [] if listener is None else [listener]
         self._deeds: list[str] = []
+        self._counted = 0
         self._wake_read, self._wake_write = os.pipe()
         self._thread = threading.Thread(target=self._listen, name="guard", daemon=True)
         self._thread.start()
@@ -119,7 +121,13 @@ class Guard:
         asked = bytearray(_ASKED.size)
         fcntl.ioctl(listener, _NOTIF_RECV, asked, True)
         number, _pid, _flags, call, _architecture, _place, *arguments = _ASKED.unpack(asked)
-        deed = told_of(self._names.get(call, f"system call {call}"), arguments)
+        name = self._names.get(call, f"system call {call}")
+        if is_counted(name):
+            self._counted += 1
+            if self._counted <= MOST_COUNTED:
+                fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, 0, _CONTINUE))
+                return
+        deed = told_of(name, arguments)
         if deed is not None and deed not in self._deeds:
             self._deeds.append(deed)
         fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, -errno.EPERM, 0))

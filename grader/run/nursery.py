@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import errno
 import gc
 import importlib
 import json
@@ -50,6 +51,7 @@ _REQUEST_BYTES = 65_536
 _TOLD = struct.Struct("=id")
 """Process id and 0, then exit status and CPU time in seconds."""
 _FORK_LIMIT_S = 10.0
+_IN_FLIGHT_S, _IN_FLIGHT_POLL_S = 10.0, 0.02
 _CLOSING_LIMIT_S = 20.0
 """More than a cell may take to end what it started."""
 _STOPPED_S = 3.0
@@ -207,10 +209,8 @@ class Nursery:
         }
         self.give(folder)
         try:
-            socket.send_fds(
-                self._socket,
-                [json.dumps(request).encode()],
-                [in_read, out_write, errors.fileno(), status_write],
+            self._send(
+                json.dumps(request).encode(), [in_read, out_write, errors.fileno(), status_write]
             )
         except OSError as error:
             for descriptor in (in_write, out_read, status_read):
@@ -234,6 +234,18 @@ class Nursery:
         # Whoever starts the next cell finds out whether it has ended.
         with contextlib.suppress(OSError):
             self._socket.send(json.dumps(asked).encode())
+
+    def _send(self, request: bytes, descriptors: list[int]) -> None:
+        deadline = time.monotonic() + _IN_FLIGHT_S
+        while True:
+            try:
+                socket.send_fds(self._socket, [request], descriptors)
+                return
+            except OSError as error:
+                # Some submission has too many on their way, and is ended for it.
+                if error.errno != errno.ETOOMANYREFS or time.monotonic() > deadline:
+                    raise
+            time.sleep(_IN_FLIGHT_POLL_S)
 
     def give(self, folder: Path) -> None:
         """Let a cell read and write all that is in its folder."""

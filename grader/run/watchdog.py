@@ -19,6 +19,7 @@ from grader.sandbox.limits import MIB, Limits, size_words
 from grader.sandbox.namespaces import STUDENT
 from grader.sandbox.usage import (
     CpuAccount,
+    files_in_flight,
     hidden_bytes,
     memory_bytes,
     open_files,
@@ -34,6 +35,8 @@ _OWN_BYTES = 2048 * MIB
 _FULL = 0.99
 # Some for subprocesses of good manners; every session gets a share of the CPU of its own.
 _MOST_SESSIONS = 16
+_MOST_IN_FLIGHT = 64
+_JUST_ENDED = 8
 
 
 class Watchdog:
@@ -83,10 +86,15 @@ class Watchdog:
 
     def _look(self) -> None:
         limits = self._limits
-        usages = usage_of(self._inits())
+        inits = self._inits()
+        usages = usage_of(inits)
         if self._looks % _LOOKS_PER_SEARCH == 0:
             room = limits.memory_bytes - memory_bytes(usages, limits.memory_bytes)
             self._hidden_bytes = hidden_bytes(usages, room)
+            if files_in_flight(usages) > _MOST_IN_FLIGHT:
+                words = f"more than {_MOST_IN_FLIGHT} descriptors on their way between processes"
+                self._note("descriptors in flight", words, str(_MOST_IN_FLIGHT))
+                self._end_all()
         self._looks += 1
         taken = memory_bytes(usages, limits.memory_bytes, self._hidden_bytes)
         if taken > limits.memory_bytes:
@@ -104,6 +112,11 @@ class Watchdog:
         # The last ones that it may start count as too many: no more can be seen.
         if threads >= limits.processes:
             self._note("processes", f"{threads} processes and threads", str(limits.processes))
+        if threads > limits.processes * len(inits) + _JUST_ENDED:
+            # More than the kernel lets them start: one of them has got around it.
+            words = f"{threads} processes and threads"
+            self._note("escaped processes", words, str(limits.processes))
+            self._end_all()
         files = open_files(usages)
         if files > limits.open_files:
             self._note("open files", f"{files} open files", str(limits.open_files))

@@ -36,6 +36,8 @@ done
 shift
 exec "$@"
 """
+HIDDEN_INIT = ("--tmpfs", "/proc/1", "--remount-ro", "/proc/1")
+"""Nothing inside reaches the memory of the sandbox's first process, which is bubblewrap's own."""
 _NAMESPACES = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts")
 _SYSTEM_FOLDERS = ("bin", "sbin", "lib", "lib32", "lib64", "libx32")
 _LINKS = "/etc/alternatives"

@@ -8,6 +8,11 @@ from dataclasses import dataclass
 from grader.errors import GraderFault
 
 MIB = 2**20
+OPEN_FILES = 1024
+_OWN_SHARE = 4
+"""What is on its way between processes (SCM_RIGHTS, unix(7)) counts for all that a user runs, and
+who may have more open may send more: a submission must not use up what the grader needs."""
+_SIGNALS = 1024
 _CPU_GRACE_S = 10
 """Whoever counts all processes together comes first, and can say what happened."""
 
@@ -19,6 +24,7 @@ _OPTIONS = {
     "nofile": resource.RLIMIT_NOFILE,
     "fsize": resource.RLIMIT_FSIZE,
     "cpu": resource.RLIMIT_CPU,
+    "sigpending": resource.RLIMIT_SIGPENDING,
     "core": resource.RLIMIT_CORE,
 }
 """Of prlimit(1)."""
@@ -37,7 +43,7 @@ class Limits:
         files: Number of files and folders there.
         shared_bytes: Of /dev/shm.
         open_files: Of all processes together, sockets and the like among them; the kernel holds
-            each process to it.
+            each process to it, or to a quarter of what we may have open.
         address_bytes: Address space of one process. Reserving takes nothing from anybody, and
             every thread reserves some, so this is far more than the memory.
         output_bytes: A process that writes more than this is ended.
@@ -50,7 +56,7 @@ class Limits:
     disk_bytes: int = 64 * MIB
     files: int = 20_000
     shared_bytes: int = 16 * MIB
-    open_files: int = 1024
+    open_files: int = OPEN_FILES
     address_bytes: int = 4096 * MIB
     output_bytes: int = 2048 * MIB
 
@@ -78,24 +84,47 @@ class Limits:
 
     def rlimits(self) -> dict[int, int]:
         """What :meth:`prlimit` sets: resource -> bound, soft and hard."""
+        own_files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
         return {
             resource.RLIMIT_AS: self.address_bytes,
             resource.RLIMIT_DATA: self.memory_bytes,
             resource.RLIMIT_NPROC: self.processes,
-            resource.RLIMIT_NOFILE: self.open_files,
+            resource.RLIMIT_NOFILE: min(self.open_files, _share(own_files)),
             resource.RLIMIT_FSIZE: self.file_bytes,
             resource.RLIMIT_CPU: self.cpu_s + _CPU_GRACE_S,
+            resource.RLIMIT_SIGPENDING: _SIGNALS,
             resource.RLIMIT_CORE: 0,
         }
 
-    def prlimit(self) -> list[str]:
+    def prlimit(self, more_processes: int = 0) -> list[str]:
         """The command in front of what is to be bounded.
 
         The number of processes counts per user and user namespace where it is set inside, and
         over everything of the user where it is set outside.
+
+        Args:
+            more_processes: So many more, of those around a sandbox.
         """
         bounds = self.rlimits()
+        bounds[resource.RLIMIT_NPROC] += more_processes
         return ["prlimit", *(f"--{name}={bounds[what]}" for name, what in _OPTIONS.items())]
+
+
+def _share(own_files: int) -> int:
+    return OPEN_FILES if own_files == resource.RLIM_INFINITY else own_files // _OWN_SHARE
+
+
+def raise_open_files(wanted: int = _OWN_SHARE * OPEN_FILES) -> int:
+    """Get so many open files for this process and those that it starts; how many there are.
+
+    Most shells allow 1024, and up to some larger number whoever asks: see getrlimit(2).
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = max(wanted, _OWN_SHARE * OPEN_FILES)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    return soft
 
 
 BUILD_OUTPUT_BYTES = 64 * MIB

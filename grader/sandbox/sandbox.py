@@ -260,7 +260,7 @@ class BuildRoom:
             "--tmpfs",
             "/tmp",
         ]
-        last = [*hidden, "--remount-ro", "/", "--remount-ro", "/dev"]
+        last = [*hidden, *bubblewrap.HIDDEN_INIT, "--remount-ro", "/", "--remount-ro", "/dev"]
         last += ["--chdir", str(self.folders[0]), *bubblewrap.variables(environment)]
         inner = [*self.limits.prlimit(), "--", *command]
         return bubblewrap.launch(arguments, binds, last, inner, self.sandbox.build_filter_file)

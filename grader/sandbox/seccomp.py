@@ -23,9 +23,14 @@ _SIGNALLING = {
 """Calls that send a signal to the process of their first argument, and where the signal is."""
 _UNHEARD_OF = (
     *("setns", "open_by_handle_at", "bpf", "reboot", "swapon", "swapoff"),
+    # Of asynchronous I/O the whole machine has a certain amount.
+    "io_setup",
     *("init_module", "finit_module", "delete_module", "kexec_load", "kexec_file_load"),
 )
 """Calls that no node and no library of one has a use for."""
+_COUNTED = ("inotify_init", "inotify_init1")
+"""Calls that make something of which all that a user runs has a certain number together."""
+MOST_COUNTED = 8
 _LEADER = 2
 """What a sandbox is started with; of a build that is colcon."""
 INIT = 1
@@ -62,6 +67,8 @@ _NAMESPACES = (0x20000, 0x2000000, 0x4000000, 0x8000000, 0x10000000, 0x20000000,
 _TIOCSTI, _TIOCLINUX = 0x5412, 0x541C
 # F_SETOWN and F_SETOWN_EX; FIOSETOWN and SIOCSPGRP: asm-generic/fcntl.h, sockios.h
 _OWNERS, _OWNING = (8, 15), (0x8901, 0x8902)
+# linux/fcntl.h: a user has a certain number of pages in pipes.
+_F_SETPIPE_SZ = 1031
 _INT = 0xFFFFFFFF
 # AF_UNIX, AF_INET, AF_INET6, AF_NETLINK (getifaddrs): linux/socket.h
 _FAMILIES = (1, 2, 10, 16)
@@ -85,7 +92,7 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
 
     rules = seccomp.SyscallFilter(seccomp.ALLOW)
     refuse = seccomp.ERRNO(errno.EPERM)
-    for name in (*_REFUSED, *([] if guarded else [*_AIMED, *_UNHEARD_OF])):
+    for name in (*_REFUSED, *([] if guarded else [*_AIMED, *_UNHEARD_OF, *_COUNTED])):
         _add(rules, refuse, name)
     for name in (*_PRETENDED, *(["setsid"] if one_session else [])):
         _add(rules, seccomp.ERRNO(0), name)
@@ -99,7 +106,7 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
             _add(rules, refuse, name, at_leader)
     # The limits of another process, and signals by way of a file that is ready.
     _add(rules, refuse, "prlimit64", seccomp.Arg(0, seccomp.NE, 0))
-    for command in _OWNERS:
+    for command in (*_OWNERS, _F_SETPIPE_SZ):
         _add(rules, refuse, "fcntl", seccomp.Arg(1, seccomp.MASKED_EQ, _INT, command))
     for request in (_TIOCSTI, _TIOCLINUX, *_OWNING):
         _add(rules, refuse, "ioctl", seccomp.Arg(1, seccomp.MASKED_EQ, _INT, request))
@@ -131,7 +138,7 @@ def guard_filter() -> bytes:
     import pyseccomp as seccomp
 
     rules = seccomp.SyscallFilter(seccomp.ALLOW)
-    for name in (*_AIMED, *_UNHEARD_OF):
+    for name in (*_AIMED, *_UNHEARD_OF, *_COUNTED):
         _add(rules, seccomp.NOTIFY, name)
     at_init = seccomp.Arg(0, seccomp.MASKED_EQ, _INT, INIT)
     for name, place in _SIGNALLING.items():
@@ -145,8 +152,13 @@ def guarded_calls() -> dict[str, int]:
     """The numbers of the calls that :func:`guard_filter` tells of, and of ``seccomp`` itself."""
     from pyseccomp import resolve_syscall, system_arch
 
-    names = (*_AIMED, *_UNHEARD_OF, *_SIGNALLING, "pidfd_open", "seccomp")
+    names = (*_AIMED, *_UNHEARD_OF, *_COUNTED, *_SIGNALLING, "pidfd_open", "seccomp")
     return {name: resolve_syscall(system_arch(), name) for name in names}
+
+
+def is_counted(name: str) -> bool:
+    """Whether a call is allowed :data:`MOST_COUNTED` times."""
+    return name in _COUNTED
 
 
 def told_of(name: str, arguments: Sequence[int]) -> str | None:
@@ -158,6 +170,8 @@ def told_of(name: str, arguments: Sequence[int]) -> str | None:
     """
     if name in _UNHEARD_OF:
         return f"called `{name}`"
+    if name in _COUNTED:
+        return f"called `{name}` more than {MOST_COUNTED} times"
     if arguments[_AIMED.get(name, 0)] & _INT != INIT:
         # A debugger or a sanitizer looks at the student's own processes.
         return None

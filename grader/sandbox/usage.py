@@ -129,6 +129,11 @@ def open_files(usages: Iterable[Usage]) -> int:
     return sum(_open_files(usage.pid) for usage in usages)
 
 
+def files_in_flight(usages: Iterable[Usage]) -> int:
+    """How many descriptors wait in sockets of processes: SCM_RIGHTS, see unix(7)."""
+    return sum(_in_flight(usage.pid) for usage in usages)
+
+
 def folder_usage(folders: Iterable[Path], most_bytes: int, most_files: int) -> tuple[int, int]:
     """Bytes on the disk and number of files below folders; stops to count beyond the limits."""
     total = count = 0
@@ -206,6 +211,21 @@ def _open_files(pid: int) -> int:
         return _table_size(pid)
     except OSError:
         return 0
+
+
+def _in_flight(pid: int) -> int:
+    folder = f"{_PROC}/{pid}/fd"
+    found = 0
+    try:
+        for name in os.listdir(folder):  # noqa: PTH208  often
+            if os.readlink(f"{folder}/{name}").startswith("socket:"):  # noqa: PTH115  often
+                with open(f"{folder}info/{name}", "rb") as file:  # noqa: PTH123  often
+                    told = re.search(rb"^scm_fds:\s*(\d+)$", file.read(), re.MULTILINE)
+                found += int(told[1]) if told else 0
+    except OSError:
+        # It has ended, or keeps to itself what it has open.
+        return found
+    return found
 
 
 def _table_size(pid: int) -> int:

@@ -293,6 +293,27 @@ for _ in range(500):
     ear.sendto(b'not of any middleware', ear.getsockname())
 tempfile.TemporaryFile().write(bytes(2**20))
 """
+# In a socket that nobody reads, again and again: they count for all that a user runs.
+IN_FLIGHT = """\
+import socket, threading, time
+def hoard():
+    kept = []
+    while True:
+        kept += socket.socketpair()
+        kept[-1].setblocking(False)
+        try:
+            while True:
+                socket.send_fds(kept[-1], [b'x'], [1] * 50)
+        except OSError:
+            time.sleep(.001)
+threading.Thread(target=hoard, daemon=True).start()
+"""
+HOARD_INOTIFY = """\
+import ctypes
+while ctypes.CDLL(None).inotify_init() >= 0:
+    pass
+time.sleep(60)
+"""
 INJECTION = """\
 print('\\x1b[2J\\x1b]0;owned\\x07<script>alert(1)</script>')
 raise RuntimeError('<script>alert(2)</script><img src=x onerror=alert(3)>\\x1b[31m=cmd|calc')
@@ -399,6 +420,23 @@ ATTACKS = {
         HIDDEN_MEMORY.format(mib=600), lost=ALIVE, named=("MiB of memory",)
     ),
     "memory_in_sockets": Attack(SOCKETS, lost=ALIVE, named=("open files, 1024 are allowed",)),
+    "hoards_descriptors_in_flight": Attack(
+        at_import=IN_FLIGHT,
+        lost=frozenset({"alive"}),
+        maybe=frozenset({"starts", "messages", "node"}),
+        named=("more than 64 descriptors on their way between processes",),
+    ),
+    "hoards_asynchronous_io": Attack(
+        CALL.format(x86_64=206, aarch64=0, arguments="65536, ctypes.byref(ctypes.c_ulong())"),
+        lost=ALIVE,
+        named=("called `io_setup`",),
+    ),
+    "hoards_inotify": Attack(
+        HOARD_INOTIFY, lost=ALIVE, named=("called `inotify_init` more than 8 times",)
+    ),
+    "writes_into_the_init": Attack(
+        "os.open('/proc/1/mem', os.O_RDWR)", lost=ALIVE, named=("FileNotFoundError",)
+    ),
     "publishes_other_bytes": Attack(
         OTHER_BYTES, lost=frozenset({"messages"}), named=("cannot be read",)
     ),

@@ -181,9 +181,9 @@ def test_the_load_counts_threads_of_the_whole_machine() -> None:
 @pytest.mark.parametrize(
     ("soft", "hard", "most", "then"),
     [
-        (1024, 1_048_576, 400, 1856),
+        (1024, 1_048_576, 400, 4096),
         (1024, 1024, 192, 1024),
-        (1024, resource.RLIM_INFINITY, 400, 1856),
+        (1024, resource.RLIM_INFINITY, 400, 4096),
         (4096, 4096, 400, 4096),
         (resource.RLIM_INFINITY, resource.RLIM_INFINITY, 400, resource.RLIM_INFINITY),
         (64, 64, 1, 64),

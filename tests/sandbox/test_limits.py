@@ -35,9 +35,10 @@ def test_an_author_s_limits_reach_the_command_in_front_of_the_program() -> None:
         "--as=4294967296",
         "--data=536870912",
         "--nproc=40",
-        "--nofile=1024",
+        f"--nofile={min(1024, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 4)}",
         "--fsize=1048576",
         "--cpu=130",
+        "--sigpending=1024",
         "--core=0",
     ]
 
