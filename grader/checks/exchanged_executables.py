@@ -13,11 +13,13 @@ from grader.submission.record import PackageRecord, SourceError
 
 def why_exchanged(recording: Recording) -> Cause | None:
     """The cause if a launched executable runs what bears the name of another one; else None."""
+    launched = {process.name for process in recording.processes}
     for process in recording.processes:
         name, _, executable = process.name.partition("/")
         package = recording.submission.package(name)
         other = package and _runs(package, executable)
-        if package and other:
+        # Where both run, each node is there, whatever started it.
+        if package and other and f"{name}/{other}" not in launched:
             target = dict(package.entry_points)[executable]
             place = SourceError(package.file("setup.py"), None, f"{executable} = {target}")
             return Cause(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.destroyed import why_destroyed
+from grader.checks.exchanged_executables import why_exchanged
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.near_name import Named, why_misnamed
 from grader.checks.node_absence import why_no_node
@@ -160,6 +161,9 @@ def why_not_offered(
             f"Make it with {_create(word, name, interface)}.",
             evidence,
         )
+    exchanged = why_exchanged(recording)
+    if exchanged is not None:
+        return exchanged.after(f"there is no {word.noun} {code(name)}")
     nodes = codes(item.name for item in recording.student_nodes)
     there_words = codes(item.name for item in there)
     return Cause(

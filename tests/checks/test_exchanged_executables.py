@@ -59,6 +59,17 @@ def test_what_runs_its_own_is_not_blamed(entries):
     assert why_exchanged(with_entries(recording(), **entries)) is None
 
 
+def test_where_both_run_neither_is_blamed():
+    both = recording(processes=(process(BOT), process("bot_publisher/bot_sub")))
+    assert why_exchanged(with_entries(both, **EXCHANGED)) is None
+
+
+def test_a_service_of_the_other_executable():
+    run = with_entries(recording(nodes=(node("/bot_sub"),), declarations=(), calls=()), **EXCHANGED)
+    said = failing("service.exists", run, service="/enable")
+    assert "the executable `bot_pub` runs `bot_publisher.bot_sub:main`" in said
+
+
 def test_one_function_for_two_executables():
     both = {"bot_pub": "bot_publisher.bot_sub:main", "bot_sub": "bot_publisher.bot_sub:main"}
     assert why_exchanged(with_entries(recording(), **both)) is not None
