@@ -95,17 +95,8 @@ def _why_not_graded(result: Result) -> str:
     return f"{why[: _LONGEST_WHY - 1]}…" if len(why) > _LONGEST_WHY else why
 
 
-def standing(ledger: Ledger) -> list[Done]:
-    """The rows of a batch as its folder has them.
-
-    Raises:
-        UsageError: It is no folder of a batch, or damaged.
-    """
-    _, entries = ledger.read()
-    return [_standing(ledger, entry) for entry in entries]
-
-
-def _standing(ledger: Ledger, entry: Entry) -> Done:
+def standing(ledger: Ledger, entry: Entry) -> Done:
+    """A row of a batch as its folder has it."""
     result = ledger.result(entry.key) if not entry.fault else None
     if result is not None and entry.sha256 in ("", result.submission.sha256):
         return Done(entry, result, fresh=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.batch.batch import Done
-from grader.batch.class_files import NO_RESULT
+from grader.batch.class_files import NO_RESULT, standing
 from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
 from grader.batch.regrading import compare, find, refuse_other, regrade
@@ -49,14 +49,18 @@ class Regraded:
         return graded and (after is None or not after.graded)
 
 
-def regrade_class(loaded: LoadedAssignment, ledger: Ledger) -> Iterator[Regraded]:
-    """Judge every row of a batch with the assignment as it is now.
+def regrade_class(
+    loaded: LoadedAssignment, ledger: Ledger, only: Path | None = None
+) -> Iterator[Regraded]:
+    """Judge the rows of a batch with the assignment as it is now.
 
     A result that changes is kept beside the new one, in ``earlier/``.
 
     Args:
         loaded: The assignment.
         ledger: The batch, opened.
+        only: Folder of a row's report: only that one is judged, and what is the same as it; or
+            None for all.
 
     Yields:
         Every row.
@@ -66,39 +70,25 @@ def regrade_class(loaded: LoadedAssignment, ledger: Ledger) -> Iterator[Regraded
     """
     name, entries = ledger.read()
     refuse_other(ledger.out, name, loaded)
+    chosen = {
+        entry.same_as or entry.key
+        for entry in entries
+        if only is None or ledger.folder(entry.key).name == only.resolve().name
+    }
     for entry in entries:
         before = ledger.result(entry.key)
         if entry.fault:
             yield Regraded(Done(entry, None, fresh=False), None, problem=entry.fault)
+        elif (entry.same_as or entry.key) not in chosen:
+            yield Regraded(standing(ledger, entry), before)
         elif before is not None and entry.sha256 in ("", before.submission.sha256):
             yield _regrade(loaded, ledger, entry, before)
         elif entry.sha256:
             yield _not_judged(entry, None, NO_RESULT)
         else:
             yield Regraded(Done(entry, None, fresh=False), None)
-    ledger.write(entries, loaded.assignment.id, loaded.sha256, loaded.location)
-
-
-def regrade_row(loaded: LoadedAssignment, ledger: Ledger, folder: Path) -> list[Regraded]:
-    """Judge one row of a batch again, and the rows that have the same submission.
-
-    Args:
-        loaded: The assignment.
-        ledger: The batch, opened.
-        folder: Of the row's report.
-
-    Returns:
-        What was judged again; nothing where the batch does not have that row any more.
-    """
-    _, entries = ledger.read()
-    named = [entry for entry in entries if ledger.folder(entry.key).name == folder.resolve().name]
-    same = {entry.same_as or entry.key for entry in named}
-    rows = [(entry, ledger.result(entry.key)) for entry in entries]
-    return [
-        _regrade(loaded, ledger, entry, before)
-        for entry, before in rows
-        if before is not None and (entry.same_as or entry.key) in same
-    ]
+    if only is None:
+        ledger.write(entries, loaded.assignment.id, loaded.sha256, loaded.location)
 
 
 def _regrade(loaded: LoadedAssignment, ledger: Ledger, entry: Entry, before: Result) -> Regraded:

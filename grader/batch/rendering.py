@@ -76,7 +76,8 @@ def read_class(out: Path) -> list[ClassRow]:
     """
     results = [read_result(folder / RESULT_FILE) for folder in find_reports(out)]
     if (out / BATCH_FILE).is_file():
-        return class_rows(standing(Ledger(out)), Ledger(out))
+        ledger = Ledger(out)
+        return class_rows([standing(ledger, entry) for entry in ledger.read()[1]], ledger)
     return class_rows([Done(Entry(one.submission.id), one, fresh=False) for one in results])
 
 

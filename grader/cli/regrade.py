@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from grader.cli.console import output_console
 from grader.cli.options import Quiet
 from grader.cli.progress import ClassProgress
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from grader.assignment.load import LoadedAssignment
+    from grader.batch.class_regrading import Regraded
+    from grader.batch.ledger import Ledger
 
 NOT_GRADED = 3
 
@@ -44,24 +51,16 @@ def regrade(
 
 def _one(path: Path, assignment: str | None) -> None:
     from grader.assignment.load import load_assignment
-    from grader.batch.class_files import GRADES_FILE, standing, write_class
-    from grader.batch.class_regrading import regrade_row
     from grader.batch.files import write_graded
-    from grader.batch.ledger import Ledger, keep_earlier
-    from grader.batch.regrading import (
-        compare,
-        find,
-        refuse_other,
-        regrade_command,
-        stored_assignment,
-    )
+    from grader.batch.ledger import Ledger
+    from grader.batch.regrading import compare, find, refuse_other, stored_assignment
     from grader.batch.regrading import regrade as judge_again
     from grader.report.facts import Clock
     from grader.report.terminal import print_grade
 
     found = find(path)
     batch = Ledger.around(found.folder) if found.result is not None else None
-    location = batch.location() if batch is not None else found.location
+    location = (batch.location() if batch is not None else None) or found.location
     name = assignment or stored_assignment(path, found.assignment, location, "regrade", str(path))
     loaded = load_assignment(name)
     if found.result is not None:
@@ -74,41 +73,50 @@ def _one(path: Path, assignment: str | None) -> None:
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
             console.print(line, markup=False)
-        if batch is None:
-            report = write_graded(graded, found.folder, clock).report
-            console.print(f"Report: {report}", soft_wrap=True)
-        else:
-            with batch.opened() as ledger:
-                rows = regrade_row(loaded, ledger, found.folder)
-                if not rows:
-                    write_graded(graded, found.folder, clock)
-                if any(row.changes for row in rows):
-                    keep_earlier(ledger.out / GRADES_FILE)
-                done = standing(ledger)
-                overview = write_class(done, ledger)
-            for row in rows:
-                console.print(f"Report: {ledger.folder(row.done.entry.key)}", soft_wrap=True)
-            console.print(f"Overview: {overview}", soft_wrap=True)
-            console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
-            others = sum(
-                item.result is not None and item.result.assignment.sha256 != loaded.sha256
-                for item in done
-            )
-            if others:
-                console.print(
-                    f"{others} of the class are still graded with another version of the "
-                    f"assignment: {regrade_command(batch.out, loaded)} judges all of them",
-                    soft_wrap=True,
-                )
+        if batch is not None:
+            _in_class(batch, loaded, found.folder)
+        report = write_graded(graded, found.folder, clock).report
+        console.print(f"Report: {report}", soft_wrap=True)
     grade = graded.grade
     raise typer.Exit(NOT_GRADED if not grade.graded else 0 if grade.full_points else 1)
 
 
+def _in_class(batch: Ledger, loaded: LoadedAssignment, folder: Path) -> None:
+    """Bring the class that a report belongs to up to date."""
+    from grader.batch.class_regrading import regrade_class
+    from grader.batch.regrading import regrade_command
+
+    console = output_console()
+    with batch.opened() as ledger:
+        rows = list(regrade_class(loaded, ledger, folder))
+        _write(ledger, rows)
+    results = [row.done.result for row in rows if row.done.result is not None]
+    others = sum(one.assignment.sha256 != loaded.sha256 for one in results)
+    if others:
+        console.print(
+            f"{others} of the class are still graded with another version of the assignment: "
+            f"{regrade_command(batch.out, loaded)} judges all of them",
+            soft_wrap=True,
+        )
+
+
+def _write(ledger: Ledger, rows: Sequence[Regraded]) -> None:
+    """Write the gradebook and the overview anew, and say where."""
+    from grader.batch.class_files import GRADES_FILE, write_class
+    from grader.batch.ledger import keep_earlier
+
+    if any(row.changes for row in rows):
+        keep_earlier(ledger.out / GRADES_FILE)
+    overview = write_class([row.done for row in rows], ledger)
+    console = output_console()
+    console.print(f"Overview: {overview}", soft_wrap=True)
+    console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
+
+
 def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     from grader.assignment.load import load_assignment
-    from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.class_regrading import regrade_class
-    from grader.batch.ledger import Ledger, keep_earlier
+    from grader.batch.ledger import Ledger
     from grader.batch.regrading import stored_assignment
 
     console = output_console()
@@ -125,9 +133,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
         for row in regrade_class(loaded, ledger):
             rows.append(row)
             progress.advance(row.done.entry.key)
-        if any(row.changes for row in rows):
-            keep_earlier(ledger.out / GRADES_FILE)
-        overview = write_class([row.done for row in rows], ledger)
+        _write(ledger, rows)
     for row in rows:
         for change in row.changes:
             console.print(f"{row.done.entry.key}: {change}", soft_wrap=True)
@@ -156,8 +162,6 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
             "run them again with `rosgrade batch ... --retry errors`",
             soft_wrap=True,
         )
-    console.print(f"Overview: {overview}", soft_wrap=True)
-    console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
     graded = all(
         not row.problem and (row.done.result is None or row.done.result.graded) for row in rows
     )

@@ -75,7 +75,7 @@ def out(tmp_path: Path, lesson: Path) -> Path:
                 write_graded(result, partial, Clock())
                 ledger.put(row.key, partial)
         ledger.write(rows, "lesson", loaded.sha256, loaded.location)
-        write_class(standing(ledger), ledger)
+        write_class([standing(ledger, row) for row in rows], ledger)
     return tmp_path / "out"
 
 

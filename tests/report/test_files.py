@@ -112,6 +112,12 @@ def test_a_device_stays_a_device(tmp_path):
     assert pipe.is_fifo()
 
 
+def test_a_report_is_replaced_whatever_somebody_has_put_in_its_place(tmp_path):
+    page = tmp_path / "rosgrade-report" / "report.html"
+    write_whole(page, "handed in")
+    refuse_inputs([page.parent, page], [tmp_path])
+
+
 def test_two_outputs_do_not_take_each_other_s_place(tmp_path):
     with pytest.raises(UsageError, match="is named for two outputs"):
         refuse_inputs([tmp_path / "a", tmp_path / "b" / ".." / "a"], [])
