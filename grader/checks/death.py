@@ -228,7 +228,8 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
     place = student_place(failure, recording.submission)
     where = f" ({place.file}:{place.line})" if place else ""
     if failure.type == "ModuleNotFoundError":
-        lacking = lacking_package(failure.message, recording.submission)
+        installed = recording.environment.get("ros_imports", "").split()
+        lacking = lacking_package(failure.message, recording.submission, installed)
         if lacking is not None:
             apt_name = f"ros-jazzy-{lacking.replace('_', '-')}"
             return Cause(

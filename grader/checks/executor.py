@@ -16,10 +16,12 @@ from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.concerned import concerned_nodes
 from grader.checks.death import cause_of_death, dead, ended_early
+from grader.checks.doubt import was_held_up
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.node_absence import why_no_node, why_not_node
 from grader.checks.node_name import node_name
+from grader.checks.sighting import nodes_seen
 from grader.checks.wording import code, codes, counted
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Process, Recording
@@ -86,11 +88,11 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     """The executor keeps spinning while the node works.
 
     The probe calls the service `list_parameters` that every node has, and `get_type_description`
-    of a node without parameter services; a node can answer only while its executor spins. Calls
-    count from the node's first message on (or, if it publishes nothing, from its appearance);
-    those that were sent too late to be answered before the end do not count. A callback may be
-    busy for a while, as long as answers come in time; with `typically`, only as long as most of
-    them come soon.
+    of a node without parameter services; a node can answer only while its executor spins. Where
+    several nodes have one name, each of them must answer. Calls count from the node's first
+    message on (or, if it publishes nothing, from its appearance); those that were sent too late
+    to be answered before the end do not count. A callback may be busy for a while, as long as
+    answers come in time; with `typically`, only as long as most of them come soon.
 
     Explains a loop with `time.sleep()` in the constructor, in main() or in a callback, and
     `rclpy.spin()` that was never called. Where no call can be judged it relies on what the
@@ -128,8 +130,12 @@ def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answer
     within_ns = int(parameters.within * NS)
     begin_ns = _working_from(recording, node)
     judged, late = [], []
+    others = {item.name for item in recording.services if item.node != node} - {
+        item.name for item in recording.services if item.node == node
+    }
     for call in recording.calls:
-        if call.service not in executor_services(node):
+        # An answer in its place, by a service of another node's, says nothing of this one.
+        if call.service not in executor_services(node) or call.service in others:
             continue
         answered = call.answered_ns is not None and (
             call.answered_ns - call.requested_ns <= within_ns
@@ -248,6 +254,14 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
     number = sum(len(found) for found in recording.messages.values())
     meanwhile = f" while {counted(number, 'message was', 'messages were')} published"
     seen += meanwhile if number else ""
+    servers = max(call.servers for call in group.late)
+    if servers > 1:
+        return Cause(
+            f"{seen}: {servers} nodes offer these services under its name, and not every one of "
+            "them answers",
+            "The name of a node must be its own: give every node another one, and spin each.",
+            evidence,
+        )
     if _never_spun(recording, process):
         return Cause(
             f"{seen}: rclpy.spin() was never called{where}",
@@ -285,12 +299,17 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
     lacking = [name for name in names if _without_services(recording, name)]
     if lacking:
         # What a process says of itself would be all that there is, and it can say anything.
-        return Finding.error(
-            expected,
+        busy = was_held_up(recording)
+        return Cause(
             f"{codes(lacking)} has none of the services "
             f"{codes(EXECUTOR_SERVICES, 'and')} that rclpy makes for every node: "
-            "nothing shows from outside whether its executor spins. Leave them on",
-        )
+            "nothing shows from outside whether its executor spins",
+            "Leave at least one of them on: do not set both start_parameter_services and "
+            "start_type_description_service to False.",
+            Evidence(moments=nodes_seen(recording)),
+            ours=busy,
+            disturbed=busy,
+        ).finding(expected)
     if testimony.said(recording, "spin") and testimony.said(recording, "timer"):
         return Finding.passed(
             expected,
@@ -306,7 +325,7 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
 
 def _without_services(recording: Recording, name: str) -> bool:
     """Whether a node was there for long, and offered nothing that its executor answers."""
-    offered = {service.name for service in recording.services}
+    offered = {service.name for service in recording.services if service.node == name}
     appeared = [node.appeared_ns for node in recording.student_nodes if node.name == name]
     long = bool(appeared) and recording.stop_ns - min(appeared) > _LONG_NS
     return long and offered.isdisjoint(executor_services(name))

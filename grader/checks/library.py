@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 
 from grader.checks.wording import code, codes
 from grader.nearest import nearest
@@ -16,7 +17,9 @@ _WITHOUT_PYTHON = re.compile(r"rcl|rcl_.+|rclc.*|rcutils|rcpputils|rmw.*|ament_c
 """ROS packages that nobody can import; who does means another one, such as rclpy."""
 
 
-def lacking_package(message: str, submission: SubmissionRecord) -> str | None:
+def lacking_package(
+    message: str, submission: SubmissionRecord, installed: Collection[str] = ()
+) -> str | None:
     """The ROS package that the installation lacks, or None.
 
     Right code runs where the package is installed, so its absence is not the student's fault; the
@@ -25,11 +28,13 @@ def lacking_package(message: str, submission: SubmissionRecord) -> str | None:
     Args:
         message: Of a ``ModuleNotFoundError``.
         submission: What was handed in; its own packages are its own matter.
+        installed: Packages that are known to be there, which a program may keep from itself.
     """
     found = _MISSING_ROOT.match(message)
     if found is None or found[1] not in PACKAGES or _WITHOUT_PYTHON.fullmatch(found[1]):
         return None
-    return None if found[1] in {package.name for package in submission.packages} else found[1]
+    own = {package.name for package in submission.packages}
+    return None if found[1] in {*own, *installed} else found[1]
 
 
 def library_hint(message: str, recording: Recording) -> str | None:

@@ -80,13 +80,7 @@ def _hangs(recording: Recording, process: Process) -> Cause:
             Evidence(moments=(nothing,)),
         )
     if testimony.said(recording, "node", name):
-        return Cause(
-            f"{who} declared a node, but it never appeared in the ROS graph",
-            "The node must stay in the ROS domain that it was started in: do not set "
-            "ROS_DOMAIN_ID or domain_id in the code.",
-            ours=True,
-            disturbed=True,
-        )
+        return testimony.why_never_appeared(recording, "a node")
     place = interrupted_place(recording, name)
     evidence = Evidence(
         moments=(nothing,),
@@ -145,13 +139,10 @@ def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
         ended = [process for process in dead(recording) if process.exit_code != 0]
         if ended:
             return cause_of_death(recording, ended[0])
-    if testimony.declares(recording, "node", "node", wanted):
-        return Cause(
-            f"the process declared the node {code(wanted)}, but it never appeared in the graph; "
-            f"{there}",
-            ours=True,
-            disturbed=True,
-        )
+    declared = {item.data.get("node") for item in recording.declared("node")}
+    # A process that shows as many nodes as it declared only calls them by other names.
+    if wanted in declared and len(declared) > len(set(names)):
+        return testimony.why_never_appeared(recording, f"the node {code(wanted)}").after(there)
     exchanged = why_exchanged(recording)
     if exchanged is not None:
         return exchanged.after(there)

@@ -18,8 +18,10 @@ from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.sighting import endpoints_seen, first_seen
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.wording import code, counted
-from grader.recording.model import Kind, Qos, Recording
+from grader.recording.model import NS, Kind, Qos, Recording
 
+# Messages that tell whether a queue was always full.
+_FEWEST = 5
 # DDS carries durations as seconds and a fraction of 2**32.
 _SAME_DURATION = 1e-3
 _ARGUMENTS = {"lease": "liveliness_lease_duration"}
@@ -268,10 +270,12 @@ class Depth(Parameters):
 def depth(recording: Recording, parameters: Depth) -> Finding:
     """The queue has the expected depth.
 
-    DDS does not tell history and depth, so this is judged by what the process declared when it
-    created the endpoint.
+    Discovery does not tell history and depth, so this is judged by what the process declared when
+    it created the endpoint. The heartbeats of a reliable publisher tell how many messages it
+    keeps: what they show counts more.
 
-    Explains another depth and a history of keep_all, which has no depth.
+    Explains another depth, a history of keep_all, which has no depth, and an endpoint that the
+    process did not declare.
     """
     kind = Kind(parameters.kind)
     expected = f"queue depth {parameters.depth} of the {kind.value} on {code(parameters.topic)}"
@@ -297,13 +301,45 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
                 _depth_hint(parameters),
                 evidence,
             )
-    if not declared or any(queue.depth is None for queue in declared):
-        return Finding.error(
+    shown = _kept(recording, parameters)
+    if shown not in (None, parameters.depth):
+        but = f"depth {parameters.depth} is declared, but " if declared else ""
+        return Finding.failed(
             expected,
-            f"the depth cannot be seen: DDS does not tell it, and the process declared no "
-            f"{kind.value} on the topic",
+            f"{but}the heartbeats of the publisher show that it keeps {counted(shown, 'message')}",
+            _depth_hint(parameters),
+            evidence,
         )
-    return Finding.passed(expected, f"depth {parameters.depth}, declared by the process")
+    if any(queue.depth is None for queue in declared):
+        return Finding.error(expected, "the depth cannot be seen: the process declared no number")
+    if not declared and shown is None:
+        what = f"the {kind.value} on {code(parameters.topic)}"
+        return testimony.why_undeclared(recording, what).finding(expected)
+    source = "declared by the process" if declared else "as the heartbeats of the publisher show"
+    return Finding.passed(expected, f"depth {parameters.depth}, {source}")
+
+
+def _kept(recording: Recording, parameters: Depth) -> int | None:
+    """The depth of the publishers' queues, or as many messages as tell it from the expected one.
+
+    A volatile publisher forgets what every subscription has acknowledged, for which it asks with
+    a heartbeat: every few seconds, and where its queue is full.
+
+    Returns:
+        What the heartbeats show, or None where that is nothing.
+    """
+    times_ns = [item.stamp_ns for item in recording.on(parameters.topic)]
+    often = len(times_ns) > _FEWEST and times_ns[-1] - times_ns[0] < len(times_ns) * NS
+    for item in recording.student_endpoints(Kind(parameters.kind), parameters.topic):
+        if item.kept is None or item.kept == parameters.depth:
+            continue
+        full = item.heartbeats >= max(_FEWEST, len(times_ns) // 2) and often
+        if item.kept > parameters.depth or (full and 2 * item.kept < parameters.depth):
+            return item.kept
+    kept = {
+        item.kept for item in recording.student_endpoints(Kind(parameters.kind), parameters.topic)
+    }
+    return parameters.depth if kept == {parameters.depth} else None
 
 
 def _depth_hint(parameters: Depth) -> str:

@@ -9,6 +9,7 @@ from grader.checks.cause import Cause
 from grader.checks.death import cause_of_death, dead
 from grader.checks.delivery import why_not_delivered
 from grader.checks.destroyed import why_unpublished
+from grader.checks.doubt import was_held_up
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Moment
 from grader.checks.sighting import endpoints_seen, until_the_end
@@ -221,7 +222,7 @@ def _unmatched(
 
 def _held_in_vain(recording: Recording, topic: str) -> Cause | None:
     """A publisher that our tracer held for its match, and that found none: its message is lost."""
-    if not any(
+    if not was_held_up(recording) or not any(
         item.data.get("topic") == topic and item.data.get("matched") is False
         for item in recording.declared("held")
     ):

@@ -12,6 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from grader.checks.cause import Cause
+from grader.checks.doubt import was_held_up
+from grader.checks.finding import Evidence, Moment
 from grader.recording.model import Kind, Process, Qos, Recording
 
 _RELIABILITIES = ("reliable", "best_effort")
@@ -176,6 +179,65 @@ def left_open(recording: Recording, kind: Kind, topic: str, node: str) -> frozen
 def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
     """Whether a declaration of a kind holds a text, such as a ``publisher`` on a ``topic``."""
     return any(_text(item.data, key) == value for item in recording.declared(kind))
+
+
+def not_in_callback(recording: Recording, topic: str) -> bool:
+    """Whether no executor had called what published the newest message that was told of."""
+    told = [item.data for item in recording.declared("published")]
+    newest = [data.get("in_callback") for data in told if _text(data, "topic") == topic][-1:]
+    # What an EventsExecutor calls, it calls from C++.
+    return newest == [False] and not declares(recording, "spin", "executor", "EventsExecutor")
+
+
+def why_undeclared(recording: Recording, what: str) -> Cause:
+    """Why the process did not declare what the ROS graph shows of it.
+
+    The tracer is in each program of Python that is started by its entry point, and in the Python
+    programs that this one starts.
+
+    Args:
+        recording: The run.
+        what: A publisher or a subscription, in words.
+    """
+    seen = f"the process did not declare {what}"
+    compiled = any(item.build_type == "ament_cmake" for item in recording.submission.packages)
+    launched = any("launch" in item.name.rpartition("/")[2] for item in recording.processes)
+    if not traced(recording) and (compiled or launched):
+        return Cause(f"{seen}: only programs in Python declare what they create", ours=True)
+    return Cause(
+        f"{seen}: it was created past rclpy, in a program that was started without the "
+        "environment of the first, or after the file descriptors of rosgrade were closed",
+        "Create it by the method of rclpy's Node, in the program that `ros2 run` starts, and "
+        "leave its environment and the file descriptors that you did not open as they are.",
+        Evidence(moments=(Moment("launched", 0.0),)),
+    )
+
+
+def why_never_appeared(recording: Recording, what: str) -> Cause:
+    """Why what the process declared is not in the ROS graph.
+
+    Args:
+        recording: The run.
+        what: A node or an endpoint, in words.
+    """
+    seen = f"the process declared {what}, but it never appeared in the ROS graph"
+    changed = sorted({_text(item.data, "changed") or "" for item in recording.declared("init")})
+    names = [name for text in changed for name in text.split()]
+    if names:
+        return Cause(
+            f"{seen}: the program changed {', '.join(names)}, by which a node finds others",
+            f"Leave {', '.join(names)} as the environment has it, in the code too: no "
+            "os.environ[...] and no domain_id.",
+            Evidence(moments=(Moment("launched", 0.0),)),
+        )
+    if was_held_up(recording):
+        return Cause(f"{seen}, while the machine was busy", ours=True, disturbed=True)
+    return Cause(
+        seen,
+        "A node must stay where the environment puts it: set no ROS_DOMAIN_ID, no discovery "
+        "server and no profile of the middleware, and leave the names of rclpy's methods alone.",
+        Evidence(moments=(Moment("launched", 0.0),)),
+    )
 
 
 def made_twice(recording: Recording) -> str:

@@ -45,7 +45,18 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     messages = recording.on(parameters.topic)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
+    if not testimony.declares(recording, "publisher", "topic", parameters.topic):
+        cause = testimony.why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
+        return cause.finding(expected)
     timers = testimony.timers(recording)
+    if testimony.not_in_callback(recording, parameters.topic):
+        return Finding.failed(
+            expected,
+            f"{counted(len(messages), 'message was', 'messages were')} published, outside of "
+            "every callback: a thread or a loop calls publish()",
+            _HINT,
+            Evidence(moments=first_seen(recording, messages)),
+        )
     calling = [item for item in timers if item.callback != _NOTHING]
     if calling or testimony.timer_of_zero(recording):
         first = calling[0] if calling else None
@@ -56,12 +67,6 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
             expected,
             f"the process declared a timer{period}{name}",
             Evidence(moments=tuple(Moment("timer created", item) for item in when_s)),
-        )
-    if not testimony.declares(recording, "publisher", "topic", parameters.topic):
-        return Finding.error(
-            expected,
-            "the process declared neither a timer nor its publisher on "
-            f"{code(parameters.topic)}, so nothing shows what calls it",
         )
     rate = " but that of a rate, which calls nothing" if timers else ""
     return Finding.failed(

@@ -67,12 +67,7 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
     if ended:
         return cause_of_death(recording, ended[0])
     if testimony.declares(recording, kind.value, "topic", topic):
-        return Cause(
-            f"the process declared a {kind.value} on {code(topic)}, but it never appeared in the "
-            "ROS graph",
-            ours=True,
-            disturbed=True,
-        )
+        return testimony.why_never_appeared(recording, f"a {kind.value} on {code(topic)}")
     exchanged = why_exchanged(recording)
     if exchanged is not None:
         return exchanged.after(f"there is no {kind.value} on {code(topic)}")

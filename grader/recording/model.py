@@ -112,6 +112,9 @@ class Endpoint:
         type_hash: Of the interface's definition (REP-2011), or empty where it is not told.
         appeared_ns: First time it was seen.
         vanished_ns: First time it was missing again, or None.
+        kept: Of a reliable publisher the most messages that it kept at one time, as its
+            heartbeats tell (DDSI-RTPS), or None where none was heard.
+        heartbeats: How many of these told of another newest message.
     """
 
     kind: Kind
@@ -124,6 +127,8 @@ class Endpoint:
     appeared_ns: int
     vanished_ns: int | None = None
     type_hash: str = ""
+    kept: int | None = None
+    heartbeats: int = 0
 
 
 @dataclass(frozen=True)
@@ -232,6 +237,8 @@ class Call:
         request: Fields of the request; of the calls to ``list_parameters`` they are not kept.
         response: Fields of the response, or None.
         error: Why it could not be sent or read: ``no server``, or what of ours went wrong.
+        servers: How many nodes offered the service then; of the calls to ``list_parameters`` and
+            ``get_type_description`` all of them must have answered.
     """
 
     service: str
@@ -241,6 +248,7 @@ class Call:
     request: Mapping[str, Any] | None = None
     response: Mapping[str, Any] | None = None
     error: str = ""
+    servers: int = 1
 
 
 @dataclass(frozen=True)
@@ -473,8 +481,10 @@ class Recording:
         incidents: What the simulator noted.
         scene: World and robot, or None in a scenario without a world.
         values: Random values of the scenario by name, in SI units.
-        environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; where it
-            is known and there are any, ``other_domains`` that the student joined, and ``remaps``.
+        environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...;
+            ``ros_imports``, packages of ROS that the submission imports and that are installed;
+            where it is known and there are any, ``other_domains`` that the student joined, and
+            ``remaps``.
     """
 
     scenario: str

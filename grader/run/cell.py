@@ -7,6 +7,7 @@ import select
 import time
 import types
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,6 +63,7 @@ class Cell:
         self._order = order
         self._domain_id = domain_id
         self._probe = probe
+        self._wire = wire
         on_line = tell_line if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
         self._students = StudentProcesses(self._output, order.enclosure, zygotes)
@@ -145,7 +147,7 @@ class Cell:
             end_ns=time.time_ns(),
             submission=SubmissionRecord(id="", sha256=""),
             nodes=self._graph.nodes,
-            endpoints=self._graph.endpoints,
+            endpoints=tuple(map(self._with_heartbeats, self._graph.endpoints)),
             processes=processes,
             log=tuple(log),
             declarations=self._output.declarations,
@@ -170,6 +172,11 @@ class Cell:
                 **({"other_domains": others} if others else {}),
             },
         )
+
+    def _with_heartbeats(self, endpoint: Endpoint) -> Endpoint:
+        heard = self._wire.heartbeats if self._wire is not None else {}
+        kept, number = heard.get(endpoint.gid, (None, 0))
+        return replace(endpoint, kept=kept, heartbeats=number)
 
     def _observe(self) -> Ending:
         ending = self._launch()
@@ -200,6 +207,7 @@ class Cell:
         return None
 
     def _start_again(self, name: str) -> None:
+        self._probe.counts_servers = False
         self._start(next(item for item in self._order.commands if item.name == name))
 
     def _start(self, command: Command) -> None:

@@ -27,10 +27,13 @@ _OF_ENDPOINTS = ("publisher", "subscription")
 _KINDS = frozenset(
     {
         *_OF_ENDPOINTS,
-        *("started", "init", "node", "timer", "added", "spin", "held", "leaving", "exiting"),
+        *("started", "init", "node", "timer", "added", "spin", "published", "held"),
+        *("leaving", "exiting"),
     }
 )
 """What a tracer tells of; see ``tracer/sitecustomize.py``."""
+_OF_PROCESS = frozenset({"started", "leaving", "exiting"})
+"""What counts only of the process that was launched, not of those that it starts."""
 
 
 @dataclass
@@ -85,6 +88,7 @@ class _Stream:
         self.kept = KeptLines(limit)
         self.written_bytes = 0
         self._partial = b""
+        self.pid: int | None = None
         self._begun_ns = 0
         self._newest_ns = 0
         self._ended = False
@@ -251,7 +255,11 @@ class OutputReader:
             data = _parsed(line.text)
             if not _is_of_tracer(data):
                 self._tell_foreign(line)
-            elif _is_fit(data):
+                continue
+            # The first to start is the one that was launched.
+            stream.pid = data["pid"] if stream.pid is None else stream.pid
+            is_own = data["pid"] == stream.pid or data["kind"] not in _OF_PROCESS
+            if is_own and _is_fit(data):
                 self._declare(line, data.pop("kind"), data)
 
     def _tell_foreign(self, line: LogLine) -> None:

@@ -58,12 +58,26 @@ def qos_profile(reliability: str, durability: str, depth: int) -> QoSProfile:
 @dataclass
 class _Pending:
     requested_ns: int
-    future: Any
+    servers: int
+    future: Any = None
+    answers: int = 0
     answered_ns: int | None = None
+
+    def answer(self) -> None:
+        """Count an answer; the call is answered when every server has."""
+        self.answers += 1
+        if self.answers == self.servers:
+            self.answered_ns = time.time_ns()
 
 
 class Probe:
-    """Subscribes to the scenario's topics and calls parameter services."""
+    """Subscribes to the scenario's topics and calls parameter services.
+
+    Attributes:
+        recording: Whether what arrives is kept.
+        counts_servers: Whether a call is answered only when every server of its service has;
+            what is left of a killed process stays in the graph, but answers nothing.
+    """
 
     def __init__(self, domain_id: int) -> None:
         """Join the graph; nothing is recorded yet.
@@ -95,6 +109,7 @@ class Probe:
         self._kept: dict[str, int] = {}
         self.last_message_ns: int | None = None
         self.recording = True
+        self.counts_servers = True
         self._has_met = False
 
     def listen(self, topics: tuple[Topic, ...], limits: Limits) -> None:
@@ -229,24 +244,27 @@ class Probe:
                 # A node of a very long name, whose own services ROS would not allow either.
                 return
             self._calls[service] = []
+            _count_answers(self._clients[service], self._calls[service])
         client, calls = self._clients[service], self._calls[service]
         unanswered = sum(call.answered_ns is None for call in calls)
         if unanswered >= _MOST_UNANSWERED or not client.service_is_ready():
             return
-        pending = _Pending(time.time_ns(), None)
+        servers = self.node.count_services(service) if self.counts_servers else 1
+        pending = _Pending(time.time_ns(), max(1, servers))
         pending.future = client.call_async(kind.Request())
-
-        def answered(_: Any) -> None:
-            pending.answered_ns = time.time_ns()
-
-        pending.future.add_done_callback(answered)
         calls.append(pending)
 
     @property
     def calls(self) -> tuple[Call, ...]:
         """Every call so far, oldest first."""
         found = [
-            Call(service, _type_of(service), call.requested_ns, call.answered_ns)
+            Call(
+                service,
+                _type_of(service),
+                call.requested_ns,
+                call.answered_ns,
+                servers=call.servers,
+            )
             for service, calls in self._calls.items()
             for call in calls
         ]
@@ -290,6 +308,21 @@ class Probe:
         if len(data) > self._limits.message_bytes:
             return
         self.messages.append(_raw(topic.name, topic.type, data, info))
+
+
+def _count_answers(client: Any, calls: list[_Pending]) -> None:
+    """Count every answer to a client's calls, of which rclpy hands on only the first."""
+    find = client.get_pending_request
+    asked: dict[int, _Pending] = {}
+
+    def found(sequence: int) -> Any:
+        if sequence not in asked:
+            future = find(sequence)
+            asked[sequence] = next(call for call in calls if call.future is future)
+        asked[sequence].answer()
+        return find(sequence)
+
+    client.get_pending_request = found
 
 
 def _type_of(service: str) -> str:

@@ -365,6 +365,7 @@ class Runner:
             )
             for launch in scenario.launch
         )
+        imported = {item.module for package in submission.packages for item in package.ros_imports}
         # A definition of ours comes before one of the student's.
         definitions = tuple(map(str, (*type_support, *ros.underlays, *ros.prefixes, install)))
         order = CellOrder(
@@ -392,6 +393,7 @@ class Runner:
                 "rmw": RMW,
                 "python": ".".join(map(str, sys.version_info[:3])),
                 "sandbox": "none",
+                "ros_imports": " ".join(sorted(imported & set(self.ros.packages))),
                 # As many threads as rclpy's MultiThreadedExecutor takes by itself.
                 "cpus": str(cpu_count()),
                 **({"remaps": " ".join(remaps)} if remaps else {}),

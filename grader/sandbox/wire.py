@@ -1,35 +1,41 @@
-"""Listens on a network of one's own for packets to the middleware that no middleware sends."""
+"""Listens on a network of one's own to what is sent to the middleware."""
 
 from __future__ import annotations
 
 import ctypes
 import socket
 import struct
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 _UDP_TABLE = Path("/proc/net/udp")
 _SO_ATTACH_FILTER = 26
 _ETH_P_IP = 0x0800
-_KEPT_BYTES = 128
+_KEPT_BYTES = 65_535
 _MOST_AT_ONCE = 4096
 # Ports of the first participants of domain 0: the mapping of the DDSI-RTPS standard.
 _FIRST_PORT, _LAST_PORT = 7400, 7649
 # Classic BPF (linux/bpf_common.h): load a word, half or byte at a place, or behind the IP header.
 _LD_W, _LD_H, _LD_B, _LDX_MSH = 0x20, 0x28, 0x30, 0xB1
-_LD_W_IND, _LD_H_IND, _LD_B_IND = 0x40, 0x48, 0x50
+_LD_H_IND = 0x48
 _JEQ, _JGE, _JGT, _JSET, _RET = 0x15, 0x35, 0x25, 0x45, 0x06
 # linux/filter.h and linux/if_packet.h: every packet of a loopback comes by twice.
 _PACKET_TYPE, _OUTGOING = 0xFFFFF000 + 4, 4
-_RTPS, _RTPS_MAJOR = 0x52545053, 2
 _RTPS_HEADER_BYTES = 20
+_SUBMESSAGE_HEADER_BYTES = 4
+_HEARTBEAT, _HEARTBEAT_BYTES = 0x07, 28
+_MOST_WRITERS, _MOST_KEPT = 1000, 2**31
 _UDP_HEADER_BYTES = 8
 
 
 class Wire:
-    """What was sent to given ports and is not RTPS.
+    """Packets to the ports of the middleware: what is not RTPS, and heartbeats of writers.
 
     Opened while there is the right to; anybody may read it.
+
+    Attributes:
+        heartbeats: Of each writer, by its identifier as hex: the most messages that one of its
+            heartbeats said it keeps, and how many heartbeats told of another newest message.
     """
 
     def __init__(self) -> None:
@@ -39,6 +45,8 @@ class Wire:
             OSError: There is no such right, or the kernel has no packet sockets.
         """
         self._count = 0
+        self._newest: dict[str, int] = {}
+        self.heartbeats: dict[str, tuple[int, int]] = {}
         self._socket = socket.socket(socket.AF_PACKET, socket.SOCK_DGRAM, 0)
         try:
             code = b"".join(_filter())
@@ -59,8 +67,21 @@ class Wire:
             except BlockingIOError:
                 break
             header = (packet[0] & 0x0F) * 4
-            self._count += int.from_bytes(packet[header + 2 : header + 4], "big") in ports
+            data = packet[header + _UDP_HEADER_BYTES :]
+            # After the name the major version; every vendor's id so far begins with 1.
+            if len(data) >= _RTPS_HEADER_BYTES and data[:5] == b"RTPS\2" and data[6] == 1:
+                self._note_heartbeats(data)
+            else:
+                self._count += int.from_bytes(packet[header + 2 : header + 4], "big") in ports
         return self._count
+
+    def _note_heartbeats(self, data: bytes) -> None:
+        for writer, first, last in heartbeats(data):
+            kept, number = self.heartbeats.get(writer, (0, 0))
+            if self._newest.get(writer) != last and len(self._newest) < _MOST_WRITERS:
+                self._newest[writer] = last
+                number += 1
+            self.heartbeats[writer] = max(kept, last - first + 1), number
 
     def close(self) -> None:
         """Listen no more."""
@@ -73,9 +94,34 @@ def bound_ports() -> frozenset[int]:
     return frozenset(int(line.split()[1].rpartition(":")[2], 16) for line in lines)
 
 
+def heartbeats(data: bytes) -> Iterator[tuple[str, int, int]]:
+    """Heartbeats of writers that programs make, in an RTPS message (DDSI-RTPS 2.5, 9.4.5.7).
+
+    Args:
+        data: What a UDP packet holds.
+
+    Yields:
+        The writer's identifier as hex, and the first and the last message that it keeps.
+    """
+    place = _RTPS_HEADER_BYTES
+    while place + _SUBMESSAGE_HEADER_BYTES <= len(data):
+        order = "<" if data[place + 1] & 1 else ">"
+        (size,) = struct.unpack_from(f"{order}H", data, place + 2)
+        body = data[place + _SUBMESSAGE_HEADER_BYTES :][:size]
+        # The last byte of a writer's id tells whether it is one of the middleware's own.
+        if data[place] == _HEARTBEAT and len(body) >= _HEARTBEAT_BYTES and not body[7] & 0xC0:
+            high, low, newest_high, newest_low = struct.unpack_from(f"{order}iIiI", body, 8)
+            first, last = (high << 32) + low, (newest_high << 32) + newest_low
+            if 0 < first <= last < first + _MOST_KEPT:
+                yield (data[8:_RTPS_HEADER_BYTES] + body[4:8]).hex(), first, last
+        if not size:
+            return
+        place += _SUBMESSAGE_HEADER_BYTES + size
+
+
 def _filter() -> list[bytes]:
-    """Of IPv4: UDP, not a later fragment, to a port of DDS, with no header of RTPS."""
-    keep, drop = 18, 19
+    """Of IPv4: UDP, not a later fragment, to a port of DDS."""
+    keep, drop = 10, 11
     program = [
         (_LD_W, 0, 0, _PACKET_TYPE),
         (_JEQ, drop, None, _OUTGOING),
@@ -86,16 +132,7 @@ def _filter() -> list[bytes]:
         (_LDX_MSH, 0, 0, 0),
         (_LD_H_IND, 0, 0, 2),
         (_JGE, None, drop, _FIRST_PORT),
-        (_JGT, drop, None, _LAST_PORT),
-        (_LD_H_IND, 0, 0, 4),
-        (_JGE, None, keep, _UDP_HEADER_BYTES + _RTPS_HEADER_BYTES),
-        (_LD_W_IND, 0, 0, _UDP_HEADER_BYTES),
-        (_JEQ, None, keep, _RTPS),
-        (_LD_B_IND, 0, 0, _UDP_HEADER_BYTES + 4),
-        (_JEQ, None, keep, _RTPS_MAJOR),
-        # The first byte of every vendor's id so far.
-        (_LD_B_IND, 0, 0, _UDP_HEADER_BYTES + 6),
-        (_JEQ, drop, None, 1),
+        (_JGT, drop, keep, _LAST_PORT),
         (_RET, 0, 0, _KEPT_BYTES),
         (_RET, 0, 0, 0),
     ]

@@ -268,6 +268,37 @@ if 'install' in sys.argv:
     print('Starting >>> bot_publisher', 'and no line end', sep='\\n', end='', flush=True)
     sys.exit(1)
 """
+# It knows the lines of the tracer, and writes one for a timer that there is not.
+FORGED_TIMER = """\
+import json, os, threading, time
+import rclpy
+from geometry_msgs.msg import Twist
+
+def publish(publisher):
+    while rclpy.ok():
+        publisher.publish(Twist())
+        time.sleep(0.1)
+
+def main():
+    rclpy.init()
+    node = rclpy.create_node('bot_publisher')
+    publisher = node.create_publisher(Twist, '/cmd_vel', 10)
+    claim = {'kind': 'timer', 'pid': os.getpid(), 'node': '/bot_publisher', 'period_s': 0.1,
+             'callback': 'BotPublisher.tick', 'group': {}}
+    os.write(int(os.environ['ROSGRADE_TRACER_FD']), json.dumps(claim).encode() + b'\\n')
+    threading.Thread(target=publish, args=(publisher,), daemon=True).start()
+    try:
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        pass
+"""
+FORGED_DEPTH = FORGED_TIMER.replace(
+    "node.create_publisher(Twist, '/cmd_vel', 10)",
+    "type(node).create_publisher.__wrapped__(node, Twist, '/cmd_vel', 1)",
+).replace(
+    "'kind': 'timer'",
+    "'kind': 'publisher', 'topic': '/cmd_vel', 'history': 'keep_last', 'depth': 10",
+)
 UNUSUAL = """\
 import asyncio, multiprocessing, socket, tempfile
 import numpy
@@ -467,6 +498,37 @@ ATTACKS = {
         lost=frozenset({"starts"}),
         named=("joined ROS domain 5",),
     ),
+    "another_discovery_server": Attack(
+        at_import="os.environ['ROS_DISCOVERY_SERVER'] = '127.0.0.1:11811'",
+        lost=frozenset({"starts"}),
+        named=("the program changed ROS_DISCOVERY_SERVER",),
+    ),
+    "calls_its_node_otherwise_than_it_says": Attack(
+        at_import="Node.get_name = lambda _: 'bot_publisher'",
+        name="publisher_bot",
+        lost=frozenset({"node"}),
+        named=("found the node `/publisher_bot`",),
+    ),
+    "hides_what_python_has": Attack(
+        at_import="if sys.flags.no_site == 0:\n"
+        "    os.execv(sys.executable, [sys.executable, '-S', *sys.argv])",
+        lost=frozenset({"starts"}),
+    ),
+    "shuts_the_tracer_out": Attack(
+        at_import="import posix\nposix.close(int(os.environ['ROSGRADE_TRACER_FD']))",
+        lost=frozenset({"timer"}),
+        named=("the process did not declare the publisher",),
+    ),
+    "declares_a_timer_beside_a_thread": Attack(
+        files={"bot_publisher/node.py": FORGED_TIMER},
+        lost=frozenset({"timer"}),
+        named=("outside of every callback",),
+    ),
+    "declares_another_depth": Attack(
+        files={"bot_publisher/node.py": FORGED_DEPTH},
+        lost=frozenset({"depth", "timer"}),
+        named=("the heartbeats of the publisher show that it keeps 1 message",),
+    ),
     "forged_tracer": Attack(FORGED, lost=ALIVE, named=("wrote into the channel",)),
     "squats_the_probe_s_name": Attack(
         SQUAT,
@@ -589,6 +651,11 @@ HONEST = {
         files={"bot_publisher/other.py": "import importlib\nimportlib.import_module('\\ud800')"}
     ),
     "does_unusual_things": Attack(UNUSUAL),
+    "closes_all_that_it_did_not_open": Attack(at_import="os.closerange(3, 65536)"),
+    "starts_python_anew": Attack(
+        at_import="if 'ANEW' not in os.environ:\n"
+        "    os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, 'ANEW': ''})"
+    ),
     "uses_what_is_not": Attack(
         at_import="import pydantic",
         lost=frozenset({"starts"}),

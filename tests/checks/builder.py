@@ -162,10 +162,11 @@ def endpoint(
     owner: Owner = Owner.STUDENT,
     qos: Qos = RELIABLE,
     appeared_s: float = 0.35,
+    **more: Any,
 ) -> Endpoint:
     """A publisher (or a subscription) in the graph."""
     gid = f"{topic}{node}{kind.value}{appeared_s}".encode().hex()
-    return Endpoint(kind, topic, type, node, owner, qos, gid, at(appeared_s))
+    return Endpoint(kind, topic, type, node, owner, qos, gid, at(appeared_s), **more)
 
 
 def reader(topic: str = "/cmd_vel", type: str = TWIST, qos: Qos = RELIABLE) -> Endpoint:

@@ -90,9 +90,23 @@ class TestGood:
         assert "the process declared a timer and that its executor spins" in finding.observed
 
     def test_what_a_process_says_of_itself_is_no_proof_where_it_left_nothing_to_ask(self):
-        finding = responsive(recording(calls=()))
-        assert finding.status is Status.ERROR
-        assert "has none of the services" in finding.observed
+        unasked = recording(calls=())
+        assert "has none of the services" in failing("executor.responsive", unasked)
+        # Of what a busy machine loses nothing is known.
+        busy = replace(unasked, disturbance=taken(0.1, 1.0, waited_s=0.6))
+        assert (responsive(busy).status, responsive(busy).disturbed) == (Status.ERROR, True)
+
+    def test_every_node_of_one_name_must_answer(self):
+        twins = [replace(item, servers=2) for item in calls()]
+        assert responsive(recording(calls=tuple(twins))).status is Status.PASSED
+        silent_one = tuple(replace(item, answered_ns=None) for item in twins)
+        found = failing("executor.responsive", recording(calls=silent_one))
+        assert "2 nodes offer these services under its name, and not every one" in found
+
+    def test_another_node_cannot_answer_in_its_place(self):
+        helper = replace(OFFERED, node="/helper")
+        found = failing("executor.responsive", recording(services=(helper,)))
+        assert "`/bot_publisher` has none of the services" in found
 
     def test_a_second_node_that_nobody_spins_and_that_is_not_on_the_topic(self):
         settings = "/settings"

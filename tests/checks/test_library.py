@@ -71,3 +71,9 @@ def test_a_package_of_ros_that_is_not_installed_here_is_not_the_student_s_fault(
 )
 def test_a_wrong_name_of_a_package_or_module_is_the_student_s(message: str) -> None:
     assert lacking_package(message, run().submission) is None
+
+
+def test_a_package_that_is_there_lacks_only_where_a_program_hides_it_from_itself() -> None:
+    message = "No module named 'nav2_msgs'"
+    assert lacking_package(message, run().submission) == "nav2_msgs"
+    assert lacking_package(message, run().submission, ["nav2_msgs"]) is None

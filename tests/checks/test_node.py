@@ -253,11 +253,19 @@ class TestExists:
         assert "ran until the end, but no node appeared" in found
         assert "never called" not in found
 
-    def test_a_node_that_the_process_declares_but_nobody_sees_is_not_judged(self):
+    def test_a_node_that_is_declared_but_never_seen_is_excused_by_a_busy_machine_only(self):
         run = nodeless(declarations=(declared("started"), declared("node", node=NODE)))
-        finding = judge("node.exists", run, name=NODE)
+        assert "never appeared in the ROS graph" in failing("node.exists", run, name=NODE)
+        busy = replace(run, disturbance=taken(0.1, 1.0, waited_s=0.6))
+        finding = judge("node.exists", busy, name=NODE)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
-        assert "never appeared in the ROS graph" in finding.observed
+
+    def test_a_node_that_left_the_environment_of_the_run_loses_the_points_at_any_load(self):
+        said = (declared("started"), declared("init", changed="ROS_DISCOVERY_SERVER"))
+        run = nodeless(declarations=(*said, declared("node", node=NODE)))
+        busy = replace(run, disturbance=taken(0.1, 1.0, waited_s=2.0))
+        found = failing("node.exists", busy, name=NODE)
+        assert "the program changed ROS_DISCOVERY_SERVER, by which a node finds others" in found
 
     @pytest.mark.parametrize(
         ("actual", "words"),

@@ -12,8 +12,10 @@ from tests.checks.builder import (
     declarations,
     declared,
     endpoint,
+    every,
     failing,
     judge,
+    messages,
     reader,
     recording,
 )
@@ -223,10 +225,33 @@ class TestDepth:
         finding = judge("qos.depth", recording(declarations=(item,)), topic="/cmd_vel", depth=10)
         assert finding.status is Status.ERROR
 
-    def test_without_a_declaration_it_cannot_be_seen(self):
-        finding = judge("qos.depth", recording(declarations=()), topic="/cmd_vel", depth=10)
-        assert finding.status is Status.ERROR
-        assert "the depth cannot be seen" in finding.observed
+    def test_a_publisher_that_is_not_declared_is_judged_by_its_heartbeats_or_named(self):
+        unknown = recording(declarations=())
+        found = failing("qos.depth", unknown, topic="/cmd_vel", depth=10)
+        assert "the process did not declare the publisher on `/cmd_vel`" in found
+        shown = replace(unknown, endpoints=(endpoint(kept=10, heartbeats=2),))
+        finding = judge("qos.depth", shown, topic="/cmd_vel", depth=10)
+        assert finding.status is Status.PASSED
+        assert "as the heartbeats of the publisher show" in finding.observed
+
+    @pytest.mark.parametrize(
+        ("kept", "heartbeats", "times_s", "passes"),
+        [
+            (11, 1, every(0.3), False),
+            # After each message, though the queue has room for nine more: it has not.
+            (1, 12, every(0.3), False),
+            (1, 3, every(0.3), True),
+            (7, 2, every(0.3), True),
+            # Of a slow publisher each message is acknowledged before the next one.
+            (1, 12, every(5.0), True),
+        ],
+    )
+    def test_heartbeats_that_contradict_what_is_declared(self, kept, heartbeats, times_s, passes):
+        own = endpoint(kept=kept, heartbeats=heartbeats)
+        run = recording(endpoints=(own,), messages=messages(times_s))
+        finding = judge("qos.depth", run, topic="/cmd_vel", depth=10)
+        assert (finding.status is Status.PASSED) is passes
+        assert passes or f"show that it keeps {kept} message" in finding.observed
 
     def test_a_subscription(self):
         item = declared("subscription", topic="/scan", history="keep_last", depth=5)

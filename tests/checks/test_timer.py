@@ -3,7 +3,16 @@
 import pytest
 
 from grader.checks.finding import Status
-from tests.checks.builder import NODE, declarations, declared, failing, judge, recording
+from tests.checks.builder import (
+    NODE,
+    declarations,
+    declared,
+    failing,
+    judge,
+    package,
+    recording,
+    submission,
+)
 
 ASKED = {"topic": "/cmd_vel"}
 
@@ -38,9 +47,28 @@ def test_a_rate_calls_nothing():
     assert "no timer but that of a rate, which calls nothing" in found
 
 
-def test_a_process_that_declares_nothing_loses_no_point():
-    finding = judge("executor.timer", recording(declarations=()), **ASKED)
+@pytest.mark.parametrize("said", [(), declarations()[:1], (*declarations()[:1], timer(0.3))])
+def test_a_process_that_shut_the_tracer_out_is_named(said):
+    found = failing("executor.timer", recording(declarations=said), **ASKED)
+    assert "the process did not declare the publisher on `/cmd_vel`" in found
+
+
+def test_a_program_that_is_not_in_python_cannot_declare_anything():
+    compiled = submission(package(build_type="ament_cmake"))
+    finding = judge("executor.timer", recording(declarations=(), submission=compiled), **ASKED)
     assert finding.status is Status.ERROR
+
+
+def test_a_timer_beside_the_thread_that_publishes_earns_nothing():
+    told = [declared("published", 1.0, topic="/cmd_vel", number=1, in_callback=True)]
+    told.append(declared("published", 1.3, topic="/cmd_vel", number=2, in_callback=False))
+    found = failing("executor.timer", loop(timer(0.3), *told), **ASKED)
+    assert "outside of every callback: a thread or a loop calls publish()" in found
+    first_in_constructor = loop(timer(0.3), *told[::-1])
+    assert judge("executor.timer", first_in_constructor, **ASKED).status is Status.PASSED
+    events = declared("spin", 0.5, executor="EventsExecutor", threads=1)
+    run = loop(timer(0.3), *told, events)
+    assert judge("executor.timer", run, **ASKED).status is Status.PASSED
 
 
 def test_a_publisher_that_is_silent_is_told_why():

@@ -439,8 +439,8 @@ class TestForgery:
 
     def test_stamps_that_arrivals_contradict(self):
         found = failing("timing.period", self.forged(0.3, 0.5), topic="/cmd_vel", period="300 ms")
-        assert "messages arrive every 500 ms" in found
-        assert "source timestamps are 300 ms apart" in found
+        assert "12 messages of 12 came up to 2.2 s earlier or later" in found
+        assert "the timestamps are not the times of publishing" in found
 
     def test_stamps_after_the_arrival(self):
         found = failing("timing.period", self.forged(0.3, 0.03), topic="/cmd_vel", period="300 ms")
@@ -465,20 +465,38 @@ class TestForgery:
         finding = period(recording(messages={"/cmd_vel": stream}))
         assert finding.status is Status.ERROR
         assert "no source timestamps" in finding.observed
+        stamping = recording(messages={"/cmd_vel": stream}, environment={"rmw": "rmw_fastrtps_cpp"})
+        found = failing("timing.period", stamping, topic="/cmd_vel", period="300 ms")
+        assert "one lies before the launch" in found
 
     def test_a_busy_machine_may_explain_it(self):
         noise = tuple(Disturbance(at(0.7 + 0.5 * n), 0, int(0.2 * NS)) for n in range(13))
         finding = period(self.forged(0.3, 0.5, disturbance=noise))
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
-    def test_arrivals_in_pairs_are_no_proof_of_a_forgery(self):
+    @pytest.mark.parametrize(
+        "waits_s", [[0.0, 0.3] * 6, [0.0, 0.08, 0.0, 0.05] * 3, [0.0] * 8 + [0.1] * 4]
+    )
+    def test_jitter_that_only_the_arrivals_show(self, waits_s):
+        """As with a clock that a library puts on a grid."""
         stream = tuple(
-            message(0.7 + 0.3 * n, sequence=n + 1, received_s=0.701 + 0.6 * ((n + 1) // 2))
-            for n in range(12)
+            message(0.7 + 0.3 * n, sequence=n + 1, received_s=0.701 + 0.3 * n + wait_s)
+            for n, wait_s in enumerate(waits_s)
         )
-        finding = period(recording(messages={"/cmd_vel": stream}))
-        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
-        assert "held them up on their way" in finding.observed
+        run = recording(messages={"/cmd_vel": stream}, stop_s=5)
+        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
+        assert "the timestamps are not the times of publishing" in found
+        # Where the machine was busy, messages may wait, and nothing is held against a right node.
+        noise = tuple(Disturbance(at(0.5 + 0.5 * n), int(0.3 * NS), 0) for n in range(10))
+        assert period(replace(run, disturbance=noise)).status in (Status.PASSED, Status.ERROR)
+
+    def test_one_message_that_was_sent_again_is_no_proof(self):
+        waits_s = [0.0] * 4 + [0.25, 0.01] + [0.0] * 6
+        stream = tuple(
+            message(0.7 + 0.3 * n, sequence=n + 1, received_s=0.701 + 0.3 * n + wait_s)
+            for n, wait_s in enumerate(waits_s)
+        )
+        assert period(recording(messages={"/cmd_vel": stream})).status is Status.PASSED
 
     def test_a_few_late_arrivals_do_not_matter(self):
         stream = tuple(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 import subprocess
 import sys
 
 import pytest
 
 from grader.sandbox import trial
+from grader.sandbox.wire import heartbeats
 
 SOURCE = """\
 import fcntl, socket, struct
@@ -42,3 +44,21 @@ def test_only_what_no_middleware_sends_to_our_ports_is_counted() -> None:
         [*own_network, sys.executable, "-c", SOURCE], capture_output=True, text=True, check=False
     )
     assert said.stdout.split() == ["0", "0", "0", "0", "20", "40", "60", "80"], said.stderr
+
+
+def heartbeat(writer: bytes, first: int, last: int, order: str = "<") -> bytes:
+    """A submessage as the standard has it."""
+    body = bytes(4) + writer + struct.pack(f"{order}iIiIi", 0, first, 0, last, 7)
+    return struct.pack(f"{order}BBH", 7, order == "<", len(body)) + body
+
+
+def test_heartbeats_tell_what_a_writer_of_a_program_keeps() -> None:
+    prefix, own, builtin = bytes(range(12)), b"\0\0\x12\3", b"\0\3\0\xc7"
+    data = struct.pack("<BBH", 0x15, 1, 8) + bytes(8)
+    message = b"RTPS\2\3\1\x0f" + prefix + data + heartbeat(own, 3, 12)
+    message += heartbeat(builtin, 1, 9) + heartbeat(own, 13, 12) + heartbeat(own, 4, 4, ">")
+    writer = (prefix + own).hex()
+    assert list(heartbeats(message)) == [(writer, 3, 12), (writer, 4, 4)]
+    # Anybody may send anything.
+    assert not list(heartbeats(message[:40]))
+    assert not list(heartbeats(message[:20] + bytes(30)))

@@ -35,6 +35,6 @@ class ListingParameters(Playing):
             self._due_s = elapsed_s + self._next - now
 
     def _call(self) -> None:
-        for node in self._stage.graph.nodes:
-            if node.owner is Owner.STUDENT and node.vanished_ns is None:
-                self._stage.call_executor(node.name)
+        there = (node for node in self._stage.graph.nodes if node.vanished_ns is None)
+        for name in dict.fromkeys(node.name for node in there if node.owner is Owner.STUDENT):
+            self._stage.call_executor(name)

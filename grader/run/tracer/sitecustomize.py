@@ -2,7 +2,8 @@
 
 Python imports a module of this name at start, before the student's code. It wraps a few
 methods of rclpy when (and only if) the student imports them, reports each use as one JSON
-line on the pipe that the cell left open, and changes nothing else, with three exceptions. A
+line on the pipe that the cell left open, which Python programs that this one starts get as
+well and os.close() does not see, and changes nothing else, with three exceptions. A
 publisher on a topic that the probe listens to is held until it is matched, because a
 volatile publisher that publishes in a constructor otherwise writes before discovery has
 matched anybody, and the message is lost. And a MultiThreadedExecutor that takes as many
@@ -43,6 +44,8 @@ _LEAST_THREADS = 4
 _SLICE_S = 0.5
 _THRESHOLDS = gc.get_threshold()
 _IMPORTED = 100_000
+_PREFIXES = ("ROS_", "RMW_", "FASTDDS_", "FASTRTPS_", "CYCLONEDDS_")
+_HARMLESS = ("ROS_LOG_DIR", "ROS_HOME", "ROS_DISTRO", "ROS_VERSION", "ROS_PYTHON_VERSION")
 _OWN_TOPICS = ("/parameter_events", "/rosout")
 # Writes up to PIPE_BUF (4096 bytes) are atomic, so lines of several processes do not mix.
 _LONGEST_LINE = 4000
@@ -143,6 +146,32 @@ def _hold(node: Any, publisher: Any) -> None:
     )
 
 
+def _tell_of_messages(publisher: Any) -> None:
+    """Report of messages 1, 2, 4, 8, ... on a topic of the probe's where they are published."""
+    topic, publish = publisher.topic_name, publisher.publish
+    if topic not in _HELD_TOPICS:
+        return
+
+    def told(*args: Any, **kwargs: Any) -> Any:
+        number = _messages[topic] = _messages.get(topic, 0) + 1
+        if not number & (number - 1):
+            _report("published", topic=topic, number=number, in_callback=_is_in_callback())
+        return publish(*args, **kwargs)
+
+    publisher.publish = told
+
+
+def _is_in_callback() -> bool:
+    """Whether an executor has called what runs now."""
+    frame = sys._getframe()
+    while frame is not None:
+        if frame.f_code.co_filename.endswith(("/rclpy/executors.py", "/rclpy/task.py")):
+            return True
+        frame = frame.f_back  # type: ignore[assignment]
+    return False
+
+
+_messages: dict[str, int] = {}
 _publishers: list[Any] = []
 _held: set[tuple[str, str]] = set()
 _added: set[str] = set()
@@ -160,7 +189,7 @@ def _flush() -> None:
     while _publishers:
         publisher = _publishers.pop()
         _quietly(publisher.wait_for_all_acked, Duration(seconds=_FLUSH_LIMIT_S))
-    if _nodes:
+    if _nodes and _pipe(_SEEN_FD):
         import select
 
         _nodes.clear()
@@ -203,6 +232,7 @@ def _patch_node(module: Any) -> None:
 
     def published(node: Any, publisher: Any) -> None:
         _endpoint("publisher", node, publisher)
+        _quietly(_tell_of_messages, publisher)
         _hold(node, publisher)
 
     def timer_made(node: Any, timer: Any) -> None:
@@ -232,7 +262,14 @@ def _freeze(_context: Any) -> None:
 
 
 def _patch_context(module: Any) -> None:
-    _wrap(module.Context, "init", before=_freeze, after=lambda *_: _report("init"))
+    def made(context: Any, _: Any) -> None:
+        changed = {name for name in _MIDDLEWARE if os.environ.get(name) != _MIDDLEWARE[name]}
+        changed.update(name for name in _of_middleware() if name not in _MIDDLEWARE)
+        if str(context.get_domain_id()) != _MIDDLEWARE.get("ROS_DOMAIN_ID", "0"):
+            changed.add("ROS_DOMAIN_ID")
+        _report("init", changed=" ".join(sorted(changed)))
+
+    _wrap(module.Context, "init", before=_freeze, after=made)
     _wrap(module.Context, "shutdown", before=lambda _: _flush())
     _wrap(module.Context, "try_shutdown", before=lambda _: _flush())
 
@@ -323,7 +360,43 @@ def _wait_in_slices(executor_class: Any) -> None:
     executor_class.spin = spin
 
 
+def _keep_pipes() -> None:
+    """Let os.close() and os.closerange() not see the pipes of the cell.
+
+    Programs close all that they did not open, such as daemons.
+    """
+    close, close_range = os.close, os.closerange
+    kept = sorted((_FD, _SEEN_FD))
+
+    def close_other(fd: int) -> None:
+        if fd in kept:
+            raise OSError(9, "Bad file descriptor")
+        close(fd)
+
+    def close_others(low: int, high: int, /) -> None:
+        for fd in kept:
+            if low <= fd < high:
+                close_range(low, fd)
+                low = fd + 1
+        close_range(low, high)
+
+    # A class that keeps one of them as its own makes no method of it.
+    os.close, os.closerange = staticmethod(close_other), staticmethod(close_others)
+
+
+def _patch_subprocess(module: Any) -> None:
+    make = module.Popen.__init__
+
+    def made(self: Any, *args: Any, **kwargs: Any) -> None:
+        if kwargs.get("close_fds", True) and _pipe(_FD) == _PIPE:
+            kwargs["pass_fds"] = (*kwargs.get("pass_fds", ()), _FD)
+        make(self, *args, **kwargs)
+
+    module.Popen.__init__ = made
+
+
 _PATCHES = {
+    "subprocess": _patch_subprocess,
     "rclpy.experimental.events_executor": _patch_events_executor,
     "rclpy.node": _patch_node,
     "rclpy.context": _patch_context,
@@ -371,6 +444,13 @@ def _run_hidden_sitecustomize() -> None:
             return
 
 
+def _of_middleware() -> dict[str, str]:
+    """Variables of the environment that decide with whom a node meets."""
+    found = {name: os.environ[name] for name in os.environ if name.startswith(_PREFIXES)}
+    return {name: value for name, value in found.items() if name not in _HARMLESS}
+
+
+_MIDDLEWARE = _of_middleware()
 _PIPE = _pipe(_FD)
 # A child that did not inherit the pipe has the variable, but not what it names.
 if _PIPE is not None and str(_PIPE[1]) == os.environ.get("ROSGRADE_TRACER_PIPE"):
@@ -378,6 +458,7 @@ if _PIPE is not None and str(_PIPE[1]) == os.environ.get("ROSGRADE_TRACER_PIPE")
     # Imports make objects and no garbage: until rclpy.init() there is little to look for.
     gc.set_threshold(_IMPORTED)
     _count_more_cpus()
+    _keep_pipes()
     import atexit
 
     atexit.register(_exit)
