@@ -76,7 +76,7 @@ class Limits:
     terminate_s: float = 1.0
     messages: int = 20_000
     message_bytes: int = 4 * 2**20
-    output_bytes: int = 128 * 2**10
+    output_bytes: int = 512 * 2**10
 
 
 @dataclass(frozen=True)
