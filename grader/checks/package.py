@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
@@ -110,11 +112,20 @@ def _modules(dotted: str) -> list[str]:
     return [*(f"{folder}/__init__.py" for folder in folders), f"{folders[-1]}.py"]
 
 
+# Its name is the student's, and stands in a list of rules.
+_FILE = re.compile(r"[\w.-]+(/[\w.-]+)+")
+
+
 class Executable(Parameters):
     """Parameters of package.executable."""
 
     package: PackageName = Field(description="Name in package.xml.")
     executable: str = Field(min_length=1, description="Name that `ros2 run` is given.")
+    remap: bool = Field(
+        False,
+        description="Where the one executable of the package has another name or lies in bin/, run "
+        "that in its place. This check fails, and what requires it is judged all the same.",
+    )
 
 
 @check("package.executable", Subject.SUBMISSION, Executable)
@@ -139,8 +150,22 @@ def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
         ):
             cause = _elsewhere(submission, package, name) or cause
     if cause is not None:
-        return cause.finding(expected)
+        remap = _misnamed(submission, parameters) if parameters.remap else ""
+        return replace(cause.finding(expected), remap=remap)
     return Finding.passed(expected, f"installed in lib/{package}")
+
+
+def _misnamed(submission: SubmissionRecord, parameters: Executable) -> str:
+    """Rule of the one file of the install space that can be run in place of what is missing."""
+    if why_not_built(submission, parameters.package) is not None:
+        return ""
+    package, name = existing_package(submission, parameters.package), parameters.executable
+    if name in package.misplaced_executables:
+        found = [f"bin/{name}"]
+    else:
+        found = [f"lib/{package.name}/{other}" for other in package.executables]
+    runs = len(found) == 1 and name not in package.executables and _FILE.fullmatch(found[0])
+    return f"{found[0]}:=lib/{package.name}/{name}" if runs else ""
 
 
 def _elsewhere(submission: SubmissionRecord, package: str, name: str) -> Cause | None:

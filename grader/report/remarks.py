@@ -20,6 +20,7 @@ def remarks(recording: Recording) -> tuple[str, ...]:
     A limit of the sandbox that was reached is told elsewhere (``Recording.breaches``).
     """
     return (
+        *_put_right(recording),
         *_posing(recording),
         *_elsewhere(recording),
         *_flooding(recording),
@@ -27,6 +28,14 @@ def remarks(recording: Recording) -> tuple[str, ...]:
         *_forging(recording),
         *_borrowing(recording),
     )
+
+
+def _put_right(recording: Recording) -> Iterator[str]:
+    if recording.remaps:
+        yield (
+            f"wrong names were put right in this run, so that everything else could be judged: "
+            f"{codes(recording.remaps)}"
+        )
 
 
 def _posing(recording: Recording) -> Iterator[str]:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
@@ -230,7 +231,8 @@ class Runner:
             underlays: Install spaces of ours that the submission was built with.
             type_support: Install spaces of ours with interfaces that the probe needs.
             alone: Let no other cell of ours run meanwhile.
-            remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right.
+            remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right; of a file of
+                the install space, without a slash in front.
 
         Raises:
             GraderFault: The cell failed, through no fault of the student's.
@@ -355,13 +357,16 @@ class Runner:
         scratch.mkdir()
         values = draw_values(scenario, seed)
         ros = replace(self.ros, underlays=underlays or self.ros.underlays)
-        names = dict(rule.split(":=") for rule in remaps)
+        rules = [rule.split(":=") for rule in remaps]
+        topics = {old: new for old, new in rules if old.startswith("/")}
+        files = {new: install / old for old, new in rules if not old.startswith("/")}
         commands = tuple(
             self.command(
-                launch.model_copy(update={"remap": {**launch.remap, **names}}),
+                launch.model_copy(update={"remap": {**launch.remap, **topics}}),
                 assignment.packages[0].name,
                 install,
                 values,
+                files,
             )
             for launch in scenario.launch
         )
@@ -410,7 +415,12 @@ class Runner:
         return enclose(order, folder, sandbox, ros, install, limits)
 
     def command(
-        self, launch: Launch, default_package: str, install: Path, values: dict[str, float]
+        self,
+        launch: Launch,
+        default_package: str,
+        install: Path,
+        values: dict[str, float],
+        files: Mapping[str, Path] = MappingProxyType({}),
     ) -> Command:
         """What to execute for a launch.
 
@@ -419,23 +429,24 @@ class Runner:
             default_package: Its package, where it names none.
             install: The submission's install space.
             values: Random values of the scenario, for parameters.
+            files: What to execute in place of a file of the install space that is not there.
         """
         package = launch.package or default_package
         if launch.executable is None:
             program = launch_file_program(self.ros, package, launch.program)
         else:
-            program = self._program(install / "lib" / package, launch.executable)
+            place = f"lib/{package}/{launch.executable}"
+            program = self._program(files.get(place, install / place))
         return Command(
             name=f"{package}/{launch.program}", argv=(*program, *ros_arguments(launch, values))
         )
 
-    def _program(self, folder: Path, executable: str) -> tuple[str, ...]:
+    def _program(self, file: Path) -> tuple[str, ...]:
         """What `ros2 run` would execute.
 
         A Python script is given to the interpreter by name, because its first line cannot
         hold a path with a space in it.
         """
-        file = folder / executable
         try:
             with file.open("rb") as stream:
                 first = stream.readline(256)

@@ -337,6 +337,22 @@ class TestExecutable:
         assert finding.status is Status.PASSED
         assert finding.expected == "the executable `bot_pub`, for `ros2 run bot_publisher bot_pub`"
 
+    @pytest.mark.parametrize(
+        ("there", "rule"),
+        [
+            ({"executables": ("bot",)}, "lib/bot_publisher/bot:=lib/bot_publisher/bot_pub"),
+            ({"misplaced_executables": ("bot_pub",)}, "bin/bot_pub:=lib/bot_publisher/bot_pub"),
+            ({"executables": ("bot", "other")}, ""),
+            ({"executables": ("b t",)}, ""),
+            ({}, ""),
+        ],
+    )
+    def test_the_one_program_of_a_package_is_run_in_place_of_what_is_missing(self, there, rule):
+        record = submission(package(**{"executables": (), **there}))
+        parameters = {"package": NAME, "executable": "bot_pub"}
+        assert judge("package.executable", record, **parameters, remap=True).remap == rule
+        assert not judge("package.executable", record, **parameters).remap
+
     def test_a_script_in_bin_shows_the_lines_of_setup_cfg(self):
         found = self.found(misplaced_executables=("bot_pub",))
         assert "was installed in bin/, where `ros2 run` does not look" in found

@@ -45,6 +45,12 @@ def test_an_ordinary_run_is_not_worth_a_word() -> None:
     assert remarks(run(messages={"/cmd_vel": messages(5000, 500.0)})) == ()
 
 
+def test_a_name_that_was_put_right_is_told() -> None:
+    (said,) = remarks(run(environment={"remaps": "/cmdvel:=/cmd_vel"}))
+    assert said.startswith("wrong names were put right in this run")
+    assert said.endswith("`/cmdvel:=/cmd_vel`")
+
+
 def test_who_writes_to_the_tracer_s_pipe_is_named_once() -> None:
     foreign = Declaration(0, "bot/bot", "foreign", {})
     (said,) = remarks(run(declarations=(foreign, foreign)))
