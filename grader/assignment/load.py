@@ -106,7 +106,10 @@ def find_assignment(name: str | Path, folder: Path | None = None) -> Path:
     if given.name != str(name) or given.suffix:
         raise UsageError(f"{given}: no such file or folder")
     listed = f" There are: {', '.join(known) or 'none'}."
-    raise UsageError(f"no assignment {str(name)!r}." + (did_you_mean(str(name), known) or listed))
+    raise UsageError(
+        f"no assignment {str(name)!r}.{did_you_mean(str(name), known) or listed} "
+        f"One of your own is named by its folder, such as path/to/{name}."
+    )
 
 
 def refuse_swapped(name: str, submission: Path) -> None:

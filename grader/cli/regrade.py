@@ -89,7 +89,8 @@ def _in_class(batch: Ledger, loaded: LoadedAssignment, folder: Path) -> None:
     console = output_console()
     with batch.opened() as ledger:
         rows = list(regrade_class(loaded, ledger, folder))
-        _write(ledger, rows)
+        overview = _write(ledger, rows)
+    _say_where(overview)
     results = [row.done.result for row in rows if row.done.result is not None]
     others = sum(one.assignment.sha256 != loaded.sha256 for one in results)
     if others:
@@ -100,14 +101,19 @@ def _in_class(batch: Ledger, loaded: LoadedAssignment, folder: Path) -> None:
         )
 
 
-def _write(ledger: Ledger, rows: Sequence[Regraded]) -> None:
-    """Write the gradebook and the overview anew, and say where."""
+def _write(ledger: Ledger, rows: Sequence[Regraded]) -> Path:
+    """Write the gradebook and the overview anew; the one until now is kept where it changes."""
     from grader.batch.class_files import GRADES_FILE, write_class
     from grader.batch.ledger import keep_earlier
 
     if any(row.changes for row in rows):
         keep_earlier(ledger.out / GRADES_FILE)
-    overview = write_class([row.done for row in rows], ledger)
+    return write_class([row.done for row in rows], ledger)
+
+
+def _say_where(overview: Path) -> None:
+    from grader.batch.class_files import GRADES_FILE
+
     console = output_console()
     console.print(f"Overview: {overview}", soft_wrap=True)
     console.print(f"Grades: {overview.with_name(GRADES_FILE)}", soft_wrap=True)
@@ -133,7 +139,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
         for row in regrade_class(loaded, ledger):
             rows.append(row)
             progress.advance(row.done.entry.key)
-        _write(ledger, rows)
+        overview = _write(ledger, rows)
     for row in rows:
         for change in row.changes:
             console.print(f"{row.done.entry.key}: {change}", soft_wrap=True)
@@ -162,6 +168,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
             "run them again with `rosgrade batch ... --retry errors`",
             soft_wrap=True,
         )
+    _say_where(overview)
     graded = all(
         not row.problem and (row.done.result is None or row.done.result.graded) for row in rows
     )

@@ -441,7 +441,11 @@ def test_a_submission_in_a_folder_called_like_the_assignment_does_not_hide_it(
     ("name", "said"),
     [
         ("lessen", "no assignment 'lessen'. Did you mean 'lesson'?"),
-        ("xyz", "no assignment 'xyz'. There are: lesson."),
+        (
+            "xyz",
+            "no assignment 'xyz'. There are: lesson. One of your own is named by its folder, "
+            "such as path/to/xyz.",
+        ),
         ("no/such/folder", "no/such/folder: no such file or folder"),
         ("missing.yaml", "missing.yaml: no such file or folder"),
     ],
