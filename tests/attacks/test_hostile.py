@@ -330,9 +330,10 @@ import socket, threading, time
 def hoard():
     kept = []
     while True:
-        kept += socket.socketpair()
-        kept[-1].setblocking(False)
         try:
+            if len(kept) < 200:
+                kept += socket.socketpair()
+                kept[-1].setblocking(False)
             while True:
                 socket.send_fds(kept[-1], [b'x'], [1] * 50)
         except OSError:
@@ -453,8 +454,7 @@ ATTACKS = {
     "memory_in_sockets": Attack(SOCKETS, lost=ALIVE, named=("open files, 1024 are allowed",)),
     "hoards_descriptors_in_flight": Attack(
         at_import=IN_FLIGHT,
-        lost=frozenset({"alive"}),
-        maybe=frozenset({"starts", "messages", "node"}),
+        maybe=frozenset({"alive", "starts", "messages"}),
         named=("more than 64 descriptors on their way between processes",),
     ),
     "hoards_asynchronous_io": Attack(
