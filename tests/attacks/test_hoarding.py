@@ -37,7 +37,8 @@ def bound() -> None:
 def as_a_user(folder: Path) -> list[str]:
     """What to start a program with, so that it runs as no root; nothing where nobody else may."""
     drop = ["setpriv", f"--reuid={USER}", f"--regid={USER}", "--clear-groups"]
-    if os.geteuid() != 0 or subprocess.run([*drop, sys.executable, "-c", ""], check=False).returncode:
+    tried = [*drop, sys.executable, "-c", "import os, sys; os.stat(sys.executable)"]
+    if os.geteuid() != 0 or subprocess.run(tried, capture_output=True, check=False).returncode:
         return []
     for place in (folder, *folder.parents):
         if place.owner() == "root" and place != Path("/tmp"):
