@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import pairwise
-
-import numpy as np
 
 from grader.assignment.unit import format_duration
 from grader.checks.approach import NO_SPEED_M_S, Approach
@@ -32,9 +29,6 @@ _A_LITTLE = 0.25
 _A_LITTLE_RAD = 0.15
 _STRAIGHT_RAD_S = 0.02
 _ASTRAY_RAD = math.radians(30.0)
-# A curve in which every error changes, but no command does.
-_SAME_NS = 5 * NS
-_AT_LIMIT = 0.98
 # So long after it was there a node may see it at the latest: odometry, a timer of 10 Hz, and some
 # of the machine's doing.
 _SEEN_LATE_NS = 300 * NS // 1000
@@ -42,12 +36,6 @@ _SEEN_LATE_NS = 300 * NS // 1000
 _AS_SENT_RAD = 0.06
 # An error of angle that a proportional controller has done away with.
 _EXACTLY_RAD = 3e-3
-# One that turns the long way of an error comes to the goal after that, or after the next one.
-_CIRCLES = 3
-_FEW_COMMANDS = 3
-# A command that only depends on where the robot is goes up and down once in a circle; such a wave
-# and a ramp are correlated by 0.78 at most.
-_FALLING = -0.85
 _YAW_HINT = (
     "Print yaw while it turns: it has to go with the robot, from -pi to pi. A quaternion in ROS is "
     "x, y, z, w; yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z)), and z alone is no angle."
@@ -126,35 +114,20 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
     misread = misread_yaw(run, position_m)
     if misread is not None:
         return Cause(f"{seen}: {misread}", misread.hint, evidence)
-    since = _same_command_since(run)
-    if since is not None:
-        return Cause(
-            f"{seen}: since {recording.since_launch_s(since.time_ns):.2f} s after launch every "
-            f"command is the same, linear.x = {speed(since.command_m_s)} and angular.z = "
-            f"{turn(since.command_rad_s)}, although the robot moves on",
-            "Each odometry takes a command of its own, computed from it. A loop in a callback "
-            "never sees a newer one, and what the constructor computes stays as it is. A command "
-            "that is clamped all the time comes of an error that is too large, as in degrees.",
-            evidence,
-        )
     far = [step for step in truth if run.distance_m(step) > position_m]
-    circles = turns_one_way(far)
-    if circles and not _follows_the_heading(far):
-        return Cause(f"{seen}: {_circling(circles)}", f"{_YAW_HINT} {WRAP_HINT}", evidence)
     detours = list(away(far, run.bearing_error_rad, _ASTRAY_RAD, "the goal"))
-    if detours:
-        times = "once" if len(detours) == 1 else f"{len(detours)} times"
-        return Cause(
-            f"{seen}: on its way it turned away from the goal through half a turn, {times}",
-            f"{WRAP_HINT} {_YAW_HINT}" if len(detours) >= _CIRCLES else WRAP_HINT,
-            evidence,
-        )
     turns = abs(turned_rad(truth)) / math.tau
-    if turns >= 1.5:
+    if detours or turns >= 1.5:
+        times = "once" if len(detours) == 1 else f"{len(detours)} times"
+        turned = (
+            f"on its way it turned away from the goal through half a turn, {times}"
+            if detours
+            else f"it turned {turns:.1f} times around"
+        )
         return Cause(
-            f"{seen}: it turned {turns:.1f} times around",
-            "Does it turn towards the goal? The error is atan2(dy, dx) - yaw in radians, "
-            "normalised to [-pi, pi]; yaw comes from the quaternion.",
+            f"{seen}: {turned}",
+            "Print yaw, the error and the command while it turns. Yaw goes with the robot, from "
+            f"-pi to pi; the error is atan2(dy, dx) - yaw. {WRAP_HINT}",
             evidence,
         )
     if nearest_m <= position_m:
@@ -179,28 +152,12 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
             "the goal it is goal_theta - yaw.",
             evidence,
         )
-    if left_m > began_m and _keeps_a_direction(run):
-        return Cause(
-            f"{seen}, farther than at its start ({metres(began_m)}): it keeps to one direction, "
-            f"{moving}, although the goal is elsewhere by now",
-            "The direction to the goal changes while the robot drives: compute math.atan2(goal_y - "
-            "y, goal_x - x) anew with each odometry, from the position that it tells.",
-            evidence,
-        )
-    if left_m > began_m and _has_turned_its_back(run):
-        return Cause(
-            f"{seen}, farther than at its start ({metres(began_m)}): it drives straight away from "
-            f"it, {moving}, as if half a turn were no error",
-            "The direction is math.atan2(dy, dx) with dx = goal_x - x, not x - goal_x, and so for "
-            "dy; math.atan(dy / dx) is the same for the opposite one. An error is wrapped by whole "
-            "turns, 2 * math.pi, not by math.pi.",
-            evidence,
-        )
     if left_m > began_m:
         return Cause(
             f"{seen}, farther than at its start ({metres(began_m)}), {moving}",
-            "It drives away: look at the sign of the heading error and at atan2(dy, dx), which "
-            "takes y first.",
+            "Print the direction of the goal, yaw and the command while it drives. The direction "
+            "changes with the position: it is atan2(dy, dx), dy first, with dx = goal_x - x, and "
+            "not atan(dy / dx). A positive error turns left.",
             evidence,
         )
     if _weaves(run):
@@ -221,52 +178,6 @@ def _circling(turns: float) -> str:
     return f"it turned {abs(turns):.1f} times around, always to the {side}"
 
 
-def _follows_the_heading(steps: Sequence[Truth]) -> bool:
-    """Whether the turn that is commanded falls as the robot turns left, but for one jump a turn.
-
-    It does where the error is taken from the right yaw and is not wrapped.
-    """
-    commands = [step.command_rad_s for step in steps]
-    if len(set(commands)) < _FEW_COMMANDS:
-        return False
-    return any(
-        np.corrcoef([(step.yaw_rad - cut_rad) % math.tau for step in steps], commands)[0, 1]
-        < _FALLING
-        for cut_rad in (0.0, math.pi)
-    )
-
-
-def _same_command_since(run: Approach) -> Truth | None:
-    """The step from which on one command to drive a curve holds to the end, if it is long ago."""
-    last, scene = run.truth[-1], run.recording.scene
-    if abs(last.command_m_s) <= NO_SPEED_M_S or abs(last.command_rad_s) < _STRAIGHT_RAD_S:
-        return None
-    # At the limit of the robot a command stays the same although the error does not.
-    if scene is not None and abs(last.command_rad_s) > _AT_LIMIT * scene.max_angular_rad_s:
-        return None
-    first = last
-    for step in reversed(run.truth):
-        if (step.command_m_s, step.command_rad_s) != (last.command_m_s, last.command_rad_s):
-            break
-        first = step
-    return first if last.time_ns - first.time_ns >= _SAME_NS else None
-
-
-def _keeps_a_direction(run: Approach) -> bool:
-    """Whether it drives in the direction that the goal had at the start, or has from the origin.
-
-    One that takes half a turn for no error looks straight away from the goal instead.
-    """
-    last, first = run.truth[-1], run.truth[0]
-    if not _drives_straight(last) or abs(run.bearing_error_rad(last)) > math.pi - _EXACTLY_RAD:
-        return False
-    directions = (
-        math.atan2(run.goal.y_m - y_m, run.goal.x_m - x_m)
-        for x_m, y_m in ((first.x_m, first.y_m), (0.0, 0.0))
-    )
-    return any(abs(wrap_angle(item - last.yaw_rad)) < _EXACTLY_RAD for item in directions)
-
-
 def _keeps_the_heading(run: Approach) -> bool:
     """Whether it has turned to the heading of the goal, and drives on with it."""
     last, first = run.truth[-1], run.truth[0]
@@ -279,12 +190,6 @@ def _keeps_the_heading(run: Approach) -> bool:
 
 def _drives_straight(step: Truth) -> bool:
     return step.linear_m_s > NO_SPEED_M_S and abs(step.angular_rad_s) < _STRAIGHT_RAD_S
-
-
-def _has_turned_its_back(run: Approach) -> bool:
-    """Whether the robot drives ahead in the end, without turning, and the goal is right behind."""
-    last = run.truth[-1]
-    return _drives_straight(last) and abs(run.bearing_error_rad(last)) > math.pi - _A_LITTLE_RAD
 
 
 def _weaves(run: Approach) -> bool:

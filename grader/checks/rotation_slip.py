@@ -198,27 +198,12 @@ def _w_first(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
     return lambda rows: formula(rows)[:, [3, 0, 1, 2]]
 
 
-def _w_moved(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
-    """y, z, w, x in the fields x, y, z, w."""
-    return lambda rows: formula(rows)[:, [1, 2, 3, 0]]
-
-
 def _conjugate(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
     return lambda rows: formula(rows) * np.array([-1.0, -1.0, -1.0, 1.0])
 
 
-def _sum_normalized(rows: Rows) -> Rows:
-    with np.errstate(all="ignore"):
-        axis = rows[:, :3] / np.abs(rows[:, :3]).sum(axis=1, keepdims=True)
-    return _turn(axis, _half(rows), _half(rows))
-
-
 def _sine_halved(rows: Rows) -> Rows:
     return np.column_stack((_axis(rows) * 0.5 * np.sin(rows[:, 3:4]), np.cos(_half(rows))))
-
-
-def _sine_and_cosine_halved(rows: Rows) -> Rows:
-    return 0.5 * _turn(_axis(rows), rows[:, 3], rows[:, 3])
 
 
 def _w_without_sign(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
@@ -263,15 +248,9 @@ _AXIS_ANGLE = (
     Slip("the angle is halved twice", _HALF_HINT, _angle_scaled(0.5)),
     Slip("the sine is halved, not the angle: sin(angle) / 2 instead of sin(angle / 2)", _HALF_HINT,
          _sine_halved),
-    Slip("sine and cosine are halved, not the angle: sin(angle) / 2 instead of sin(angle / 2)",
-         _HALF_HINT, _sine_and_cosine_halved),
-    Slip("the axis is divided by the sum of its parts, not by its length", _AXIS_HINT,
-         _sum_normalized),
     Slip("w has lost its sign", _SIGN_HINT, _w_without_sign(_right_quaternion)),
     Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
          _w_first(_right_quaternion)),
-    Slip("the fields are in a wrong order: x, y, z, w hold y, z, w, x", _ORDER_HINT,
-         _w_moved(_right_quaternion)),
     # Before the conjugate: where the angle is negative it gives the same rotation.
     Slip("the angle has lost its sign", "A negative angle turns the other way: leave it negative, "
          "without abs().", _angle_without_sign),
@@ -282,8 +261,6 @@ _AXIS_ANGLE = (
     Slip("the angle is converted to degrees", _RADIANS_HINT, _angle_scaled(180.0 / np.pi)),
     Slip("the first number is taken for the angle",
          "The message holds [x, y, z, angle]: the angle is data[3].", _angle_first),
-    Slip("sine and cosine are exchanged", _HALF_HINT,
-         lambda rows: _turn(_axis(rows), 0.5 * np.pi - _half(rows), 0.5 * np.pi - _half(rows))),
 )  # fmt: skip
 
 
@@ -354,8 +331,6 @@ _RPY = (
     ),
     Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
          _w_first(rotations_of_rpy)),
-    Slip("the fields are in a wrong order: x, y, z, w hold y, z, w, x", _ORDER_HINT,
-         _w_moved(rotations_of_rpy)),
     # Before the conjugate: where w is negative it gives the same rotation.
     Slip("w has lost its sign", _SIGN_HINT, _w_without_sign(rotations_of_rpy)),
     Slip("it is the conjugate, the inverse rotation", _INVERSE_HINT,
@@ -432,8 +407,6 @@ _TO_RPY = (
          rpy_of),
     Slip("the quaternion is read with w first", _ORDER_HINT,
          lambda rows: _right_rpy(rows[:, [1, 2, 3, 0]])),
-    Slip("the quaternion is read in a wrong order: z as w", _ORDER_HINT,
-         lambda rows: _right_rpy(rows[:, [3, 0, 1, 2]])),
     # Before the inverse: where w is negative it gives the same angles.
     Slip("w is read without its sign", _SIGN_HINT,
          lambda rows: _right_rpy(np.column_stack((rows[:, :3], np.abs(rows[:, 3]))))),

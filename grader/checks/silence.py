@@ -17,11 +17,10 @@ from grader.checks.standing_clock import why_time_stands_still
 from grader.checks.topic_absence import why_no_endpoint
 from grader.checks.unanswered import why_never_awaited, why_raised
 from grader.checks.wording import code, codes, counted, listing
-from grader.recording.model import NS, Endpoint, Kind, LogLine, Owner, Recording
+from grader.recording.model import NS, Endpoint, Kind, Owner, Recording
 from grader.submission.record import SourceError
 
 _LOG_LINES = 5
-_LONGEST_QUOTE = 80
 _SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
 ENDED_HINT = (
     "Publish in every call of the callback. Look for a counter or a condition that ends it, for "
@@ -31,7 +30,6 @@ ENDED_HINT = (
 _ENDED_PERIODS = 3.0
 # Share of the observation that the host may take before silence says nothing any more.
 _STARVED = 0.5
-_COMPLAINT_WORDS = ("error", "exception", "traceback", "warn")
 
 
 def why_silent(recording: Recording, topic: str) -> Cause:
@@ -73,7 +71,6 @@ def why_silent(recording: Recording, topic: str) -> Cause:
         or why_time_stands_still(recording, f"no message on {code(topic)}")
         or why_blocked(recording, f"no message on {code(topic)}", nodes, recording.launched_ns)
         or why_never_awaited(recording, f"no message on {code(topic)}")
-        or _prints(recording, topic)
         or _unanswered(recording, topic, asked)
         or _idle(recording, topic)
     )
@@ -307,41 +304,6 @@ def _slow(recording: Recording, topic: str) -> Cause | None:
     )
 
 
-def _prints(recording: Recording, topic: str) -> Cause | None:
-    types = {item.type for item in recording.student_endpoints(Kind.PUBLISHER, topic)}
-    # `print(msg)` writes the class with its fields.
-    words = ["publish", *(f"{name.rpartition('/')[2].lower()}(" for name in types)]
-    about = [line for line in recording.log if _tells_of_publishing(recording, line, words)]
-    if not about:
-        return None
-    return Cause(
-        f"no message on {code(topic)}, although the process prints {code(_short(about[0].text))}: "
-        "printing and logging send nothing",
-        "Call self.publisher.publish(msg) with the message in the callback.",
-        Evidence(
-            moments=(Moment("printed instead", recording.since_launch_s(about[0].time_ns)),),
-            log=tuple(line.text for line in about[:_LOG_LINES]),
-        ),
-    )
-
-
-def _short(line: str) -> str:
-    text = line.strip()
-    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
-
-
-def _tells_of_publishing(recording: Recording, line: LogLine, words: list[str]) -> bool:
-    text = line.text.lower()
-    # Indented lines are code in a traceback, which names publish() too.
-    return (
-        any(word in text for word in words)
-        and line.stream != "rosout"
-        and line.time_ns <= recording.stop_ns
-        and not text[:1].isspace()
-        and not any(word in text for word in _COMPLAINT_WORDS)
-    )
-
-
 def _idle(recording: Recording, topic: str) -> Cause:
     # What it prints after Ctrl+C tells of its end, which any right node may word as a traceback.
     complaints = [
@@ -390,9 +352,10 @@ def _idle(recording: Recording, topic: str) -> Cause:
         return Cause(seen, hint, evidence)
     return Cause(
         seen,
-        "Is publish(msg) reached in the callback? An `except: pass` hides the error that would "
-        "tell why not, a lock that is never free keeps it waiting, timer.cancel() ends it, and "
-        "timer.reset() again and again lets its period never end.",
+        "Is publish(msg) reached in the callback? Printing or logging a message does not send it, "
+        "an `except: pass` hides the error that would tell why not, a lock that is never free "
+        "keeps it waiting, timer.cancel() ends it, and timer.reset() again and again lets its "
+        "period never end.",
         evidence,
     )
 

@@ -238,20 +238,7 @@ class TestSilence:
 
     def test_printing_instead_of_publishing(self):
         log = output("[INFO] [1700000001.2] [bot_publisher]: Publishing 1.0 0.5", time_s=1.2)
-        found = self.found(log=log)
-        assert "although the process prints" in found
-        assert "Publishing 1.0 0.5" in found
-        assert "printing and logging send nothing" in found
-
-    def test_printing_the_message_itself(self):
-        line = "geometry_msgs.msg.Twist(linear=geometry_msgs.msg.Vector3(x=1.0, y=0.0, z=0.0))"
-        found = self.found(log=output(line, stream="stdout", time_s=1.2))
-        assert "the process prints `geometry_msgs.msg.Twist(linear=" in found
-        assert "printing and logging send nothing" in found
-
-    def test_a_traceback_that_names_publish_is_no_print(self):
-        log = output(traceback("KeyError: 'x'", source="self.publisher.publish(msg)"), time_s=1.2)
-        assert "prints" not in self.found(log=log)
+        assert "Printing or logging a message does not send it" in self.found(log=log)
 
     def test_no_timer_at_all(self):
         found = self.found(declarations=declarations(timer_s=None))
