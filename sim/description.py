@@ -22,6 +22,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from grader.assignment.name import topic_name
 from grader.assignment.quantity import (
+    Angle,
     AngularSpeed,
     Duration,
     DurationOrZero,
@@ -32,7 +33,7 @@ from grader.assignment.quantity import (
 )
 from grader.assignment.source import Model, read_source
 from grader.assignment.unit import Dimension
-from sim.coordinates import PoseInPlane, PositiveMetres
+from sim.coordinates import Metres, PoseInPlane, PositiveMetres
 from sim.motion import ORIGIN, Pose
 
 TopicName = Annotated[str, AfterValidator(topic_name)]
@@ -85,6 +86,20 @@ class Drive(Model):
     )
 
 
+class Push(Model):
+    """A push that moves the robot besides its wheels; odometry tells of it like of any motion.
+
+    For scenarios that tell a node which looks where the robot is from one that only counts.
+    """
+
+    after: PositiveMetres = Field(description="Way along its path after which it begins.")
+    ahead: Annotated[float, Metres()] = Field(
+        0.0, description="How far it is pushed ahead; backwards is negative."
+    )
+    turn: Angle = Field(0.0, description="How far it is turned, counter-clockwise.")
+    lasts: Duration = Field(0.3, description="How long the push takes.", validate_default=False)
+
+
 class RobotOptions(Model):
     """The robot and where it starts."""
 
@@ -111,6 +126,7 @@ class RobotOptions(Model):
     drives: tuple[Drive, ...] = Field(
         (), description="Commands that it obeys besides those on its topic; the newest counts."
     )
+    pushes: tuple[Push, ...] = Field((), description="Pushes that it gets on its way.")
 
 
 class LidarOptions(Model):

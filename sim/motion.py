@@ -40,6 +40,10 @@ class Twist:
     linear_m_s: float
     angular_rad_s: float
 
+    def __add__(self, other: Twist) -> Twist:
+        """Both velocities together."""
+        return Twist(self.linear_m_s + other.linear_m_s, self.angular_rad_s + other.angular_rad_s)
+
     @property
     def is_finite(self) -> bool:
         """Whether neither part is NaN or infinite."""

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from sim.description import RobotOptions
+from sim.description import Push, RobotOptions
 from sim.motion import NS, REST, Pose, Twist, integrate
 
 
@@ -73,12 +73,14 @@ class Robot:
         start: Where it starts, at rest, in the world's frame.
         command_timeout_ns: It stops when no command came for so long, or None.
         drives: Commands that it gets by itself, with the simulated time of each, in order.
+        pushes: Pushes that it gets, in order of the way.
     """
 
     model: RobotModel
     start: Pose
     command_timeout_ns: int | None = None
     drives: tuple[tuple[int, Twist], ...] = ()
+    pushes: tuple[Push, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +89,7 @@ class State:
 
     Attributes:
         pose: In the world's frame.
-        twist: The velocity of the step that led here.
+        twist: The velocity of its wheels in the step that led here.
     """
 
     pose: Pose
@@ -158,6 +160,7 @@ def make_robot(options: RobotOptions, start: Pose) -> Robot:
         start,
         None if timeout_s is None else round(timeout_s * NS),
         tuple(sorted(drives, key=lambda drive: drive[0])),
+        tuple(sorted(options.pushes, key=lambda push: push.after)),
     )
 
 

@@ -5,6 +5,7 @@ The same world, options, seed and commands give the same steps, bit by bit.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from enum import Enum
@@ -34,6 +35,8 @@ class EventKind(str, Enum):
     """A command was NaN or infinite; the robot is commanded to stop instead."""
     COMMAND_TIMEOUT = "command_timeout"
     """No command came for the robot's ``command_timeout``; it is commanded to stop."""
+    PUSHED = "pushed"
+    """A push began that moves the robot besides its wheels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +114,12 @@ class Simulation:
         self._scans = _schedule(sensors.lidar)
         self._samples = _schedule(sensors.odometry)
         self._drives = deque(robot.drives)
+        self._pushes = deque(robot.pushes)
+        self._pushed: tuple[int, Twist] = (0, REST)
+        self._way_m = 0.0
         self._index = 0
         self._state = State(robot.start)
+        self._motion = REST
         self._command = REST
         self._commanded_ns: int | None = None
         self._contact: str | None = None
@@ -156,7 +163,7 @@ class Simulation:
             self._obey(command, events)
         self._index += 1
         time_ns = self._index * STEP_NS
-        contact = self._move(time_ns)
+        contact = self._move(time_ns, self._push(time_ns, events))
         if contact != self._contact:
             if self._contact is not None:
                 events.append(Event(EventKind.CONTACT_ENDED, self._contact))
@@ -168,12 +175,12 @@ class Simulation:
         if self._scans is not None and self._scans.is_due(time_ns):
             scan = self.lidar.scan(state.pose, time_ns, self._noise)
         if self._samples is not None and self._samples.is_due(time_ns):
-            sample = self._odometry.sample(time_ns, state.pose, state.twist)
+            sample = self._odometry.sample(time_ns, state.pose, self._motion)
         return Step(
             self._index,
             time_ns,
             state.pose,
-            state.twist,
+            self._motion,
             self._command,
             contact,
             tuple(events),
@@ -202,27 +209,43 @@ class Simulation:
             self._command = REST
             events.append(Event(EventKind.COMMAND_TIMEOUT, f"none for {timeout_ns / NS:g} s"))
 
-    def _move(self, time_ns: int) -> str | None:
+    def _push(self, time_ns: int, events: list[Event]) -> Twist:
+        """The velocity that a push adds in the step that ends at a time."""
+        if self._pushes and self._way_m >= self._pushes[0].after:
+            push = self._pushes.popleft()
+            twist = Twist(push.ahead / push.lasts, push.turn / push.lasts)
+            self._pushed = (time_ns + round(push.lasts * NS), twist)
+            text = f"{push.ahead:g} m ahead, {math.degrees(push.turn):g} degrees to the left"
+            events.append(Event(EventKind.PUSHED, text))
+        until_ns, twist = self._pushed
+        return twist if time_ns < until_ns else REST
+
+    def _move(self, time_ns: int, push: Twist) -> str | None:
         state = self._state
-        twist = velocity(state.twist, self._command, STEP_S, self.robot.model.limits)
+        wheels = velocity(state.twist, self._command, STEP_S, self.robot.model.limits)
+        twist = wheels + push
         linear_m_s, angular_rad_s = twist.linear_m_s, twist.angular_rad_s
         pose = state.pose
         contact = self._contacts.find(pose, linear_m_s, angular_rad_s, STEP_S, time_ns)
+        self._motion = twist
         if twist == REST:
-            if state.twist != REST:
-                self._state = State(pose)
+            if state.twist != wheels:
+                self._state = State(pose, wheels)
             return contact.label
         if contact.share < 1.0:
             # Turning goes on: a circle can turn where it touches.
-            twist = Twist(0.0, angular_rad_s)
+            wheels = Twist(0.0, wheels.angular_rad_s)
+            self._motion = Twist(0.0, angular_rad_s)
             reached = pose
             if contact.share > 0.0:
                 reached = integrate(pose, linear_m_s, angular_rad_s, STEP_S * contact.share)
             turned = integrate(pose, 0.0, angular_rad_s, STEP_S)
-            self._state = State(Pose(reached.x_m, reached.y_m, turned.yaw_rad), twist)
+            self._state = State(Pose(reached.x_m, reached.y_m, turned.yaw_rad), wheels)
         else:
-            self._state = State(integrate(pose, linear_m_s, angular_rad_s, STEP_S), twist)
-        self._odometry.move(linear_m_s * STEP_S * contact.share, angular_rad_s * STEP_S)
+            self._state = State(integrate(pose, linear_m_s, angular_rad_s, STEP_S), wheels)
+        way_m = linear_m_s * STEP_S * contact.share
+        self._way_m += abs(way_m)
+        self._odometry.move(way_m, angular_rad_s * STEP_S)
         return contact.label
 
 

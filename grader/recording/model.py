@@ -400,8 +400,8 @@ class Incident:
 
     Attributes:
         time_ns: When.
-        kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout`` or
-            ``late`` (steps that the host did not let us do in time and that were caught up).
+        kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout``,
+            ``pushed`` or ``late`` (steps that the host did not let us do in time and that were caught up).
         text: For people.
         value: For ``late`` how late in seconds, else None.
     """
