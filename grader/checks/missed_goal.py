@@ -225,7 +225,15 @@ def _wrong_place(run: Approach, position_m: float) -> tuple[str, str] | None:
             math.hypot(last.x_m - x_m, last.y_m - y_m) <= position_m
         ):
             return words
-    return None
+    pushed = next((item for item in run.recording.incidents if item.kind == "pushed"), None)
+    if pushed is None:
+        return None
+    when_s = run.recording.since_launch_s(pushed.time_ns)
+    return (
+        f"it was pushed {when_s:.2f} s after launch, and what it commanded since leads elsewhere",
+        "Compute every command from the newest odometry: what was commanded before does not tell "
+        "where the robot is.",
+    )
 
 
 def why_not_aligned(run: Approach, position_m: float, heading_rad: float) -> Cause | None:

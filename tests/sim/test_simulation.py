@@ -238,3 +238,31 @@ def test_the_start_is_that_of_the_scenario_or_else_of_the_world() -> None:
 def test_a_robot_inside_a_wall_is_refused() -> None:
     with pytest.raises(AssignmentError, match=r"room.yaml:8: boxes\[0\]: a robot with radius"):
         simulation(ROOM, robot={"pose": [0, 1.2, 0]})
+
+
+@pytest.mark.parametrize("drift", [{}, {"slip": "1 mm"}])
+def test_a_push_moves_the_robot_on_its_way_and_odometry_tells_of_it(drift: dict[str, str]) -> None:
+    push = {"after": "20 cm", "ahead": "-10 cm", "turn": "30 deg", "lasts": "500 ms"}
+    ahead = {"robot": {"pushes": [push]}, "odometry": {"drift": drift}}
+    steps = run(simulation(**ahead), 400, lambda i: Twist(0.1, 0.0) if i == 0 else None)
+    pushed = [step.index for step in steps for event in step.events]
+    assert [event.kind for step in steps for event in step.events] == [EventKind.PUSHED]
+    assert steps[pushed[0] - 2].pose.x_m == pytest.approx(0.2, abs=2e-3)
+    during, after = steps[pushed[0] - 1 : pushed[0] + 49], steps[pushed[0] + 49]
+    assert {step.twist for step in during} == {Twist(0.1 - 0.2, math.radians(60.0))}
+    assert after.twist == Twist(0.1, 0.0)
+    assert after.pose.yaw_rad == pytest.approx(math.radians(30.0))
+    samples = [step for step in steps if step.odometry is not None]
+    for step in samples:
+        belief = step.odometry and step.odometry.pose
+        assert belief is not None
+        assert belief.x_m == pytest.approx(step.pose.x_m, abs=0.01)
+        assert belief.yaw_rad == pytest.approx(step.pose.yaw_rad, abs=0.05)
+
+
+def test_a_push_stops_at_a_wall() -> None:
+    world = parse_world("{segments: [[-0.15, -1, -0.15, 1]]}")
+    options = {"robot": {"pushes": [{"after": "1 cm", "ahead": "-50 cm"}]}}
+    steps = run(simulation(world, **options), 200, lambda i: Twist(0.1, 0.0) if i == 0 else None)
+    assert min(step.pose.x_m for step in steps) >= -0.0501
+    assert any(step.contact for step in steps)
