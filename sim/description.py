@@ -140,6 +140,11 @@ class LidarOptions(Model):
     layout: Layout = Field(Layout.FROM_ZERO, description="Where the beams begin.")
     no_return: NoReturn = Field(NoReturn.INF, description="What a beam without distance reports.")
     noise: LengthOrZero = Field(0.0, description="Standard deviation of a measured distance.")
+    intensities: bool = Field(
+        True,
+        description="Whether `intensities` holds a number for each beam, as from the real LDS-01 "
+        "and in Gazebo: less with the distance, 0 without one. Some drivers leave it empty.",
+    )
     pose: PoseInPlane = Field(ORIGIN, description="Where it sits on the robot.")
     frame: str = Field("base_scan", min_length=1, description="`header.frame_id`.")
     starts: DurationOrZero = Field(0.0, description="No scan before this time.")

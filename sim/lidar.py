@@ -28,6 +28,8 @@ Ints = NDArray[np.int64]
 _BEAM_MARGIN = 1e-9
 """In beams: a ray that misses an end by rounding still counts, so that no ray slips through
 the corner of a polygon."""
+_BRIGHTNESS = 2000.0
+"""Intensity at no distance, about as the LDS-01 reports it of a white wall."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,12 @@ class Scan:
 
     time_ns: int
     ranges_m: NDArray[np.float32]
+
+    @property
+    def intensities(self) -> NDArray[np.float32]:
+        """Shape (beams,), without a unit: less with the distance, 0 where there is none."""
+        falling = _BRIGHTNESS / (1.0 + self.ranges_m**2)
+        return np.where(self.ranges_m == 0.0, 0.0, falling).astype(np.float32)
 
 
 class Lidar:

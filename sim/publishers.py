@@ -85,6 +85,7 @@ class ScanPublisher:
     def __init__(self, node: Node, topic: TopicOptions, lidar: Lidar) -> None:
         """Create the publisher."""
         self._message = LaserScan()
+        self._has_intensities = lidar.options.intensities
         self._message.header.frame_id = lidar.options.frame
         self._message.angle_min = lidar.angle_min_rad
         self._message.angle_max = lidar.angle_max_rad
@@ -105,6 +106,8 @@ class ScanPublisher:
         _set_time(self._message.header.stamp, stamp_ns)
         # An array('f') is taken over as it is; a list would be checked number by number.
         self._message.ranges = array("f", scan.ranges_m.tobytes())
+        if self._has_intensities:
+            self._message.intensities = array("f", scan.intensities.tobytes())
         self.publisher.publish(self._message)
 
 

@@ -35,8 +35,8 @@ from grader.recording.model import NS, Recording, Scene, Truth
 
 _LEAST_SHARE = 0.9
 _LEAST_STEPS = 30
-# The simulated robots need a quarter of a second to their full speed.
-_SPEEDING_UP_NS = NS // 2
+# Besides what the robot needs to speed up, a node may bring its commands up in steps.
+_IN_STEPS_S = 0.5
 _WAY_TOLERANCE_M = 2e-3
 _TURN_HINT = "The speed ahead is linear.x, the turn is angular.z."
 _SPEED_HINT = "linear.x is the speed in metres per second."
@@ -63,9 +63,9 @@ class Drives(Parameters):
 def drives(recording: Recording, parameters: Drives) -> Finding:
     """The robot drives ahead at the right speed.
 
-    Judged by the true speed, while nothing is near ahead: after it has sped up, and until it
-    comes to rest for good. The median must be the speed within `tolerance`, and nine tenths of
-    the time must be, too.
+    Judged by the true speed, while nothing is near ahead: after it has sped up (half a second,
+    and what the robot's acceleration needs to that speed), and until it comes to rest for good.
+    The median must be the speed within `tolerance`, and nine tenths of the time must be, too.
 
     Explains a robot that never moved (the process ended, nothing published, commands of zero
     or not-a-number), a factor, a limit of the robot, driving backwards, driving on and off, and
@@ -106,7 +106,8 @@ def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Trut
     # Braking before the final rest is judged where the robot stopped.
     while rest is not None and end > begin and not truth[end - 1].command_m_s:
         end -= 1
-    since_ns = truth[begin].time_ns + _SPEEDING_UP_NS
+    speeding_up_s = _IN_STEPS_S + abs(parameters.speed) / scene.acceleration_m_s2
+    since_ns = truth[begin].time_ns + round(speeding_up_s * NS)
     found = []
     for step in truth[begin:end]:
         if step.contact is not None:

@@ -23,8 +23,10 @@ from grader.checks.wording import counted
 from grader.recording.model import NS, Recording, Truth
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
-# Way that braking and the delay of odometry may still cost after the position is reached.
+# Way that the delay of odometry may still cost after the position is reached: 2 cm of the slowest
+# robot, and as much as a faster one goes in a tenth of a second.
 _RUN_OUT_M = 0.02
+_RUN_OUT_S = 0.09
 _OFF_RAD = 0.5
 _STRAIGHT_RAD_S = 0.01
 _PAUSE_NS = NS // 5
@@ -45,7 +47,8 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     Judged by the commands in force and the true way. Within `position` of the goal the robot
     may drive on towards it, as far as its own tolerance says, and turn on the spot towards it;
     but while it turns away from the goal's position, or once it has done so without driving, it
-    may not drive any more (2 cm are allowed for braking and the delay of odometry).
+    may not drive any more (for the delay of odometry 2 cm are allowed, or what the robot
+    goes in 0.09 s at its full speed).
 
     Explains why the position was not reached, a speed in the second phase, and driving and
     turning by turns.
@@ -63,7 +66,8 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     stray = _stray(run, arrival, parameters.speed)
     evidence = Evidence(plots=(speed_plot(recording), run.distance_plot))
     way = sum(_way_m(before, after) for before, after in stray)
-    if way <= _RUN_OUT_M:
+    fastest = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
+    if way <= max(_RUN_OUT_M, _RUN_OUT_S * fastest):
         return Finding.passed(expected, f"{metres(way)} after it had begun to turn", evidence)
     deeper = why_off_course(recording)
     if deeper is not None:

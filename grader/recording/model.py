@@ -401,7 +401,8 @@ class Incident:
     Attributes:
         time_ns: When.
         kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout``,
-            ``pushed`` or ``late`` (steps that the host did not let us do in time and that were caught up).
+            ``pushed`` or ``late`` (steps that the host did not let us do in time and that were
+            caught up).
         text: For people.
         value: For ``late`` how late in seconds, else None.
     """
@@ -428,6 +429,7 @@ class Scene:
         command_topic: The velocity commands that the robot obeys.
         odometry_topic: Where it tells its odometry.
         scan_topic: Where it tells its scans.
+        acceleration_m_s2: Limit of the robot, speeding up or braking.
     """
 
     radius_m: float
@@ -440,6 +442,7 @@ class Scene:
     command_topic: str = "/cmd_vel"
     odometry_topic: str = "/odom"
     scan_topic: str = "/scan"
+    acceleration_m_s2: float = 1.0
 
 
 @dataclass(frozen=True)

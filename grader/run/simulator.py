@@ -105,6 +105,7 @@ class SimulatedRobot:
             command_topic=self._options.topics.command.topic,
             odometry_topic=self._options.topics.odometry.topic,
             scan_topic=self._options.topics.scan.topic,
+            acceleration_m_s2=robot.limits.acceleration_m_s2,
         )
 
     def on_step(self, step: Step, stamp_ns: int) -> None:

@@ -546,6 +546,7 @@ def scene_of(simulation: Simulation) -> Scene:
         moving=simulation.world.moving,
         began_ns=at(BEGAN_S),
         lidar=simulation.lidar.options.pose,
+        acceleration_m_s2=model.limits.acceleration_m_s2,
     )
 
 

@@ -139,6 +139,15 @@ class TestDrives:
         run = drive(by_front(0.2), world=WALL, seconds=20)
         assert "2 times the expected speed" in failing("motion.drives", run, **DRIVES)
 
+    @pytest.mark.parametrize("acceleration", ["1 m/s^2", "0.4 m/s^2"])
+    def test_the_robot_speeds_up_as_fast_as_it_can(self, acceleration):
+        """However long it needs to its speed: what is commanded is right from the start."""
+        robot = {"max_speed": "1 m/s", "max_acceleration": acceleration}
+        fast = drive(lambda _: (1.0, 0.0), seconds=6, options={"robot": robot})
+        passes("motion.drives", fast, speed="1 m/s")
+        slow = drive(lambda _: (0.8, 0.0), seconds=6, options={"robot": robot})
+        assert "0.8 times" in failing("motion.drives", slow, speed="1 m/s")
+
     def test_limited_by_the_robot(self):
         run = drive(by_front(1.0), world=WALL, seconds=20)
         said = failing("motion.drives", run, **DRIVES)

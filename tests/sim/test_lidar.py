@@ -235,3 +235,11 @@ def test_moving_obstacles_are_seen_where_they_are_at_the_time() -> None:
     assert np.isinf(sensor.cast(ORIGIN, 0)).all()
     assert sensor.cast(ORIGIN, 1_000_000_000)[0] == pytest.approx(2.4)
     assert sensor.cast(ORIGIN, 5_000_000_000)[0] == pytest.approx(2.9)
+
+
+@pytest.mark.parametrize("no_return", list(NoReturn))
+def test_intensities_fall_with_the_distance_and_are_0_without_one(no_return: NoReturn) -> None:
+    sensor = lidar(NEAR_AND_FAR, LidarOptions(no_return=no_return))
+    found = sensor.scan(ORIGIN, 0, np.random.default_rng(0)).intensities
+    assert found[90] > found[180] > 0.0
+    assert not found[[45, 270]].any()

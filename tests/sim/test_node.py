@@ -196,6 +196,7 @@ def test_a_student_drives_and_sees(bench: Bench) -> None:
     taken = truth[scan.header.stamp.sec * NS + scan.header.stamp.nanosec].scan
     assert taken is not None
     assert scan.ranges.tobytes() == taken.ranges_m.tobytes()
+    assert scan.intensities.tobytes() == taken.intensities.tobytes()
     moving = bench.truth.steps[-1]
     assert moving.command == Twist(0.2, 0.5)
     assert moving.pose != Pose(0.0, 0.0, 0.0)
