@@ -11,8 +11,22 @@ A bug is none of these: it keeps its traceback.
 
 from __future__ import annotations
 
+import errno
 from dataclasses import dataclass
 from pathlib import Path
+
+_ROOM = "make room there, or name another place (for the cache: XDG_CACHE_HOME), and grade again"
+_OF_MACHINE = {
+    errno.ENOSPC: ("the disk is full", _ROOM),
+    errno.EDQUOT: ("your disk quota is used up", _ROOM),
+    errno.EFBIG: ("no file may be so large", "raise `ulimit -f` in the shell that grades"),
+    errno.EMFILE: ("too many files are open", "raise `ulimit -n` in the shell that grades"),
+    errno.ENFILE: ("too many files are open", "raise the sysctl fs.file-max"),
+    errno.ENOMEM: ("memory ran out", "grade fewer at once (--jobs)"),
+    errno.EROFS: ("the file system is read-only", "name another place"),
+    errno.EIO: ("the disk cannot be read or written", "look at the system's log"),
+}
+"""What the operating system refuses through no fault of the caller's, and what to do about it."""
 
 
 class RosgradeError(Exception):
@@ -67,3 +81,18 @@ class SubmissionError(RosgradeError):
 
 class GraderFault(RosgradeError):
     """Something of ours or of the machine failed; the submission is not graded."""
+
+
+def machine_fault(error: OSError, place: Path | None = None) -> GraderFault | None:
+    """Say what this machine lacks and what to do about it; None where that is not the reason.
+
+    Args:
+        error: Of the operating system.
+        place: What was written, where the error does not name it.
+    """
+    if error.errno not in _OF_MACHINE:
+        return None
+    what, remedy = _OF_MACHINE[error.errno]
+    named = error.filename2 or error.filename or place
+    where = f" ({named})" if named else ""
+    return GraderFault(f"this machine: {what}{where}; no point is lost by it: {remedy}")

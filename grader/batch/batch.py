@@ -17,7 +17,7 @@ from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.intake import HandedIn
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command
-from grader.errors import GraderFault, RosgradeError, UsageError
+from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
 from grader.nearest import did_you_mean
 from grader.recording.fact import to_json
 from grader.report.facts import Clock
@@ -212,6 +212,8 @@ class Batch:
 
     def _with_fault(self, entry: Entry, error: Exception) -> Entry:
         """Tell on its row why it could not be graded; the others go on."""
+        if isinstance(error, OSError):
+            error = machine_fault(error) or error
         told = str(error).partition("\n")[0]
         if not isinstance(error, RosgradeError):
             told = f"a fault of rosgrade, see {FAULTS_FILE}: {type(error).__name__}"

@@ -15,7 +15,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.batch.reference_run import read_references
 from grader.batch.type_support import TypeSupport
 from grader.checks.finding import Status
-from grader.errors import GraderFault, UsageError
+from grader.errors import GraderFault, UsageError, machine_fault
 from grader.grade import Grade, grade
 from grader.recording.fact import to_json
 from grader.recording.mcap_reader import read_recording
@@ -285,7 +285,8 @@ class Grading:
             raise GraderFault(f"the recording that was just made: {error}") from error
         except OSError as error:
             # A full disk, a folder that somebody removed: it is tried again, and the others go on.
-            raise GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}") from error
+            told = GraderFault(f"this machine: {str(error)[:_LONGEST_WORDS]}")
+            raise machine_fault(error) or told from error
 
 
 def _has_died(recording: Recording) -> bool:

@@ -19,7 +19,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from grader.batch.files import RESULT_FILE
-from grader.errors import RosgradeError, UsageError
+from grader.errors import RosgradeError, UsageError, machine_fault
 from grader.report.files import check_folder, write_whole
 from grader.report.result import read_result
 from grader.report.result_model import Result
@@ -83,7 +83,8 @@ class Ledger:
                 raise UsageError(f"{self.out}: holds something else; name a new folder")
             lock = (self.out / _LOCK).open("w")
         except OSError as error:
-            raise UsageError(f"{self.out}: cannot be written: {error.strerror}") from error
+            told = UsageError(f"{self.out}: cannot be written: {error.strerror}")
+            raise machine_fault(error, self.out) or told from error
         with lock:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

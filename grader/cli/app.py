@@ -33,7 +33,7 @@ from grader.cli import (
 )
 from grader.cli.console import print_error
 from grader.cli.streams import lasting_streams
-from grader.errors import GraderFault, RosgradeError
+from grader.errors import GraderFault, RosgradeError, machine_fault
 
 USAGE = 2
 NOT_GRADED = 3
@@ -108,7 +108,7 @@ def main() -> None:
         sys.exit(NOT_GRADED if isinstance(error, GraderFault) else USAGE)
     except OSError as error:
         # A full disk, too few descriptors, a folder that somebody removed.
-        print_error(f"this machine: {error}")
+        print_error(str(machine_fault(error) or f"this machine: {error}"))
         sys.exit(NOT_GRADED)
     except Exception:
         # A bug of ours must not look as if points were lost.

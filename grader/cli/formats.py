@@ -173,13 +173,14 @@ def _prefix(submission: Path | None, workspace: Path) -> str | None:
 
 
 def _append(file: Path, text: str) -> None:
-    from grader.errors import UsageError
+    from grader.errors import UsageError, machine_fault
 
     try:
         with file.open("a", encoding="utf-8") as stream:
             stream.write(text)
     except OSError as error:
-        raise UsageError(f"{file} cannot be written: {error.strerror}") from error
+        told = UsageError(f"{file} cannot be written: {error.strerror}")
+        raise machine_fault(error, file) or told from error
 
 
 def _write_classroom50(result: Result, folder: Path) -> None:

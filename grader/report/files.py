@@ -10,9 +10,8 @@ import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from grader.errors import GraderFault, UsageError
+from grader.errors import UsageError, machine_fault
 
-_OF_THE_DISK = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 # How JSON, JUnit XML, pages and Markdown of ours begin.
 _WRITTEN = re.compile(
     rb'\{\s*"(schema|score)"|(<\?xml[^>]*>\s*)?<testsuites\b|<!doctype html>|## \S+: ',
@@ -32,7 +31,7 @@ def write_whole(file: Path, content: str | bytes) -> None:
 
     Raises:
         UsageError: It cannot be written there.
-        GraderFault: The disk is full or broken.
+        GraderFault: The disk is full or broken, or files may not be so large.
     """
     data = content.encode() if isinstance(content, str) else content
     # Such as /dev/null or /dev/stdout, which must stay what they are.
@@ -51,8 +50,8 @@ def write_whole(file: Path, content: str | bytes) -> None:
         finally:
             draft.unlink(missing_ok=True)
     except OSError as error:
-        kind = GraderFault if error.errno in _OF_THE_DISK else UsageError
-        raise kind(f"{file} cannot be written: {_why(file, error)}") from error
+        told = UsageError(f"{file} cannot be written: {_why(file, error)}")
+        raise machine_fault(error, file) or told from error
 
 
 def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
@@ -171,4 +170,5 @@ def write_folders(place: Path, files: Mapping[str, str]) -> None:
         finally:
             shutil.rmtree(draft, ignore_errors=True)
     except OSError as error:
-        raise UsageError(f"{error.filename2 or error.filename}: {error.strerror}") from error
+        told = UsageError(f"{error.filename2 or error.filename}: {error.strerror}")
+        raise machine_fault(error) or told from error

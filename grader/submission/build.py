@@ -7,6 +7,7 @@ business of a sandbox around them.
 
 from __future__ import annotations
 
+import errno
 import re
 import shutil
 import signal
@@ -17,7 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from grader.errors import GraderFault
+from grader.errors import GraderFault, machine_fault
 from grader.oom import oom_kills
 from grader.ros import RosInstallation
 from grader.submission import apart, buildlog
@@ -240,9 +241,10 @@ class _Workshop:
         if outcome.status == 0:
             return
         if "No space left on device" in outcome.output:
-            free = min(shutil.disk_usage(path).free for path in (scratch, install.parent))
-            if free < _LEAST_FREE_BYTES:
-                raise GraderFault("the disk is full: the submission could not be built")
+            for place in (scratch, install.parent):
+                full = machine_fault(OSError(errno.ENOSPC, "", str(place)))
+                if full is not None and shutil.disk_usage(place).free < _LEAST_FREE_BYTES:
+                    raise full
 
     def _record(
         self,

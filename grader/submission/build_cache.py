@@ -22,7 +22,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from grader.errors import GraderFault
+from grader.errors import GraderFault, machine_fault
 from grader.resources import check_executable
 from grader.submission.record import BuildRecord
 from grader.tree import remove_tree
@@ -268,4 +268,5 @@ def _usable(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise GraderFault(f"the cache folder {folder} cannot be used: {error}") from error
+        told = GraderFault(f"the cache folder {folder} cannot be used: {error}")
+        raise machine_fault(error, folder) or told from error

@@ -5,6 +5,7 @@ What is handed in here cannot be built, so that nothing needs ROS.
 
 from __future__ import annotations
 
+import errno
 import shutil
 import sys
 from collections.abc import Callable
@@ -196,6 +197,14 @@ def test_the_row_of_what_was_not_graded_says_why() -> None:
     result = make_result(sample.grade, sample.recordings, sample.facts)
     observed = next(c.observed for c in result.checks if c.status is Status.ERROR)
     assert notes([Done(Entry("ana"), result, fresh=True)])["ana"] == f"not graded: {observed}"
+
+
+def test_a_full_disk_is_the_machine_s_and_says_what_to_do(course: Class) -> None:
+    full = OSError(errno.ENOSPC, "No space left on device", "/cache/builds")
+    told = {item.entry.fault for item in course.grade(FailingCrew(full)).values()}
+    (fault,) = told
+    assert fault.startswith("this machine: the disk is full (/cache/builds); no point is lost")
+    assert "make room there" in fault
 
 
 def test_what_could_not_be_graded_is_told_on_the_row_of_its_twin_too(course: Class) -> None:

@@ -47,7 +47,10 @@ def test_a_check_is_done_and_keeps_its_status(tmp_path: Path, redirected: str) -
 @pytest.mark.parametrize(
     ("raised", "said"),
     [
-        ("OSError(28, 'No space left on device')", "rosgrade: error: this machine: [Errno 28]"),
+        (
+            "OSError(28, 'No space')",
+            "rosgrade: error: this machine: the disk is full",
+        ),
         ("KeyError('a bug')", "Traceback"),
     ],
 )

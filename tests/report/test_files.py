@@ -2,6 +2,8 @@
 
 import errno
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -69,7 +71,7 @@ def test_a_full_disk_is_no_wrong_use(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(GraderFault, match=r"result\.json cannot be written: No space left"):
+    with pytest.raises(GraderFault, match=r"the disk is full \(.*result\.json.*\)"):
         write_whole(tmp_path / "result.json", "text")
     assert not list(tmp_path.iterdir())
 
@@ -121,3 +123,16 @@ def test_a_report_is_replaced_whatever_somebody_has_put_in_its_place(tmp_path):
 def test_two_outputs_do_not_take_each_other_s_place(tmp_path):
     with pytest.raises(UsageError, match="is named for two outputs"):
         refuse_inputs([tmp_path / "a", tmp_path / "b" / ".." / "a"], [])
+
+
+def test_a_limit_of_the_shell_is_no_wrong_use(tmp_path: Path) -> None:
+    program = (
+        "import pathlib, resource; from grader.report.files import write_whole; "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10)); "
+        f"write_whole(pathlib.Path({str(tmp_path / 'result.json')!r}), 'x' * 100)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert "GraderFault: this machine: no file may be so large" in ended.stderr
+    assert "raise `ulimit -f`" in ended.stderr
