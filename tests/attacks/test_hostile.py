@@ -489,7 +489,7 @@ ATTACKS = {
     ),
     "claims_a_queue_of_no_depth": Attack(CLAIM, lost=ALIVE, named=("wrote into the channel",)),
     "stops_itself": Attack(
-        "os.kill(os.getpid(), signal.SIGSTOP)", lost=frozenset({"messages", "ends"})
+        "os.kill(os.getpid(), signal.SIGSTOP)", lost=ALIVE, named=("SIGSTOP",)
     ),
     "sleeps": Attack(at_import="time.sleep(1000)", lost=frozenset({"starts"})),
     "leaves_at_once": Attack(at_import="os._exit(0)", lost=frozenset({"starts"})),
@@ -602,22 +602,22 @@ ATTACKS = {
     "build_ends_as_if_killed": Attack(
         at_build="import sys\nif 'install' in sys.argv:\n    sys.exit(137)",
         lost=frozenset({"builds"}),
-        named=("setup.py: colcon could not build this package",),
+        named=("exited with code 137",),
     ),
     "build_speaks_as_cmake": Attack(
         at_build=SPEAK_AS_CMAKE,
         lost=frozenset({"builds"}),
-        named=("setup.py: colcon could not build this package",),
+        named=("setup.py: Could not find",),
     ),
     "build_speaks_as_colcon": Attack(
         at_build=SPEAK_AS_COLCON,
         lost=frozenset({"builds"}),
-        named=("setup.py: colcon could not build this package",),
+        named=("setup.py: Finished",),
     ),
     "build_speaks_without_a_line_end": Attack(
         at_build=SPEAK_UNFINISHED,
         lost=frozenset({"builds"}),
-        named=("setup.py: colcon could not build this package",),
+        named=("setup.py: and no line end",),
     ),
     "build_hides_memory": Attack(
         at_build=HIDDEN_MEMORY.format(mib=1200),
@@ -659,7 +659,7 @@ HONEST = {
     "uses_what_is_not": Attack(
         at_import="import pydantic",
         lost=frozenset({"starts"}),
-        named=("No module named 'pydantic'", "`numpy` and `scipy`; `pydantic` is not among them"),
+        named=("No module named 'pydantic'", "Is `pydantic` spelt right?", "`numpy` and `scipy`"),
     ),
     "does_not_build": Attack(at_build="raise ValueError('a mistake')", lost=frozenset({"builds"})),
 }
