@@ -44,7 +44,8 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     Every ROS package that the Python code imports must be named in package.xml by `depend`,
     `exec_depend`, `build_depend`, `build_export_depend` or `run_depend`, and every package that
     is named there must exist. An import that the code can do without (guarded by `try`)
-    needs no entry.
+    needs no entry. Modules that the code names in none of its files, but imports in a run, count
+    as well.
 
     Explains each missing dependency with the line of the import and the tag to add, one that
     stands under `test_depend` or inside `export` only, and misspelt names.

@@ -17,6 +17,7 @@ from grader.assignment.model import CheckSpec
 from grader.checks.check import Subject
 from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Finding, Status
+from grader.checks.runtime_imports import with_runtime_imports
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding
 from grader.grade.order import dependency_order
 from grader.grade.points import points_for
@@ -56,13 +57,14 @@ def grade(
         ValueError: A requirement does not exist, or the requirements form a circle.
     """
     bound = {item.spec.id: item for item in loaded.checks}
+    known = with_runtime_imports(submission, recordings.values())
     results: dict[str, CheckResult] = {}
     for name in dependency_order({name: item.spec.requires for name, item in bound.items()}):
         roots = _roots(bound[name].spec, results)
         findings = (
             (_skipped([results[root] for root in roots]),)
             if roots
-            else tuple(_findings(bound[name], loaded, submission, recordings, faults))
+            else tuple(_findings(bound[name], loaded, known, recordings, faults))
         )
         put_right = all(_is_put_right(item, recordings) for item in findings)
         results[name] = _result(bound[name], loaded, findings, roots, put_right=put_right)

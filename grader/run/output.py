@@ -27,7 +27,7 @@ _OF_ENDPOINTS = ("publisher", "subscription")
 _KINDS = frozenset(
     {
         *_OF_ENDPOINTS,
-        *("started", "init", "node", "timer", "added", "spin", "published", "held"),
+        *("started", "imported", "init", "node", "timer", "added", "spin", "published", "held"),
         *("leaving", "exiting"),
     }
 )

@@ -5,8 +5,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
+from grader.checks.runtime_imports import with_runtime_imports
 from grader.submission.record import Dependency, Import, SourceError
-from tests.checks.builder import SOURCE, failing, judge, package, submission
+from tests.checks.builder import (
+    INSTALLED,
+    SOURCE,
+    declared,
+    failing,
+    judge,
+    package,
+    recording,
+    submission,
+)
 
 NAME = "bot_publisher"
 RCLPY = Dependency("rclpy", "depend", 10, known=True)
@@ -136,3 +146,32 @@ def test_passes_exactly_when_all_that_is_imported_is_named(imported, named):
     assert (finding.status is Status.PASSED) == (imported <= named)
     for name in imported - named:
         assert f"<depend>{name}</depend>" in finding.hint
+
+
+def imported(module, file=INSTALLED, line=7):
+    return recording(declarations=(declared("imported", module=module, file=file, line=line),))
+
+
+def test_a_module_whose_name_is_put_together_is_known_from_a_run():
+    handed_in = submission(package(dependencies=(RCLPY, GEOMETRY)))
+    known = with_runtime_imports(handed_in, [imported("sensor_msgs")])
+    assert f"{SOURCE}:7 imports `sensor_msgs`" in failing(
+        "package.dependencies", known, package=NAME
+    )
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        # By a library; of no package of ROS; named in the code, and so judged there already.
+        imported("sensor_msgs", "/opt/ros/jazzy/lib/python3.12/site-packages/tf2_ros/buffer.py"),
+        imported("scipy"),
+        imported("geometry_msgs", line=90),
+        # The process itself wrote it.
+        imported(["sensor_msgs"]),
+        imported("sensor_msgs", line="7"),
+    ],
+)
+def test_what_is_not_the_student_s_own_import_needs_no_entry(run):
+    handed_in = submission(package(dependencies=(RCLPY, GEOMETRY)))
+    assert with_runtime_imports(handed_in, [run]) == handed_in

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 from grader.run.environment import TRACER
 
@@ -52,17 +53,49 @@ def test_a_program_that_closes_all_descriptors_and_its_child_are_still_heard() -
     assert lines[0]["pid"] == lines[3]["pid"] != lines[1]["pid"] == lines[2]["pid"]
 
 
-def run_traced(program: str) -> str:
-    """What the tracer says of a program, which must end well."""
+_IMPORTS = """
+import importlib
+import other
+import one
+__import__("two")
+importlib.import_module("th" + "ree")
+exec("import four")
+try:
+    import five
+except ImportError:
+    pass
+importlib.import_module("js" + "on")
+importlib.import_module("other")
+"""
+
+
+def test_what_the_code_itself_imports_is_told_where_it_needs_it(tmp_path: Path) -> None:
+    folder = tmp_path / "install" / "lib" / "package"
+    folder.mkdir(parents=True)
+    for name in ("one", "two", "three", "four", "five"):
+        (folder / f"{name}.py").touch()
+    library = tmp_path / "library"
+    library.mkdir()
+    (library / "other.py").write_text("import needed")
+    (library / "needed.py").touch()
+    (folder / "program").write_text(_IMPORTS)
+    told = run_traced(str(folder / "program"), library)
+    lines = [json.loads(line) for line in told.splitlines()]
+    found = [(line["module"], line["line"]) for line in lines if line["kind"] == "imported"]
+    assert found == [("other", 3), ("one", 4), ("two", 5), ("three", 6), ("four", 7)]
+
+
+def run_traced(program: str, *paths: Path) -> str:
+    """What the tracer says of a program, a file or its text, which must end well."""
     read, write = os.pipe()
     environment = {
         **os.environ,
-        "PYTHONPATH": str(TRACER),
+        "PYTHONPATH": os.pathsep.join(map(str, (TRACER, *paths))),
         "ROSGRADE_TRACER_FD": str(write),
         "ROSGRADE_TRACER_PIPE": str(os.fstat(write).st_ino),
     }
     done = subprocess.run(
-        [sys.executable, "-c", program],
+        [sys.executable, *([] if program.startswith("/") else ["-c"]), program],
         env=environment,
         pass_fds=(write,),
         capture_output=True,

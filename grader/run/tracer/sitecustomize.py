@@ -409,6 +409,7 @@ class _Finder:
 
     @classmethod
     def find_spec(cls, name: str, path: Any = None, target: Any = None) -> Any:
+        _quietly(_note_import, name)
         patch = _PATCHES.get(name)
         if patch is None:
             return None
@@ -427,6 +428,66 @@ class _Finder:
             _quietly(patch, module)
 
         return exec_module
+
+
+def _note_import(name: str) -> None:
+    """Report where the student's own code imports what is not of Python, unless it can fail."""
+    root = name.partition(".")[0]
+    if root in sys.stdlib_module_names or root in _imported or not _INSTALL:
+        return
+    frame = sys._getframe()
+    # Of what is executed from a text, the file is that of the code that executes it.
+    while _passes_on(frame.f_code.co_filename):
+        frame = frame.f_back  # type: ignore[assignment]
+    if frame.f_code.co_filename.startswith(f"{_INSTALL}/"):
+        _imported.add(root)
+        if not _is_guarded(frame):
+            file = frame.f_code.co_filename
+            _report("imported", module=root, file=file, line=frame.f_lineno)
+
+
+def _passes_on(file: str) -> bool:
+    return file == __file__ or file.startswith("<") or "/importlib/" in file
+
+
+def _is_guarded(frame: Any) -> bool:
+    """Whether what a frame executes stands in a `try` or a `with`.
+
+    See "Exception handling table format" in Objects/exception_handling_notes.txt of CPython.
+    """
+    table = iter(getattr(frame.f_code, "co_exceptiontable", b""))
+
+    def number() -> int:
+        byte = next(table)
+        value = byte & 63
+        while byte & 64:
+            byte = next(table)
+            value = value << 6 | byte & 63
+        return value
+
+    try:
+        while True:
+            begin, size, _target, _depth = number(), number(), number(), number()
+            if 2 * begin <= frame.f_lasti < 2 * (begin + size):
+                return True
+    except StopIteration:
+        return False
+
+
+def _importing_module(import_module: Any) -> Any:
+    def imported(name: str, package: Any = None) -> Any:
+        # What is loaded already is not looked for.
+        _quietly(_note_import, name)
+        return import_module(name, package)
+
+    imported.__name__ = imported.__qualname__ = import_module.__name__
+    imported.__module__, imported.__doc__ = "importlib", import_module.__doc__
+    return imported
+
+
+_imported: set[str] = set()
+# As ROS installs programs: PREFIX/lib/PACKAGE/PROGRAM.
+_INSTALL = os.path.dirname(os.path.dirname(os.path.dirname("".join(sys.orig_argv[1:2]))))
 
 
 def _run_hidden_sitecustomize() -> None:
@@ -460,6 +521,9 @@ if _PIPE is not None and str(_PIPE[1]) == os.environ.get("ROSGRADE_TRACER_PIPE")
     _count_more_cpus()
     _keep_pipes()
     import atexit
+    import importlib
+
+    importlib.import_module = _importing_module(importlib.import_module)
 
     atexit.register(_exit)
     _report("started", executable=sys.argv[0] if hasattr(sys, "argv") else "")
