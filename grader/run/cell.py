@@ -134,7 +134,8 @@ class Cell:
         log = sorted((*written, *self._probe.rosout.lines), key=lambda line: line.time_ns)
         disturbance = self._meter.stop()
         processes = self._students.records()
-        found = (clock.fault, shortage.fault(processes, breaches))
+        starved = shortage.fault(processes, breaches)
+        found = (clock.fault, starved or self._students.ended_from_outside(breaches))
         self._faults += [fault for fault in found if fault is not None]
         others = ", ".join(map(str, self._other_domains))
         return Recording(

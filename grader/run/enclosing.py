@@ -24,7 +24,8 @@ from grader.sandbox.sandbox import TREES, Sandbox, hide
 
 _UID = 1000
 _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
-_FILTER, _GUARD, _WORLD, _PASSWD_FILE = "student.bpf", "guard.bpf", "world.yaml", "passwd"
+_FILTER, _GUARD, _UNHEARD = "student.bpf", "guard.bpf", "unheard.bpf"
+_WORLD, _PASSWD_FILE = "world.yaml", "passwd"
 _SYSTEM = "system"
 _MIDDLEWARE = b"RMW_IMPLEMENTATION"
 _READ_BYTES = 2**20
@@ -55,6 +56,7 @@ def enclose(
     }
     shutil.copyfile(sandbox.filter_file, folder / _FILTER)
     shutil.copyfile(sandbox.guard_file, folder / _GUARD)
+    shutil.copyfile(sandbox.unheard_file, folder / _UNHEARD)
     (folder / _PASSWD_FILE).write_text(_PASSWD, encoding="utf-8")
     bubblewrap.copy_system_files(folder / _SYSTEM)
     in_cell = {str(path): str(CELL / place) for path, place in copies.items()}
@@ -83,6 +85,7 @@ def enclose(
             arguments=(*_arguments(sandbox, ros, binds), "--chdir", HOME),
             filter=str(CELL / _FILTER),
             guard=str(CELL / _GUARD),
+            unheard=str(CELL / _UNHEARD),
             calls=sandbox.guarded_calls,
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},

@@ -41,6 +41,7 @@ class Enclosure:
         arguments: Of bubblewrap.
         filter: File with the filter of system calls.
         guard: File with the filter around it, which asks a guard.
+        unheard: File with the one in its place where nobody can listen.
         calls: Numbers of the calls that it asks about.
         limits: What its processes may take.
         folders: Folder inside -> where the cell finds it.
@@ -51,6 +52,7 @@ class Enclosure:
     arguments: tuple[str, ...]
     filter: str
     guard: str
+    unheard: str
     calls: dict[str, int]
     limits: Limits
     folders: dict[str, str]

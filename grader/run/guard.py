@@ -15,12 +15,12 @@ import os
 import select
 import struct
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TypeVar
 
-from grader.sandbox.seccomp import MOST_COUNTED, is_counted, told_of
+from grader.sandbox.seccomp import LIMITING, MOST_COUNTED, can_end, is_counted, told_of
 
 # linux/seccomp.h
 _SET_MODE_FILTER, _NEW_LISTENER = 1, 1 << 3
@@ -29,6 +29,8 @@ _CONTINUE = 1
 # linux/prctl.h
 _PR_SET_NO_NEW_PRIVS = 38
 _INSTRUCTION_BYTES = 8
+_LIMITED_AT_START = 2
+"""Around bubblewrap and within it: see :class:`~grader.run.enclosure.EnclosedProcess`."""
 _MORE, _END = b"+", b"."
 # id, process, flags, number, architecture, instruction, six arguments
 _ASKED = struct.Struct("=QIIiIQ6Q")
@@ -41,20 +43,27 @@ _Started = TypeVar("_Started")
 class Guard:
     """Starts the student's sandboxes, and refuses what is asked of it."""
 
-    def __init__(self, program: bytes, calls: Mapping[str, int]) -> None:
+    def __init__(
+        self, program: bytes, calls: Mapping[str, int], unheard: bytes | None = None
+    ) -> None:
         """Stand guard.
 
         Args:
             program: :func:`grader.sandbox.seccomp.guard_filter`.
             calls: :func:`grader.sandbox.seccomp.guarded_calls`.
+            unheard: The filter where nobody can listen; by default the same.
 
         Raises:
             OSError: The kernel takes no such filter.
         """
         self._names = {number: name for name, number in calls.items()}
         self._starter = ThreadPoolExecutor(1, "starter")
-        listener = self._starter.submit(_install, program, calls["seccomp"]).result()
+        programs = (program, program if unheard is None else unheard)
+        listener = self._starter.submit(_install, programs, calls["seccomp"]).result()
         self._listeners = [] if listener is None else [listener]
+        self._starts = 0
+        self._limited = 0
+        self._ending: set[int] = set()
         self._deeds: list[str] = []
         self._counted = 0
         self._wake_read, self._wake_write = os.pipe()
@@ -62,9 +71,9 @@ class Guard:
         self._thread.start()
 
     @classmethod
-    def from_file(cls, program: Path, calls: Mapping[str, int]) -> Guard:
-        """Read the filter from a file."""
-        return cls(program.read_bytes(), calls)
+    def from_files(cls, program: Path, calls: Mapping[str, int], unheard: Path) -> Guard:
+        """Read the filters from files."""
+        return cls(program.read_bytes(), calls, unheard.read_bytes())
 
     def start(self, start: Callable[[], _Started]) -> _Started:
         """Start something under guard.
@@ -72,6 +81,7 @@ class Guard:
         Raises:
             OSError: It cannot be executed.
         """
+        self._starts += 1
         return self._starter.submit(start).result()
 
     def watch(self, listener: int) -> None:
@@ -82,6 +92,20 @@ class Guard:
         """
         self._listeners.append(listener)
         os.write(self._wake_write, _MORE)
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether it is told of what the student's processes do."""
+        return bool(self._listeners)
+
+    def can_have_ended(self, ours: Collection[int | None]) -> bool:
+        """Whether the student's processes may have killed or stopped one of them themselves.
+
+        Args:
+            ours: Processes that are not the student's.
+        """
+        limited = self._limited > _LIMITED_AT_START * self._starts
+        return bool(self._ending.difference(ours)) or limited or not self.is_heard
 
     @property
     def deeds(self) -> tuple[str, ...]:
@@ -120,7 +144,7 @@ class Guard:
     def _answer(self, listener: int) -> None:
         asked = bytearray(_ASKED.size)
         fcntl.ioctl(listener, _NOTIF_RECV, asked, True)
-        number, _pid, _flags, call, _architecture, _place, *arguments = _ASKED.unpack(asked)
+        number, process, _flags, call, _architecture, _place, *arguments = _ASKED.unpack(asked)
         name = self._names.get(call, f"system call {call}")
         if is_counted(name):
             self._counted += 1
@@ -128,27 +152,33 @@ class Guard:
                 fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, 0, _CONTINUE))
                 return
         deed = told_of(name, arguments)
+        if deed is None and can_end(name, arguments):
+            self._limited += name == LIMITING
+            if name != LIMITING:
+                self._ending.add(process)
+            fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, 0, _CONTINUE))
+            return
         if deed is not None and deed not in self._deeds:
             self._deeds.append(deed)
         fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, -errno.EPERM, 0))
 
 
-def _install(program: bytes, call: int) -> int | None:
-    """Put this thread under the filter.
+def _install(programs: tuple[bytes, bytes], call: int) -> int | None:
+    """Put this thread under a filter: the first, or the second where nobody can listen.
 
     Returns:
         What the kernel asks through. None where somebody around us listens already (a container
-        may): the same calls are then refused, and nobody is told.
+        may): what is asked otherwise is then refused, and nobody is told.
     """
     libc = ctypes.CDLL(None, use_errno=True)
-    code = ctypes.create_string_buffer(program, len(program))
 
     class Filter(ctypes.Structure):
         _fields_ = (("count", ctypes.c_ushort), ("code", ctypes.c_void_p))
 
-    given = Filter(len(program) // _INSTRUCTION_BYTES, ctypes.addressof(code))
     libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
-    for flags in (_NEW_LISTENER, 0):
+    for program, flags in zip(programs, (_NEW_LISTENER, 0), strict=True):
+        code = ctypes.create_string_buffer(program, len(program))
+        given = Filter(len(program) // _INSTRUCTION_BYTES, ctypes.addressof(code))
         done = libc.syscall(call, _SET_MODE_FILTER, flags, ctypes.byref(given))
         if done != -1:
             return done if flags else None

@@ -259,6 +259,7 @@ class Nursery:
             limit_s: What has not ended by then is killed.
         """
         self._socket.close()
+        self._kill_stopped(self._stopped())
         try:
             self._popen.wait(limit_s)
         except subprocess.TimeoutExpired:
@@ -275,12 +276,19 @@ class Nursery:
         """
         before: frozenset[int] = frozenset()
         while not self._closed.wait(_STOPPED_S):
-            pids = (self._popen.pid, *descendants(self._popen.pid))
-            stopped = frozenset(filter(is_stopped, pids))
-            for pid in stopped & before:
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(pid, signal.SIGKILL)
+            stopped = self._stopped()
+            self._kill_stopped(stopped & before)
             before = stopped
+
+    def _stopped(self) -> frozenset[int]:
+        pids = (self._popen.pid, *descendants(self._popen.pid))
+        return frozenset(filter(is_stopped, pids))
+
+    @staticmethod
+    def _kill_stopped(pids: frozenset[int]) -> None:
+        for pid in pids:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
 
     def _kill(self, pid: int) -> None:
         if self._sandbox is None:

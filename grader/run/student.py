@@ -8,12 +8,12 @@ import signal
 import subprocess
 import time
 import types
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from grader.recording.model import NS, Process
+from grader.recording.model import NS, Breach, Process
 from grader.run.descendants import (
     descendants,
     is_init,
@@ -110,7 +110,11 @@ class StudentProcesses:
         self._zygotes = zygotes
         self._guard: Guard | None = None
         if enclosure is not None:
-            self._guard = Guard.from_file(Path(enclosure.guard), enclosure.calls)
+            self._guard = Guard.from_files(
+                Path(enclosure.guard), enclosure.calls, Path(enclosure.unheard)
+            )
+            if not self._guard.is_heard:
+                self._enclosure = replace(enclosure, guard=enclosure.unheard)
         self._running: list[_Running] = []
         self._pids: frozenset[int] = frozenset()
         self._survivors: tuple[str, ...] = ()
@@ -324,6 +328,27 @@ class StudentProcesses:
             and not process.is_ended
             and not process.popen.was_set_up
         )
+
+    def ended_from_outside(self, breaches: Sequence[Breach]) -> str | None:
+        """That something outside of its sandbox killed or stopped a process; None if not.
+
+        Within a sandbox only its own processes can send a signal, and a guard is told of that.
+        Without one, or where they may have done it, it cannot be told who did.
+
+        Args:
+            breaches: Limits that the processes passed, for which they were ended by us.
+        """
+        # A sandbox's own processes end with the status of what was started in it.
+        started = [item.popen for item in self._running if isinstance(item.popen, EnclosedProcess)]
+        ours = {pid for popen in started for pid in (popen.pid, popen.init)}
+        if breaches or self._guard is None or self._guard.can_have_ended(ours):
+            return None
+        for process in self._running:
+            code = process.exit_code
+            if process.stopped_by == "itself" and code in (-signal.SIGKILL, -signal.SIGSTOP):
+                name = signal.Signals(-code).name
+                return f"{process.name} got {name} from outside of its sandbox, during the run"
+        return None
 
     def records(self) -> tuple[Process, ...]:
         """What became of each process; call after :meth:`clean_up`."""

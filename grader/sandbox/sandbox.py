@@ -88,6 +88,11 @@ class Sandbox:
         """A file with the filter that asks the guard of a run."""
         return self._filter_file(guard_filter())
 
+    @property
+    def unheard_file(self) -> Path:
+        """A file with the filter in its place where nobody can listen."""
+        return self._filter_file(guard_filter(heard=False))
+
     @cached_property
     def guarded_calls(self) -> dict[str, int]:
         """Numbers of the calls that the guard is asked about."""

@@ -31,6 +31,26 @@ _UNHEARD_OF = (
 _COUNTED = ("inotify_init", "inotify_init1")
 """Calls that make something of which all that a user runs has a certain number together."""
 MOST_COUNTED = 8
+_ENDING = (signal.SIGKILL, signal.SIGSTOP)
+# RLIMIT_CPU and F_SETSIG: asm-generic/resource.h, linux/fcntl.h. A program may also end with the
+# status by which a shell tells of a signal.
+_RLIMIT_CPU, _F_SETSIG, _SIGNALLED = 0, 10, 128
+LIMITING = "prlimit64"
+"""The call that bounds the CPU time of a process, at the end of which the kernel kills it."""
+_WAYS: tuple[tuple[str, int, tuple[int, ...], int], ...] = (
+    *((name, place, _ENDING, 0xFFFFFFFF) for name, place in _SIGNALLING.items()),
+    ("pidfd_send_signal", 1, _ENDING, 0xFFFFFFFF),
+    ("fcntl", 1, (_F_SETSIG,), 0xFFFFFFFF),
+    ("setrlimit", 0, (_RLIMIT_CPU,), 0xFFFFFFFF),
+    *(
+        (name, 0, tuple(_SIGNALLED + number for number in _ENDING), 0xFF)
+        for name in ("exit", "exit_group")
+    ),
+    # Its signal is in memory, where a filter cannot look.
+    ("timer_create", 0, (0,), 0),
+)
+"""Ways to SIGKILL and SIGSTOP, which nothing can catch, within a sandbox, or to what looks like
+them: a call, the place of an argument, its values, and the bits of it that count."""
 _LEADER = 2
 """What a sandbox is started with; of a build that is colcon."""
 INIT = 1
@@ -126,11 +146,14 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
 
 
 @cache
-def guard_filter() -> bytes:
+def guard_filter(*, heard: bool = True) -> bytes:
     """Assemble the filter around a student's sandbox, which asks a guard before it refuses.
 
     It is in force while bubblewrap makes the sandbox, so it holds only calls that bubblewrap
-    itself does not need.
+    itself does not need, or that the guard lets go on.
+
+    Args:
+        heard: Whether somebody listens. Then it also tells of what :func:`can_end` speaks of.
 
     Raises:
         RuntimeError: libseccomp is not there.
@@ -145,6 +168,13 @@ def guard_filter() -> bytes:
         # Signal 0 only asks whether the process is there.
         _add(rules, seccomp.NOTIFY, name, at_init, seccomp.Arg(place, seccomp.NE, 0))
     _add(rules, seccomp.NOTIFY, "pidfd_open", at_init)
+    if heard:
+        for name, place, values, mask in _WAYS:
+            for value in values:
+                argument = seccomp.Arg(place, seccomp.MASKED_EQ, mask, value)
+                _add(rules, seccomp.NOTIFY, name, argument)
+        of_cpu = seccomp.Arg(1, seccomp.MASKED_EQ, _INT, _RLIMIT_CPU)
+        _add(rules, seccomp.NOTIFY, LIMITING, of_cpu, seccomp.Arg(2, seccomp.NE, 0))
     return _program(rules)
 
 
@@ -152,8 +182,21 @@ def guarded_calls() -> dict[str, int]:
     """The numbers of the calls that :func:`guard_filter` tells of, and of ``seccomp`` itself."""
     from pyseccomp import resolve_syscall, system_arch
 
-    names = (*_AIMED, *_UNHEARD_OF, *_COUNTED, *_SIGNALLING, "pidfd_open", "seccomp")
-    return {name: resolve_syscall(system_arch(), name) for name in names}
+    names = (*_AIMED, *_UNHEARD_OF, *_COUNTED, *_SIGNALLING, "pidfd_open", "seccomp", LIMITING)
+    every = (*names, *(name for name, *_ in _WAYS))
+    return {name: resolve_syscall(system_arch(), name) for name in every}
+
+
+def can_end(name: str, arguments: Sequence[int]) -> bool:
+    """Whether a call can kill or stop a process of the same sandbox, which is allowed.
+
+    Args:
+        name: The call, of which the guard was told.
+        arguments: Its arguments, as the kernel gives them.
+    """
+    return name == LIMITING or any(
+        name == way and arguments[place] & mask in values for way, place, values, mask in _WAYS
+    )
 
 
 def is_counted(name: str) -> bool:

@@ -35,6 +35,7 @@ def enclosure(tmp_path: Path) -> Enclosure:
         ),
         filter=str(sandbox.filter_file),
         guard=str(sandbox.guard_file),
+        unheard=str(sandbox.unheard_file),
         calls=sandbox.guarded_calls,
         limits=Limits(),
         folders={},

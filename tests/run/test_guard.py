@@ -86,3 +86,36 @@ def test_who_stands_guard_is_not_under_it(guard: Guard) -> None:
     # No such command: whoever asks, it comes to nothing.
     assert ctypes.CDLL(None).syscall(CALLS["bpf"], -1, 0, 0) == -1
     assert guard.deeds == ()
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        ("import os; os.kill(os.getpid(), 9)", True),
+        ("import signal; signal.raise_signal(signal.SIGKILL)", True),
+        ("import os, signal; signal.pidfd_send_signal(os.pidfd_open(os.getpid()), 9)", True),
+        ("import os; os._exit(137)", True),
+        (
+            "import resource; resource.setrlimit(resource.RLIMIT_CPU, (1, 1))\nwhile True: pass",
+            True,
+        ),
+        ("import os; os.kill(os.getpid(), 15)", False),
+        ("import fcntl; fcntl.fcntl(0, fcntl.F_GETFD)", False),
+    ],
+)
+def test_every_way_to_kill_a_process_from_within_is_told(
+    guard: Guard, source: str, told: bool
+) -> None:
+    command = [sys.executable, "-S", "-c", source]
+    # As bubblewrap and what is in it are limited.
+    limits = ["prlimit", "--cpu=60", "prlimit", "--cpu=50"]
+    ended = guard.start(lambda: subprocess.run([*limits, *command], check=False))
+    assert (ended.returncode in (-9, 137)) is told
+    assert guard.can_have_ended(()) is told
+
+
+def test_a_signal_from_outside_is_none_of_theirs(guard: Guard) -> None:
+    started = guard.start(lambda: subprocess.Popen(["sleep", "60"]))
+    started.kill()
+    assert started.wait() == -9
+    assert not guard.can_have_ended(())
