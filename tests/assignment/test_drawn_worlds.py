@@ -3,34 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 from grader.assignment.drawing import draw_values, fill_in, world_values
-from grader.assignment.load import load_assignment
+from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.model import Scenario
 from grader.assignment.simulation import read_scenario_world
 from grader.checks.finding import Status
 from grader.recording.model import Recording
+from sim.description import SimulatorOptions
 from sim.motion import Pose, relative, wrap_angle
+from sim.simulation import make_simulation
+from sim.world import World
 from tests.checks.builder import Controller, drive, judge, on_odometry
 from tests.checks.test_motion_goal import Student
 
 SEEDS = range(200)
+BOT_CONTROLLER = load_assignment("bot_controller")
 P_CONTROLLER = load_assignment("p_controller")
+
+
+def worlds(
+    loaded: LoadedAssignment, scenario_id: str
+) -> Iterator[tuple[Scenario, World, dict[str, float]]]:
+    """World and values of a scenario for every seed."""
+    (scenario,) = [one for one in loaded.assignment.scenarios if one.id == scenario_id]
+    for seed in SEEDS:
+        values = draw_values(scenario, seed)
+        file = loaded.folder / str(scenario.world)
+        yield scenario, read_scenario_world(file, world_values(scenario, values)), values
 
 
 def drawn(scenario_id: str) -> Iterator[tuple[Scenario, Pose, Pose, dict[str, Any]]]:
     """Start, goal and parameters of a scenario of p_controller for every seed."""
-    loaded = P_CONTROLLER
-    (scenario,) = [one for one in loaded.assignment.scenarios if one.id == scenario_id]
-    for seed in SEEDS:
-        values = draw_values(scenario, seed)
-        world = read_scenario_world(
-            loaded.folder / str(scenario.world), world_values(scenario, values)
-        )
+    for scenario, world, values in worlds(P_CONTROLLER, scenario_id):
         given = {key: fill_in(it, values) for key, it in scenario.launch[0].parameters.items()}
         goal = Pose(given["goal_x"], given["goal_y"], wrap_angle(given["goal_theta"]))
         yield scenario, world.start, goal, given
@@ -100,3 +110,47 @@ def _counting(student: Student) -> Controller:
         return speed, turn
 
     return on_odometry(control)
+
+
+def front(ranges: list[float]) -> float:
+    return ranges[0]
+
+
+def least_of_a_cone(ranges: list[float]) -> float:
+    return min(*ranges[:6], *ranges[-5:])
+
+
+def mean_without_zeros(ranges: list[float]) -> float:
+    beams = [one for one in (*ranges[:31], *ranges[-30:]) if one]
+    return sum(beams) / len(beams) if beams else 0.0
+
+
+def mean_of_what_was_measured(ranges: list[float]) -> float:
+    return mean_without_zeros([one if math.isfinite(one) else 0.0 for one in ranges])
+
+
+@pytest.mark.parametrize(
+    ("scenario_id", "blind"),
+    [
+        ("ahead", []),
+        ("pole", [least_of_a_cone]),
+        ("blocked", []),
+        ("crossing", [mean_without_zeros, mean_of_what_was_measured]),
+        ("noise", [mean_without_zeros]),
+    ],
+)
+def test_every_obstacle_is_seen_by_the_front_beam_and_missed_by_what_is_wrong(
+    scenario_id: str, blind: list[Callable[[list[float]], float]]
+) -> None:
+    """From 0.18 m before it, standing: what is compared with 0.2 m there, in every drawn world."""
+    for scenario, world, _ in worlds(BOT_CONTROLLER, scenario_id):
+        options = SimulatorOptions(lidar=scenario.lidar)
+        simulation = make_simulation(world, options, seed=1)
+        late_ns = 3_000_000_000
+        ahead_m = simulation.lidar.cast(world.start, late_ns)[0]
+        pose = Pose(max(0.0, ahead_m - 0.18), 0.0, 0.0)
+        noise = np.random.default_rng(1)
+        ranges = [float(one) for one in simulation.lidar.scan(pose, late_ns, noise).ranges_m]
+        assert 0.0 < front(ranges) <= 0.2 + 4 * scenario.lidar.noise
+        for law in blind:
+            assert not 0.0 < law(ranges) <= 0.25, law
