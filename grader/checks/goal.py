@@ -202,8 +202,9 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
         expected,
         f"{seen}; {metres(astray_m)} of it with the goal more than {degrees(_ASTRAY_RAD)} to the "
         "side",
-        "Look at its heading on the way: the larger the angular gain is against the speed, the "
-        "sooner it looks at the goal.",
+        "Look at its heading on the way: does it turn to the goal at once, and by the short way? "
+        "The error atan2(dy, dx) - yaw is wrapped, and its gain is large against that of the "
+        "distance.",
         Evidence(moments=(_farthest(run),), plots=evidence.plots),
     )
 

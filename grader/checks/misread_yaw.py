@@ -18,6 +18,7 @@ _GOOD_R2 = 0.97
 _RIGHT_R2 = 0.9
 # Readings differ by less where the robot hardly turns.
 _TURNED_RAD = 0.5
+_NEARLY_OPPOSITE_DEG = 170
 _FORMULA = "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z))"
 
 
@@ -85,9 +86,13 @@ _READINGS = (
 def _shifted(offset_deg: int) -> Reading:
     """Yaw with something added to it."""
     words = f"about {abs(offset_deg)}° {'more' if offset_deg > 0 else 'less'} than it is"
+    opposite = abs(offset_deg) > _NEARLY_OPPOSITE_DEG
     return Reading(
         f"{words}, or as if so much were taken from the direction of the goal",
-        f"Neither yaw nor math.atan2(dy, dx) needs an offset: {_FORMULA}.",
+        "The direction is atan2(dy, dx) with dx = goal_x - x, and not atan(dy / dx), which is the "
+        "opposite one where dx is negative. An error is wrapped by 2 * pi, not by pi."
+        if opposite
+        else f"Neither yaw nor math.atan2(dy, dx) needs an offset: {_FORMULA}.",
         lambda yaw_rad: yaw_rad + math.radians(offset_deg),
     )
 

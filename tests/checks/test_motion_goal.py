@@ -638,6 +638,7 @@ def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_th
         (lambda yaw: -yaw, "with its sign changed", "Counter-clockwise"),
         (abs, "as if yaw were never negative", "acos loses the sign"),
         (lambda yaw: yaw + 0.35, "as if yaw were about 20° more than it is", "needs an offset"),
+        (lambda yaw: yaw + math.pi, "as if yaw were about 180° more", "not atan(dy / dx)"),
         (lambda yaw: yaw - 1.57, "as if yaw were about 90° less than it is", "needs an offset"),
     ],
 )
