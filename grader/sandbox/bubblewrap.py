@@ -9,6 +9,7 @@ the command goes on as a user that has nothing.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,6 +18,8 @@ from pathlib import Path
 
 UID = 61_000
 """The user that sandboxes run as where rosgrade runs as root: nobody's (systemd, UIDs-GIDs)."""
+_BUILD_UIDS = itertools.cycle(range(UID + 1, UID + 101))
+"""What the kernel counts for a user (see :mod:`grader.sandbox.limits`) is each build's own."""
 PLAIN_ENVIRONMENT = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
 """Of bubblewrap itself: the sandbox's first process shows it to everybody inside."""
 
@@ -139,6 +142,7 @@ def launch(
     last: Sequence[str],
     command: Sequence[str],
     filter_file: Path | None = None,
+    uid: int = UID,
 ) -> list[str]:
     """The whole command line that starts a sandbox from outside of any.
 
@@ -148,6 +152,7 @@ def launch(
         last: Further arguments, in force after the binds.
         command: Run in it.
         filter_file: Filter of system calls, or None.
+        uid: Who it runs as where we are root.
     """
     program = [str(shutil.which("bwrap"))]
     opened: list[str] = []
@@ -167,16 +172,21 @@ def launch(
         *opened,
         *("unshare", "--mount", "--propagation", "private"),
         *("/bin/sh", "-c", _STAGING, "sh", _STAGE, *sources, "--"),
-        *("setpriv", f"--reuid={UID}", f"--regid={UID}", "--clear-groups"),
+        *("setpriv", f"--reuid={uid}", f"--regid={uid}", "--clear-groups"),
         *("--inh-caps=-all", "--bounding-set=-all", "--no-new-privs"),
         *(*program, *arguments, *bound(staged), *last, "--", *command),
     ]
 
 
-def give(path: Path) -> None:
+def build_uid() -> int:
+    """A user that no other sandbox runs as at the moment, where we are root."""
+    return next(_BUILD_UIDS)
+
+
+def give(path: Path, uid: int = UID) -> None:
     """Make a folder with all that is in it the sandbox's own, so that it can write there."""
     if os.geteuid() == 0:
-        _chown(path, UID)
+        _chown(path, uid)
 
 
 def take_back(path: Path) -> None:

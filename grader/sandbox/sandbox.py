@@ -217,10 +217,11 @@ class Sandbox:
                 again afterwards.
             limits: What it may take.
         """
+        uid = bubblewrap.build_uid()
         for folder in folders:
-            bubblewrap.give(folder)
+            bubblewrap.give(folder, uid)
         try:
-            yield BuildRoom(self, ros, tuple(folders), limits)
+            yield BuildRoom(self, ros, tuple(folders), limits, uid)
         finally:
             for folder in folders:
                 bubblewrap.take_back(folder)
@@ -235,6 +236,7 @@ class BuildRoom:
         ros: What it builds with.
         folders: What it may write to.
         limits: What it may take.
+        uid: Who it runs as where we are root.
         environment: Of the process that starts it.
     """
 
@@ -242,6 +244,7 @@ class BuildRoom:
     ros: RosInstallation
     folders: tuple[Path, ...]
     limits: Limits = BUILD
+    uid: int = bubblewrap.UID
     environment: Mapping[str, str] = field(
         default_factory=lambda: dict(bubblewrap.PLAIN_ENVIRONMENT)
     )
@@ -268,7 +271,9 @@ class BuildRoom:
         last = [*hidden, *bubblewrap.HIDDEN_INIT, "--remount-ro", "/", "--remount-ro", "/dev"]
         last += ["--chdir", str(self.folders[0]), *bubblewrap.variables(environment)]
         inner = [*self.limits.prlimit(), "--", *command]
-        return bubblewrap.launch(arguments, binds, last, inner, self.sandbox.build_filter_file)
+        return bubblewrap.launch(
+            arguments, binds, last, inner, self.sandbox.build_filter_file, self.uid
+        )
 
     def excess(self, pid: int) -> str | None:
         """Say which limit a build has passed, or None.

@@ -283,3 +283,18 @@ def test_the_filter_refuses_and_pretends(tmp_path: Path) -> None:
         check=False,
     )
     assert said.stdout.split() == ["True", "True", "True", "0"], said.stderr
+
+
+def test_no_two_builds_and_no_run_are_one_user_where_we_are_root(tmp_path: Path) -> None:
+    sandbox, installation = Sandbox(tmp_path / "cache"), ros.find()
+    folders = [tmp_path / "one", tmp_path / "other"]
+    for folder in folders:
+        folder.mkdir()
+    with (
+        sandbox.build(installation, folders[:1]) as one,
+        sandbox.build(installation, folders[1:]) as other,
+    ):
+        assert len({one.uid, other.uid, bubblewrap.UID}) == 3
+        if os.geteuid() == 0:
+            assert [folder.stat().st_uid for folder in folders] == [one.uid, other.uid]
+            assert f"--reuid={one.uid}" in one.command(["true"], {})
