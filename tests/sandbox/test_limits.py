@@ -70,8 +70,9 @@ def test_a_wrong_limit_is_refused_with_its_reason(written: object, problem: str)
 
 
 def test_the_enclosure_of_an_order_survives_json() -> None:
+    files = ("/cell/x", "/cell/y", "/cell/z")
     enclosure = Enclosure(
-        ("--ro-bind", "/a", "/b"), "/cell/x", "/cell/y", {"bpf": 1}, Limits(), {"/ws/a": "/cell/a"}
+        ("--ro-bind", "/a", "/b"), *files, {"bpf": 1}, Limits(), {"/ws/a": "/cell/a"}
     )
     assert Enclosure.from_dict(json.loads(json.dumps(dataclasses.asdict(enclosure)))) == enclosure
     assert enclosure.outside("/ws/a/lib/x") == Path("/cell/a/lib/x")
