@@ -145,5 +145,5 @@ def test_the_lesson_carries_most_of_the_points(loaded: LoadedAssignment, table: 
     assert share >= SHARE_OF_THE_LESSON, f"the lesson carries {share:.0%}"
 
 
-def test_tables_are_of_assignments_that_exist() -> None:
-    assert {path.stem for path in TABLES.glob("*.yaml")} <= set(list_assignments())
+def test_every_assignment_has_a_table() -> None:
+    assert {path.stem for path in TABLES.glob("*.yaml")} == set(list_assignments())
