@@ -14,8 +14,8 @@ from grader.checks.wording import codes
 from grader.recording.model import NS, Call, Process, Recording
 from grader.submission.record import SourceError
 
-# What was asked for later than this before the end may be unanswered for that reason.
-_ANSWER_NS = NS
+# What had less time for an answer than this may be unanswered for that reason.
+_ANSWER_S = 1.0
 # A node whose callbacks return at once answers a call to its parameter services sooner.
 _SLOW_S = 0.5
 
@@ -29,7 +29,8 @@ HINT = (
 def first_unanswered(recording: Recording, nodes: Collection[str], since_ns: int) -> Call | None:
     """The first call that a blocked node left unanswered; None if it answered one in time.
 
-    A node's parameter services answer only while its executor spins.
+    A node's parameter services answer only while its executor spins. What the machine took from
+    the node is no time for an answer, and so a node that only gets no CPU is never blocked.
 
     Args:
         recording: The run.
@@ -41,7 +42,7 @@ def first_unanswered(recording: Recording, nodes: Collection[str], since_ns: int
         for call in recording.calls
         if call.service.rpartition("/")[0] in nodes
         and not call.error
-        and call.requested_ns <= recording.stop_ns - _ANSWER_NS
+        and _left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
     ]
     unanswered = [call for call in calls if call.answered_ns is None]
     if not unanswered or any((call.answered_ns or 0) >= since_ns for call in calls):
@@ -63,10 +64,14 @@ def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float
     for call in recording.calls:
         if call.service.rpartition("/")[0] in nodes and not call.error:
             end_ns = call.answered_ns or recording.stop_ns
-            taken_s = recording.taken_s(call.requested_ns, end_ns)
-            waits.append((call, (end_ns - call.requested_ns) / NS - taken_s))
+            waits.append((call, _left_s(recording, call.requested_ns, end_ns)))
     waits.sort(key=lambda item: item[1])
     return waits[-2] if len(waits) > 1 else None
+
+
+def _left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
+    """Time without what the machine took of it."""
+    return (end_ns - begin_ns) / NS - recording.taken_s(begin_ns, end_ns)
 
 
 def stuck_callback(recording: Recording) -> SourceError | None:

@@ -16,7 +16,7 @@ class Cause:
         hint: What to try next.
         evidence: Where it can be seen.
         ours: Not the student's fault, or it cannot be told: the finding is an error.
-        disturbed: For a cause of ours: the run is worth repeating.
+        disturbed: The run is worth repeating: the machine has, or may have, a part in it.
     """
 
     observed: str
@@ -29,7 +29,8 @@ class Cause:
         """The finding of a check that expected something else."""
         if self.ours:
             return Finding.error(expected, self.observed, disturbed=self.disturbed, hint=self.hint)
-        return Finding.failed(expected, self.observed, self.hint, self.evidence)
+        found = Finding.failed(expected, self.observed, self.hint, self.evidence)
+        return replace(found, disturbed=self.disturbed)
 
     def after(self, beginning: str) -> Cause:
         """The same cause with something said before it."""

@@ -56,10 +56,9 @@ def judged_goals(
         asked = f" with {fields_words(fields)}" if fields else ""
         if any(has_fields(goal.goal, fields) for goal in goals):
             return Cause(
-                f"the scenario cancels or preempts every goal{asked} of {code(action)}, or none: "
-                "none is of the kind that this check judges",
-                "A goal with cancel_after is judged by action.cancels, one with preempt by "
-                "action.preempts, and what comes to its own end by the others.",
+                f"no goal{asked} that was sent to {code(action)} is one that this check judges",
+                "action.cancels judges goals with cancel_after, action.preempts those with "
+                "preempt, and the other checks those that come to their own end.",
                 ours=True,
             )
         return Cause(f"the probe sent no goal{asked} to {code(action)}", ours=True, disturbed=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from grader.assignment.unit import format_duration
 from grader.checks.blockage import why_blocked, why_never_spun, why_slow
@@ -61,8 +62,10 @@ def why_not_logged(
         sent = f"only {counted(len(wanted), 'message was', 'messages were')} sent on {code(topic)}"
         return why_unsubscribed(recording, topic, sent) or Cause(sent, ours=True, disturbed=True)
     nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
+    begin_ns = recording.carried(topic)[0].stamp_ns
+    blocked = why_blocked(recording, _seen(topic, found), nodes, begin_ns)
     cause = (
-        _disturbed(recording, topic, wanted, needed, decimals, within_ns)
+        _disturbed(recording, topic, wanted, needed, decimals, within_ns, blocked)
         or why_unsubscribed(recording, topic, _seen(topic, found))
         or why_never_spun(
             recording,
@@ -70,7 +73,7 @@ def why_not_logged(
             "QoS matches",
             nodes,
         )
-        or why_blocked(recording, _seen(topic, found), nodes, recording.carried(topic)[0].stamp_ns)
+        or blocked
         or _dropped(recording, topic)
     )
     if cause is not None:
@@ -106,12 +109,15 @@ def _disturbed(
     needed: int,
     decimals: int,
     within_ns: int,
+    blocked: Cause | None,
 ) -> Cause | None:
     begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + within_ns
     taken_s = recording.taken_s(begin_ns, end_ns)
-    starved = taken_s >= _STARVED * (end_ns - begin_ns) / NS
-    if not starved and (len(echoes(recording, wanted, decimals, within_ns, forgive=True)) < needed):
-        return None
+    if len(echoes(recording, wanted, decimals, within_ns, forgive=True)) < needed:
+        if taken_s < _STARVED * (end_ns - begin_ns) / NS:
+            return None
+        if blocked is not None:
+            return replace(blocked, disturbed=True)
     return Cause(
         f"log lines for {code(topic)} are late or missing, but the machine took "
         f"{format_duration(taken_s)} from the process meanwhile",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from grader.assignment.unit import format_duration
 from grader.checks import compatibility, testimony
 from grader.checks.blockage import why_blocked, why_never_spun
@@ -62,15 +64,21 @@ def why_silent(recording: Recording, topic: str) -> Cause:
         return cause_of_death(recording, ended[0]).after(f"no message on {code(topic)}")
     asked = _asked_on(recording, topic)
     nodes = {item.node for item in publishers}
+    seen = f"no message on {code(topic)}"
+    begin_ns = [recording.sent[name][0].stamp_ns for name in asked if recording.sent[name]]
+    blocked = why_blocked(recording, seen, nodes, min(begin_ns, default=recording.launched_ns))
+    starved = _starved(recording, topic)
     return (
-        why_unpublished(recording, topic, f"no message on {code(topic)}")
+        why_unpublished(recording, topic, seen)
         or _undelivered(recording, topic, asked)
         or (_slow(recording, topic) if not asked else None)
-        or _starved(recording, topic)
-        or why_never_spun(recording, f"no message on {code(topic)}", nodes)
-        or why_time_stands_still(recording, f"no message on {code(topic)}")
-        or why_blocked(recording, f"no message on {code(topic)}", nodes, recording.launched_ns)
-        or why_never_awaited(recording, f"no message on {code(topic)}")
+        # A callback that never returns burns what CPU the machine leaves it.
+        or (starved and blocked and replace(blocked, disturbed=True))
+        or starved
+        or why_never_spun(recording, seen, nodes)
+        or why_time_stands_still(recording, seen)
+        or blocked
+        or why_never_awaited(recording, seen)
         or _unanswered(recording, topic, asked)
         or _idle(recording, topic)
     )

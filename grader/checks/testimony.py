@@ -182,8 +182,13 @@ def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
 
 
 def not_in_callback(recording: Recording, topic: str) -> bool:
-    """Whether no executor had called what published the newest message that was told of."""
-    told = [item.data for item in recording.declared("published")]
+    """Whether no executor had called what published the newest message that was told of.
+
+    A last message that stops a robot may well be published by main() after Ctrl+C.
+    """
+    told = [
+        item.data for item in recording.declared("published") if item.time_ns <= recording.stop_ns
+    ]
     newest = [data.get("in_callback") for data in told if _text(data, "topic") == topic][-1:]
     # What an EventsExecutor calls, it calls from C++.
     return newest == [False] and not declares(recording, "spin", "executor", "EventsExecutor")

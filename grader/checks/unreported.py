@@ -90,6 +90,17 @@ def _incomplete(
     recording: Recording, reports: Reports, name: str, at_least: int, evidence: Evidence
 ) -> Cause:
     begun, ended = len(reports.of(name)), len(reports.ended([name]))
+    begin_ns = recording.matched_ns or recording.launched_ns
+    watched_s = (recording.stop_ns - begin_ns) / NS
+    taken_s = recording.taken_s(begin_ns, recording.stop_ns)
+    # With the time that was taken from it, the node may have come to as many as are needed.
+    if taken_s > 0.0 and ended * watched_s >= at_least * (watched_s - taken_s):
+        return Cause(
+            f"{code(name)} ran {counted(ended, 'time')}, but the machine took "
+            f"{format_duration(taken_s)} of {format_duration(watched_s)} from the process",
+            ours=True,
+            disturbed=True,
+        )
     if begun > ended:
         return Cause(
             f"{code(name)} reported {counted(begun, 'start')}, but {ended or 'no'} "
@@ -111,7 +122,6 @@ def _incomplete(
             "the others of its group from running.",
             evidence,
         )
-    watched_s = (recording.stop_ns - (recording.matched_ns or recording.launched_ns)) / NS
     return Cause(
         f"{code(name)} ran only {counted(ended, 'time')} in {format_duration(watched_s)}, of "
         f"{at_least} that are needed",

@@ -98,6 +98,15 @@ class TestResult:
         run = acting(goal(), canceled(time_s=2.0), goal(time_s=3.0, preempted=True, end_s=None))
         assert judge("action.result", run, **RESULT).status is Status.PASSED
 
+    def test_no_goal_of_the_kind_that_is_judged_is_the_author_s_to_mend(self):
+        for run, check in ((acting(canceled()), "result"), (acting(goal()), "cancels")):
+            finding = judge(f"action.{check}", run, **(RESULT if check == "result" else FIB))
+            assert (finding.status, finding.disturbed) == (Status.ERROR, False)
+            assert finding.observed == (
+                "no goal that was sent to `/fibonacci` is one that this check judges"
+            )
+            assert "action.cancels judges goals with cancel_after" in finding.hint
+
     def test_no_server_is_told_by_what_there_is(self):
         run = acting(goal(accepted=None, error="no server"), services=())
         assert "offers no action" in failing("action.result", run, **RESULT)

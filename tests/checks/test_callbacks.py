@@ -294,6 +294,8 @@ class TestRun:
         runs = only(parallel(), "timer_1")[:2]
         assert judged("run", run(*runs), ["timer_1"], at_least=2).status is Status.PASSED
         assert "ran only 2 times" in failed("run", run(*runs), ["timer_1"], at_least=3)
+        starved = run(*runs, disturbance=taken(1.0, 7.0, waited_s=5.0))
+        assert judged("run", starved, ["timer_1"], at_least=3).status is Status.ERROR
 
 
 class TestNearMisses:

@@ -533,6 +533,8 @@ class TestSilence:
         assert "something keeps the executor from coming round" in found
         assert "from 1.50 s after launch on the node's parameter service answers no call" in found
         assert "`while True`" in found
+        busy = taken(1.0, 4.0, waited_s=2.0)
+        assert "coming round" in front(lines("1.37 -0.62", [1.0]), calls=calls, disturbance=busy)
 
     def test_an_executor_that_answers_is_not_blocked(self):
         calls = (call(1.5, None, of=BOT), call(3.2, of=BOT))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from grader.checks.finding import Status
 from grader.recording.model import Kind
 from tests.checks.builder import (
     NODE,
@@ -15,12 +16,14 @@ from tests.checks.builder import (
     endpoint,
     every,
     failing,
+    judge,
     output,
     process,
     reader,
     recording,
     sent,
     stimulus,
+    taken,
     traceback,
 )
 
@@ -122,6 +125,21 @@ class TestNotAnswered:
         found = why(asked(listener(), times_s=every(0.3, 5), calls=calls))
         assert "something keeps the executor from coming round" in found
         assert "`while True`, time.sleep() or input()" in found
+
+    def test_a_callback_that_burns_a_cpu_is_the_student_s_on_a_busy_machine_too(self):
+        busy = taken(0.4, 4.4, waited_s=2.5)
+        calls = (call(0.2), *(call(0.5 * n, None) for n in range(2, 9)))
+        run = asked(listener(), times_s=every(0.3, 5), calls=calls, disturbance=busy)
+        assert "something keeps the executor from coming round" in why(run)
+        # It is run again all the same, and counts if it happens twice.
+        assert judge("messages.count", run, topic="/cmd_vel", at_least=1).disturbed
+
+    def test_a_node_that_got_no_cpu_is_not_blocked(self):
+        calls = tuple(call(0.5 * n, None) for n in range(2, 9))
+        starved = taken(0.4, 4.4, waited_s=3.2)
+        run = asked(listener(), times_s=every(0.3, 5), calls=calls, disturbance=starved)
+        finding = judge("messages.count", run, topic="/cmd_vel", at_least=1)
+        assert (finding.status, finding.disturbed) == (Status.ERROR, True)
 
     def test_spin_that_was_never_called(self):
         run = asked(

@@ -66,6 +66,9 @@ def test_a_timer_beside_the_thread_that_publishes_earns_nothing():
     assert "outside of every callback: a thread or a loop calls publish()" in found
     first_in_constructor = loop(timer(0.3), *told[::-1])
     assert judge("executor.timer", first_in_constructor, **ASKED).status is Status.PASSED
+    at_the_end = declared("published", 4.55, topic="/cmd_vel", number=4, in_callback=False)
+    stopped = loop(timer(0.3), *told[::-1], at_the_end)
+    assert judge("executor.timer", stopped, **ASKED).status is Status.PASSED
     events = declared("spin", 0.5, executor="EventsExecutor", threads=1)
     run = loop(timer(0.3), *told, events)
     assert judge("executor.timer", run, **ASKED).status is Status.PASSED
