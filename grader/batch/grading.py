@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -204,19 +204,20 @@ class Grading:
         recordings: dict[str, Recording] = {}
         again = [scenario.id for scenario in self._scenarios] if prepared.install else []
         alone: list[str] = []
-        remaps: frozenset[str] = frozenset()
+        remaps = {scenario.id: frozenset[str]() for scenario in self._scenarios}
         first = 1
         for attempt in range(1, MOST_RUNS + 1):
-            run = partial(self._run, prepared, folder, sorted(remaps))
+            run = partial(self._run, prepared, folder, remaps)
             self._run_all(run, again, recordings, faults, alone=False)
             self._run_all(run, alone, recordings, faults, alone=True)
             runs.update(dict.fromkeys((*again, *alone), attempt))
             result = grade(self._loaded, prepared.record, recordings, faults)
             if not result.full_points:
                 check_there(recordings)
-            if attempt < MOST_RUNS and not result.remaps <= remaps:
-                remaps |= result.remaps
-                again, alone, first = [one.id for one in self._scenarios], [], attempt + 1
+            renamed = [name for name, known in remaps.items() if not result.remaps[name] <= known]
+            if attempt < MOST_RUNS and renamed:
+                remaps = {name: known | result.remaps[name] for name, known in remaps.items()}
+                again, alone, first = renamed, [], attempt + 1
                 continue
             alone = sorted(
                 set(result.disturbed_scenarios(Status.ERROR))
@@ -260,7 +261,12 @@ class Grading:
                 raise
 
     def _run(
-        self, prepared: Prepared, folder: Path, remaps: Sequence[str], name: str, alone: bool
+        self,
+        prepared: Prepared,
+        folder: Path,
+        remaps: Mapping[str, frozenset[str]],
+        name: str,
+        alone: bool,
     ) -> Recording:
         assert prepared.install is not None
         assignment = self._loaded.assignment
@@ -278,7 +284,7 @@ class Grading:
                 underlays=prepared.underlays,
                 type_support=self._type_support.prefixes(),
                 alone=alone,
-                remaps=remaps,
+                remaps=sorted(remaps[name]),
             )
             return read_recording(file)
         except UsageError as error:

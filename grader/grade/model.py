@@ -156,14 +156,27 @@ class Grade:
         return self.result(first) if first is not None else None
 
     @property
-    def remaps(self) -> frozenset[str]:
-        """Rules that put right the names that are wrong."""
-        return frozenset(
-            item.finding.remap
+    def remaps(self) -> dict[str, frozenset[str]]:
+        """Rules that put wrong names right, by the scenario that needs them.
+
+        A name that is wrong in one scenario is wrong wherever one of its programs is launched.
+        """
+        programs = {
+            scenario.id: {(launch.package, launch.program) for launch in scenario.launch}
+            for scenario in self.assignment.scenarios
+        }
+        wrong = [
+            (item.finding.remap, programs.get(item.scenario or ""))
             for result in self.results
             for item in result.findings
             if item.finding.remap
-        )
+        ]
+        return {
+            name: frozenset(
+                rule for rule, others in wrong if others is None or not others.isdisjoint(launched)
+            )
+            for name, launched in programs.items()
+        }
 
     def disturbed_scenarios(self, status: Status) -> tuple[str, ...]:
         """Scenarios that are worth repeating alone, because the host disturbed them.

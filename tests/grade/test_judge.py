@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from grader.assignment.model import Launch
 from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Status
 from grader.errors import GraderFault
@@ -370,4 +371,20 @@ def test_what_requires_a_name_is_judged_where_the_run_put_the_name_right(put_rig
     checks = (Told("topic", replace(FAIL, remap=rule)), Told("sent", requires=("topic",)))
     result = judge(*checks, recordings={"listen": run})
     assert statuses(result) == {"topic": "failed", "sent": "passed" if put_right else "skipped"}
-    assert result.remaps == {rule}
+    assert result.remaps == {"listen": {rule}}
+
+
+def test_a_name_is_put_right_only_where_the_program_that_has_it_wrong_is_launched():
+    rule = "/cmdvel:=/cmd_vel"
+    loaded = make_loaded(
+        [Told("topic", replace(FAIL, remap=rule), scenarios=("one",))], ("one", "again", "other")
+    )
+    other = loaded.assignment.scenarios[2].model_copy(
+        update={"launch": (Launch(executable="bot_sub"),)}
+    )
+    scenarios = (*loaded.assignment.scenarios[:2], other)
+    loaded = replace(
+        loaded, assignment=loaded.assignment.model_copy(update={"scenarios": scenarios})
+    )
+    result = grade(loaded, make_submission(), {"one": make_recording("one")})
+    assert result.remaps == {"one": {rule}, "again": {rule}, "other": frozenset()}
