@@ -26,10 +26,10 @@ from grader.checks.goals import (
     evidence,
     judged_goals,
     why_no_result,
-    why_raised_in,
     why_rejected,
 )
 from grader.checks.offered import ACTION, is_offered
+from grader.checks.unanswered import why_raised
 from grader.checks.value import EXACT, NoSuchField
 from grader.checks.wording import code, counted, percent
 from grader.recording.interaction import Goal
@@ -196,7 +196,7 @@ def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf
     if len(found) < parameters.at_least:
         seen = f"the goal ({fields_words(goal.goal)}) gave {counted(len(found), 'message')} of "
         seen += f"feedback and then {goal.status}" if goal.status else "feedback"
-        return why_raised_in(recording, goal, seen) or Cause(
+        return why_raised(recording, seen, goal.sent_ns) or Cause(
             seen,
             "Call goal_handle.publish_feedback(feedback) in the loop of the execute callback.",
             shown,
@@ -222,10 +222,8 @@ def _other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf, rate_h
     late_s = (end_ns - begin_ns) / NS - due_s * (1.0 + parameters.tolerance)
     taken_s = recording.taken_s(begin_ns, end_ns)
     if 0.0 < late_s <= taken_s:
-        return Cause(
-            f"{seen}, but the machine took {format_duration(taken_s)} from the process meanwhile",
-            ours=True,
-            disturbed=True,
+        return Cause.to_repeat(
+            f"{seen}, but the machine took {format_duration(taken_s)} from the process meanwhile"
         )
     times_s = [recording.since_launch_s(item.time_ns) for item in goal.feedback]
     plot = Plot(
@@ -297,7 +295,7 @@ def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> C
     shown = evidence(recording, goal)
     if goal.status != parameters.status:
         seen = f"the goal ({fields_words(goal.goal)}) {goal.status or 'has no status'}"
-        raised = why_raised_in(recording, goal, seen) if goal.status == "aborted" else None
+        raised = why_raised(recording, seen, goal.sent_ns) if goal.status == "aborted" else None
         call = "succeed" if parameters.status == "succeeded" else "abort"
         return raised or Cause(
             seen,

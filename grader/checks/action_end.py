@@ -9,18 +9,17 @@ from grader.assignment.unit import format_duration
 from grader.checks.action import OfGoals, cannot, type_of
 from grader.checks.cause import Cause
 from grader.checks.check import Subject, check
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Finding
 from grader.checks.goals import (
     evidence,
     judged_goals,
-    why_raised_in,
     why_rejected,
     why_server_gone,
 )
 from grader.checks.offered import ACTION
-from grader.checks.unanswered import why_one_cpu, why_taken, why_unanswered
+from grader.checks.unanswered import why_one_cpu, why_raised, why_taken, why_unanswered
 from grader.checks.value import NoSuchField
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
@@ -105,20 +104,18 @@ def _why_not_canceled(recording: Recording, goal: Goal, within_s: float) -> Caus
 def _never_asked(recording: Recording, goal: Goal) -> Cause:
     """The goal was not asked to cancel: it ended too early, or the run did."""
     if goal.result_ns is None:
-        ended = dead(recording)
-        if ended:
-            return cause_of_death(recording, ended[0])
-        return Cause("the run ended before the goal was asked to cancel", ours=True, disturbed=True)
+        late = Cause.to_repeat("the run ended before the goal was asked to cancel")
+        return why_ended(recording) or late
     lasted_s = (goal.result_ns - (goal.answered_ns or goal.sent_ns)) / NS
     if lasted_s > (goal.cancel_after_s or 0.0):
-        return Cause("the probe was too late to ask for it", ours=True, disturbed=True)
+        return Cause.to_repeat("the probe was too late to ask for it")
     return _ended_alone(recording, goal, f"the goal {goal.status} {format_duration(lasted_s)}")
 
 
 def _ended_alone(recording: Recording, goal: Goal, seen: str) -> Cause:
     """The goal came to an end before anybody could end it."""
     what = f"{seen} after it was accepted, before it was to be ended"
-    return why_raised_in(recording, goal, what) or Cause(
+    return why_raised(recording, what, goal.sent_ns) or Cause(
         what,
         "The execute callback returns too early: it must work on the goal step by step, with a "
         "pause between.",
@@ -164,7 +161,9 @@ def _why_other_end(recording: Recording, goal: Goal, within_s: float) -> Cause:
             "goal_handle.canceled() and return the result.",
             shown,
         )
-    raised = why_raised_in(recording, goal, f"the goal {goal.status} instead of being canceled")
+    raised = why_raised(
+        recording, f"the goal {goal.status} instead of being canceled", goal.sent_ns
+    )
     if raised is not None:
         return raised
     if _answered_too_late(goal):
@@ -235,9 +234,7 @@ def _why_goes_on(
     if before.result_ns is not None and before.result_ns < goal.sent_ns:
         late_s = (goal.sent_ns - before.result_ns) / NS
         if recording.taken_s(before.sent_ns, goal.sent_ns) >= late_s:
-            return Cause(
-                "the old goal had ended before the new one was sent", ours=True, disturbed=True
-            )
+            return Cause.to_repeat("the old goal had ended before the new one was sent")
         lasted_s = (before.result_ns - (before.answered_ns or before.sent_ns)) / NS
         return _ended_alone(
             recording, before, f"the old goal {before.status} {format_duration(lasted_s)}"

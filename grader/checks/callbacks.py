@@ -15,7 +15,7 @@ from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.callback_run import Reports, read_reports, spans
 from grader.checks.check import Subject, check
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.delivery import why_not_sent
 from grader.checks.destroyed import why_unsubscribed
 from grader.checks.finding import Evidence, Finding
@@ -142,10 +142,8 @@ def _judge_period(
             f"{format_duration((begins[-1] - begins[0]) / NS)}: too often, and held up by others"
         )
         if gained_s - excused_s <= _GAINED * period_s:
-            return Finding.error(
-                expected,
-                f"{observed}, unless it was the machine that held it up",
-                disturbed=True,
+            return Finding.to_repeat(
+                expected, f"{observed}, unless it was the machine that held it up"
             )
         return Finding.failed(expected, observed, _period_hint(recording, 0.0, period_s), evidence)
     if good and len(reports.ended([callback])) >= parameters.at_least:
@@ -154,10 +152,8 @@ def _judge_period(
         middle_s = median(seconds)
         observed = f"{code(callback)} starts every {format_duration(middle_s)} (median)"
         if judge(forgiven(recording, measured, limits), limits).good:
-            return Finding.error(
-                expected,
-                f"{observed}, but the machine took the time from the process",
-                disturbed=True,
+            return Finding.to_repeat(
+                expected, f"{observed}, but the machine took the time from the process"
             )
         return Finding.failed(
             expected, observed, _period_hint(recording, middle_s, period_s), evidence
@@ -194,13 +190,12 @@ def _by_chance(
     declared_s = {timer.period_s for timer in testimony.timers(recording)}
     if not declared_s or any(judge([period_s], limits).good for period_s in declared_s):
         return None
-    return Finding.error(
+    return Finding.to_repeat(
         _run_words(parameters),
         f"{code(callback)} starts as often as it should, but the executor was never free between "
         f"its starts, and the process declared "
         f"{listing(f'a timer of {format_duration(item)}' for item in sorted(declared_s))}: "
         "its period does not show",
-        disturbed=True,
     )
 
 
@@ -311,17 +306,16 @@ def _judge_messages(
         )
     if ended == len(sent) or (ended >= parameters.at_least and _busy(recording, reports, callback)):
         return None
-    dying = dead(recording)
-    if dying:
-        return cause_of_death(recording, dying[0]).after(observed).finding(expected)
-    destroyed = why_unsubscribed(recording, parameters.stimulus or "", observed, sent[-1].stamp_ns)
-    if destroyed is not None:
-        return destroyed.finding(expected)
+    cause = why_ended(recording, observed) or why_unsubscribed(
+        recording, parameters.stimulus or "", observed, sent[-1].stamp_ns
+    )
+    if cause is not None:
+        return cause.finding(expected)
     work_s = max((item.seconds or 0.0 for item in reports.ended([callback])), default=0.0)
     missing_s = (len(sent) - ended) * work_s
     if recording.taken_s(sent[0].stamp_ns, recording.stop_ns) >= missing_s > 0.0:
-        return Finding.error(
-            expected, f"{observed}, but the machine took the time from the process", disturbed=True
+        return Finding.to_repeat(
+            expected, f"{observed}, but the machine took the time from the process"
         )
     return Finding.failed(
         expected,
@@ -386,10 +380,8 @@ def work(recording: Recording, parameters: Work) -> Finding:
             for value, item in zip(seconds, found, strict=True)
         )
         if middle_s > parameters.duration and excused_s <= parameters.duration + allowed_s:
-            return Finding.error(
-                expected,
-                f"{told[-1]}, but the machine took the time from the process",
-                disturbed=True,
+            return Finding.to_repeat(
+                expected, f"{told[-1]}, but the machine took the time from the process"
             )
         return Finding.failed(
             expected,

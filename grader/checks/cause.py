@@ -25,6 +25,11 @@ class Cause:
     ours: bool = False
     disturbed: bool = False
 
+    @classmethod
+    def to_repeat(cls, observed: str) -> Cause:
+        """The machine's doing, or ours: the run is worth repeating."""
+        return cls(observed, ours=True, disturbed=True)
+
     def finding(self, expected: str) -> Finding:
         """The finding of a check that expected something else."""
         if self.ours:

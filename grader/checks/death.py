@@ -190,6 +190,13 @@ def signal_of(exit_code: int) -> signal.Signals | None:
     return found if exit_code < 0 or found in _SIGNALS else None
 
 
+def why_ended(recording: Recording, seen: str = "") -> Cause | None:
+    """The cause if a process ended early, after what was seen of it; None if none did."""
+    ended = dead(recording)
+    cause = cause_of_death(recording, ended[0]) if ended else None
+    return cause.after(seen) if cause is not None and seen else cause
+
+
 def cause_of_death(recording: Recording, process: Process) -> Cause:
     """Why a process ended early, with its exception and the student's line if there is one.
 

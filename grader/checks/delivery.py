@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from grader.checks import compatibility
 from grader.checks.cause import Cause
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.destroyed import why_unsubscribed
 from grader.checks.finding import Evidence
 from grader.checks.sighting import endpoints_seen
@@ -47,13 +47,10 @@ def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
         (item.vanished_ns or math.inf) > carried[0].stamp_ns for item in subscriptions
     ):
         return None
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0])
-    return why_unsubscribed(recording, topic, "nothing was sent while it was there") or Cause(
-        f"nothing was sent on {code(topic)}, so there was nothing to receive",
-        ours=True,
-        disturbed=True,
+    return (
+        why_ended(recording)
+        or why_unsubscribed(recording, topic, "nothing was sent while it was there")
+        or Cause.to_repeat(f"nothing was sent on {code(topic)}, so there was nothing to receive")
     )
 
 
@@ -64,8 +61,8 @@ def why_not_sent(recording: Recording, topic: str) -> Cause:
         recording: A run in which the probe should have published on the topic.
         topic: Fully qualified topic name.
     """
-    return why_not_delivered(recording, topic) or Cause(
-        f"nothing was sent on {code(topic)}", ours=True, disturbed=True
+    return why_not_delivered(recording, topic) or Cause.to_repeat(
+        f"nothing was sent on {code(topic)}"
     )
 
 

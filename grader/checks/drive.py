@@ -259,11 +259,7 @@ def _too_slow(recording: Recording, seen: str) -> Cause:
         f"average, {format_duration(waited_s)} after the beginning"
     )
     if lost_s > 0.25 * (driven_s + waited_s):
-        return Cause(
-            f"{words}; the machine took {format_duration(lost_s)} from the run",
-            ours=True,
-            disturbed=True,
-        )
+        return Cause.to_repeat(f"{words}; the machine took {format_duration(lost_s)} from the run")
     evidence = Evidence(moments=(until_the_end(recording),), plots=(speed_plot(recording),))
     return Cause(words, _SPEED_HINT, evidence)
 

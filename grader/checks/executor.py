@@ -15,7 +15,7 @@ from grader.checks.blockage import why_not_given
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.concerned import concerned_nodes
-from grader.checks.death import cause_of_death, dead, ended_early
+from grader.checks.death import cause_of_death, ended_early, why_ended
 from grader.checks.doubt import was_held_up
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence, Finding, Moment, Plot
@@ -117,10 +117,8 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
             expected, _summary(groups, parameters), _evidence(recording, groups)
         )
     if all(_excused(recording, group, parameters) for group in bad):
-        return Finding.error(
-            expected,
-            f"{_summary(bad, parameters)}, but the machine took the time from the process",
-            disturbed=True,
+        return Finding.to_repeat(
+            expected, f"{_summary(bad, parameters)}, but the machine took the time from the process"
         )
     worst = max(bad, key=lambda group: len(group.late) / len(group.judged))
     return _blocked(recording, worst, parameters).finding(expected)
@@ -212,10 +210,8 @@ def _judge_median(
         observed = f"{code(group.node)} answered after {format_duration(median_s)} (median)"
         own_s = median(_wait_s(recording, call, excused=True) for call in group.judged)
         if own_s <= allowed_s:
-            return Finding.error(
-                expected,
-                f"{observed}, but the machine took the time from the process",
-                disturbed=True,
+            return Finding.to_repeat(
+                expected, f"{observed}, but the machine took the time from the process"
             )
         return Finding.failed(
             expected,
@@ -293,9 +289,9 @@ def _never_spun(recording: Recording, process: Process | None) -> bool:
 
 def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
     """No call that counts: what the process declared must do."""
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).finding(expected)
+    ended = why_ended(recording)
+    if ended is not None:
+        return ended.finding(expected)
     lacking = [name for name in names if _without_services(recording, name)]
     if lacking:
         # What a process says of itself would be all that there is, and it can say anything.

@@ -204,3 +204,8 @@ class Finding:
     ) -> Finding:
         """Not judged, through no fault of the student's."""
         return cls(Status.ERROR, expected, observed, hint, 0.0, Evidence(), disturbed)
+
+    @classmethod
+    def to_repeat(cls, expected: str, observed: str) -> Finding:
+        """Not judged, by the machine's doing or ours: the run is worth repeating."""
+        return cls.error(expected, observed, disturbed=True)

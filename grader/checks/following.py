@@ -119,11 +119,10 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         return _failure(recording, parameters, made_of, judged, wrong, expected)
     late = [one for one in judged if not made_of.fits(one, one.window[one.excused :])]
     if late:
-        return Finding.error(
+        return Finding.to_repeat(
             expected,
             f"{len(late)} of {counted(len(judged), 'message')} have older values, but the machine "
             "took the time from the process",
-            disturbed=True,
         )
     plots = tuple(_plot(recording, made_of, judged, index) for index in range(len(made_of.fields)))
     seen = f"so it is in all of {counted(len(judged), 'message')}"

@@ -127,10 +127,8 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     lost_s = taken_s(recording, truth[0].time_ns, end.time_ns)
     if lost_s > 0.0 and took_s - lost_s <= parameters.within:
         seen = f"after {format_duration(took_s)}" if rest is not None else "not until the end"
-        return Finding.error(
-            expected,
-            f"{seen}; the machine took up to {format_duration(lost_s)} from the run",
-            disturbed=True,
+        return Finding.to_repeat(
+            expected, f"{seen}; the machine took up to {format_duration(lost_s)} from the run"
         )
     deeper = why_unsteered(recording)
     if deeper is not None:
@@ -232,11 +230,9 @@ def _why_far(run: Approach, seen: str, more_m: float) -> Cause | None:
     # What it drives on without a command, it has to come back.
     if lost_s <= 0.0 or 2.0 * lost_s * fastest < more_m:
         return None
-    return Cause(
+    return Cause.to_repeat(
         f"{seen}; the machine took up to {format_duration(lost_s)} from the run, which may "
-        "explain it",
-        ours=True,
-        disturbed=True,
+        "explain it"
     )
 
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.destroyed import why_destroyed
 from grader.checks.fields import has_fields
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.offered import ACTION, offered, why_not_met, why_not_offered
-from grader.checks.unanswered import why_gone, why_raised, why_taken, why_unanswered
+from grader.checks.unanswered import why_gone, why_taken, why_unanswered
 from grader.checks.wording import code
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
@@ -50,9 +50,9 @@ def judged_goals(
         return Cause(f"no goal could be sent to {code(action)}: {failed.error}", ours=True)
     found = tuple(goal for goal in goals if has_fields(goal.goal, fields) and wanted(goal))
     if not found:
-        ended = dead(recording)
-        if ended:
-            return cause_of_death(recording, ended[0])
+        ended = why_ended(recording)
+        if ended is not None:
+            return ended
         asked = f" with {fields_words(fields)}" if fields else ""
         if any(has_fields(goal.goal, fields) for goal in goals):
             return Cause(
@@ -61,7 +61,7 @@ def judged_goals(
                 "preempt, and the other checks those that come to their own end.",
                 ours=True,
             )
-        return Cause(f"the probe sent no goal{asked} to {code(action)}", ours=True, disturbed=True)
+        return Cause.to_repeat(f"the probe sent no goal{asked} to {code(action)}")
     for goal in found:
         if goal.error:
             return why_not_met(recording, ACTION, action, "could not be sent a goal", goal.sent_ns)
@@ -95,15 +95,6 @@ def why_no_result(recording: Recording, goal: Goal, within_s: float) -> Cause | 
     return why_taken(recording, what, goal.sent_ns, goal.result_ns, within_s) or Cause(
         what, "Look for a sleep that is too long.", evidence(recording, goal)
     )
-
-
-def why_raised_in(recording: Recording, goal: Goal, what: str) -> Cause | None:
-    """An exception that the execute callback of a goal raised, which rclpy catches."""
-    for process in recording.processes:
-        cause = why_raised(recording, what, process, goal.sent_ns)
-        if cause is not None:
-            return cause
-    return None
 
 
 def why_server_gone(recording: Recording, goal: Goal, what: str) -> Cause | None:

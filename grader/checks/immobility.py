@@ -6,7 +6,7 @@ from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.command import Command, command_topic, commands, is_zero
 from grader.checks.compatibility import compatibility_table, refusals
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import cause_of_death, dead, why_ended
 from grader.checks.finding import Evidence, Moment
 from grader.checks.ground import ahead, nearest
 from grader.checks.lateness import taken_s
@@ -44,9 +44,9 @@ def why_not_moved(recording: Recording) -> Cause | None:
     cause = why_not_judged(recording)
     if cause is not None or has_moved(recording.truth):
         return cause
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(_STILL)
+    cause = why_ended(recording, _STILL)
+    if cause is not None:
+        return cause
     sent = commands(recording)
     if not sent:
         topic = command_topic(recording)
@@ -183,10 +183,8 @@ def _in_vain(recording: Recording, sent: tuple[Command, ...]) -> Cause:
     begin_ns = recording.truth[0].time_ns
     lost_s = taken_s(recording, begin_ns, recording.truth[-1].time_ns)
     if left_s < 0.2 and lost_s > 0.0:
-        return Cause(
-            f"{_STILL} until the end, but the machine took {format_duration(lost_s)} from the run",
-            ours=True,
-            disturbed=True,
+        return Cause.to_repeat(
+            f"{_STILL} until the end, but the machine took {format_duration(lost_s)} from the run"
         )
     return Cause(
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "

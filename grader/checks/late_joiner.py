@@ -10,9 +10,10 @@ from pydantic import Field
 from grader.assignment.name import Id, TopicName
 from grader.assignment.unit import format_duration
 from grader.checks import testimony
+from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.compatibility import compatibility_table, refusals
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.destroyed import why_unpublished
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.messages import published
@@ -93,10 +94,9 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
             evidence,
         )
     if not _is_newest(history, before.messages):
-        return Finding.error(
+        return Finding.to_repeat(
             expected,
             f"{_seen(history, before)}, but not the newest ones: some were lost on their way",
-            disturbed=True,
         )
     return _too_few(recording, parameters, join, history, before, evidence, expected)
 
@@ -173,10 +173,7 @@ def _not_judged(
         else f"when it joined, only {counted(number, 'message')} had been published of the "
         f"{needed} that are needed to judge"
     )
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(seen).finding(expected)
-    return Finding.error(expected, seen)
+    return (why_ended(recording, seen) or Cause(seen, ours=True)).finding(expected)
 
 
 def _waited(
@@ -193,9 +190,7 @@ def _waited(
         return Finding.failed(expected, f"{seen}: {made_anew}", _ONE_PUBLISHER_HINT, evidence)
     # With the time that was taken from it, the node may have come to as many as are needed.
     if before.number * span_s > parameters.last * (span_s - taken_s):
-        return Finding.error(
-            expected, f"{seen}; the machine took {format_duration(taken_s)}", disturbed=True
-        )
+        return Finding.to_repeat(expected, f"{seen}; the machine took {format_duration(taken_s)}")
     return Finding.failed(
         expected,
         f"{seen} in {format_duration(span_s)}",
@@ -273,12 +268,11 @@ def _too_few(
             return destroyed.finding(expected)
     taken_s = recording.taken_s(join.joined_ns, recording.stop_ns)
     if join.matched_ns is None and publishers:
-        return Finding.error(
+        return Finding.to_repeat(
             expected,
             f"the late joiner was not matched within "
             f"{format_duration((recording.stop_ns - join.joined_ns) / NS)}"
             + (f"; the machine took {format_duration(taken_s)} meanwhile" if taken_s else ""),
-            disturbed=True,
         )
     depths = [
         queue.depth
@@ -292,11 +286,10 @@ def _too_few(
             expected, f"{_seen(history, before)}: {made_anew}", _ONE_PUBLISHER_HINT, evidence
         )
     if depths and depths[0] >= parameters.last:
-        return Finding.error(
+        return Finding.to_repeat(
             expected,
             f"{_seen(history, before)}, although the publisher's depth is {depths[0]}: the rest "
             "was lost on its way",
-            disturbed=True,
         )
     return Finding.failed(expected, _seen(history, before) + why, _hint(parameters), evidence)
 

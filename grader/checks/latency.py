@@ -145,11 +145,10 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
         len(missing) - len(excusable) <= parameters.unanswered
     ):
         taken_s = recording.taken_s(sent[0].stamp_ns, recording.stop_ns)
-        return Finding.error(
+        return Finding.to_repeat(
             expected,
             f"{_figures(times)}; the machine took up to {format_duration(taken_s)} from the "
             "process meanwhile, which may explain it",
-            disturbed=True,
         )
     evidence = _evidence(recording, found, parameters)
     if len(missing) > parameters.unanswered:

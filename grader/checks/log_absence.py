@@ -8,7 +8,7 @@ from dataclasses import replace
 from grader.assignment.unit import format_duration
 from grader.checks.blockage import why_blocked, why_never_spun, why_slow
 from grader.checks.cause import Cause
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.delivery import why_no_history, why_not_delivered
 from grader.checks.destroyed import why_unsubscribed
 from grader.checks.echo import Echo, Wanted, echoes, output_lines, shown
@@ -48,19 +48,16 @@ def why_not_logged(
         decimals: How many decimals must be right.
         within_ns: How soon after its message a line must have come.
     """
-    cause = why_not_delivered(recording, topic)
+    cause = why_not_delivered(recording, topic) or why_ended(recording, _seen(topic, found))
     if cause is not None:
         return cause
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(_seen(topic, found))
     if wanted and wanted[-1].message.stamp_ns < recording.launched_ns:
         cause = why_no_history(recording, topic, _seen(topic, found))
         if cause is not None:
             return cause
     if len(wanted) < needed:
         sent = f"only {counted(len(wanted), 'message was', 'messages were')} sent on {code(topic)}"
-        return why_unsubscribed(recording, topic, sent) or Cause(sent, ours=True, disturbed=True)
+        return why_unsubscribed(recording, topic, sent) or Cause.to_repeat(sent)
     nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
     begin_ns = recording.carried(topic)[0].stamp_ns
     blocked = why_blocked(recording, _seen(topic, found), nodes, begin_ns)
@@ -118,11 +115,9 @@ def _disturbed(
             return None
         if blocked is not None:
             return replace(blocked, disturbed=True)
-    return Cause(
+    return Cause.to_repeat(
         f"log lines for {code(topic)} are late or missing, but the machine took "
-        f"{format_duration(taken_s)} from the process meanwhile",
-        ours=True,
-        disturbed=True,
+        f"{format_duration(taken_s)} from the process meanwhile"
     )
 
 

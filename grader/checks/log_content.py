@@ -13,7 +13,7 @@ from grader.assignment.unit import format_duration
 from grader.checks.blockage import why_not_called
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.logged import LEVELS, Logged, logged, logger_of, printed
 from grader.checks.node_absence import why_no_node, why_not_node
@@ -153,14 +153,13 @@ def _why_lacking(
             _evidence(recording, other),
         )
     seen = f"only {len(found)} of them" if found else "none"
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(seen)
+    ended = why_ended(recording, seen)
+    if ended is not None:
+        return ended
     lost = sum(process.dropped_bytes for process in recording.processes)
     if lost:
         return Cause(f"{seen}, but {lost} bytes of output were not kept", "Log less.", ours=True)
-    nodes = {node.name for node in recording.student_nodes}
-    idle = why_not_called(recording, seen, nodes)
+    idle = why_not_called(recording, seen, {node.name for node in recording.student_nodes})
     if idle is not None:
         return idle
     if found:
@@ -290,8 +289,8 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     seen = f"{counted(len(found), 'log message')}, {rate_hz:.3g} Hz"
     taken_s = recording.taken_s(begin_ns, end_ns)
     if rate_hz < low_hz and (end_ns - begin_ns) / NS - taken_s <= len(found) / low_hz:
-        return Finding.error(
-            expected, f"{seen}, but the machine took {format_duration(taken_s)}", disturbed=True
+        return Finding.to_repeat(
+            expected, f"{seen}, but the machine took {format_duration(taken_s)}"
         )
     hint = (
         "Log in a timer of that period, or with throttle_duration_sec=1.0 in a faster callback: "
@@ -310,15 +309,11 @@ def _fell_silent(recording: Recording, found: Sequence[Logged], low_hz: float) -
     allowed_s = _SILENT_PERIODS / low_hz
     if silent_s <= allowed_s:
         return None
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(seen)
     taken_s = recording.taken_s(last_ns, recording.stop_ns)
-    if silent_s - taken_s <= allowed_s:
-        return Cause(
-            f"{seen}: the machine took {format_duration(taken_s)}", ours=True, disturbed=True
-        )
-    return Cause(
+    cause = why_ended(recording, seen)
+    if cause is None and silent_s - taken_s <= allowed_s:
+        cause = Cause.to_repeat(f"{seen}: the machine took {format_duration(taken_s)}")
+    return cause or Cause(
         seen,
         "The node must go on logging: look for a counter or a condition that ends it, for a timer "
         "that is cancelled, and for a callback that does not return.",

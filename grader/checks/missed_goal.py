@@ -92,11 +92,9 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
     watched_s = (truth[-1].time_ns - truth[0].time_ns) / NS
     seen = f"is still {metres(left_m)} from the goal when the observation ends"
     if lost_s > 0.25 * watched_s and recording.ending is Ending.TIMEOUT:
-        return Cause(
+        return Cause.to_repeat(
             f"{seen}; the machine took up to {format_duration(lost_s)} of "
-            f"{format_duration(watched_s)} from the run",
-            ours=True,
-            disturbed=True,
+            f"{format_duration(watched_s)} from the run"
         )
     unsteered = why_unsteered(recording)
     if unsteered is not None:

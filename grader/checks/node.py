@@ -13,7 +13,7 @@ from grader.checks import testimony
 from grader.checks.cause import Cause
 from grader.checks.check import NoParameters, Parameters, Subject, check
 from grader.checks.concerned import concerned_nodes
-from grader.checks.death import cause_of_death, dead, ended_early, offence
+from grader.checks.death import cause_of_death, dead, ended_early, offence, why_ended
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.node_absence import why_no_node, why_not_node
 from grader.checks.node_name import node_name
@@ -208,10 +208,9 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
     if not recording.processes:
         missing = why_no_node(recording) or Cause("nothing was launched")
         return missing.finding(expected)
-    ended = dead(recording)
-    if ended:
-        cause = cause_of_death(recording, ended[0])
-        return cause.after("it had already ended before SIGINT").finding(expected)
+    ended = why_ended(recording, "it had already ended before SIGINT")
+    if ended is not None:
+        return ended.finding(expected)
     stuck = [process for process in recording.processes if process.exited_ns is None]
     if stuck:
         return Finding.error(
@@ -272,10 +271,8 @@ def _too_late(recording: Recording, process: Process, parameters: Ends) -> Cause
         observed = f"{code(process.name)} did not end after SIGINT; {process.stopped_by} was needed"
     taken_s = recording.taken_s(recording.stop_ns, end_ns)
     if taken_s > 0.0 and took_s - taken_s <= parameters.within:
-        return Cause(
-            f"{observed}, but the machine took {format_duration(taken_s)} from it meanwhile",
-            ours=True,
-            disturbed=True,
+        return Cause.to_repeat(
+            f"{observed}, but the machine took {format_duration(taken_s)} from it meanwhile"
         )
     stop_s = recording.since_launch_s(recording.stop_ns)
     return Cause(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.checks import testimony
 from grader.checks.cause import Cause
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import cause_of_death, dead, why_ended
 from grader.checks.exchanged_executables import why_exchanged
 from grader.checks.failure import interrupted_place
 from grader.checks.finding import Evidence
@@ -25,10 +25,7 @@ def why_no_node(recording: Recording) -> Cause | None:
         return None
     if recording.ending is Ending.NOT_STARTED or not recording.processes:
         return _not_started(recording)
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0])
-    return _hangs(recording, recording.processes[0])
+    return why_ended(recording) or _hangs(recording, recording.processes[0])
 
 
 def why_not_node(recording: Recording, name: str) -> Cause | None:

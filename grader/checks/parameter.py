@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.destroyed import why_destroyed
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.node_absence import why_not_node
@@ -130,11 +130,8 @@ def why_not_declared(recording: Recording, parameters: OfParameter) -> Cause | N
         *calls_to(recording, parameters.node, "describe_parameters"),
     )
     if not asked:
-        ended = dead(recording)
-        return (
-            cause_of_death(recording, ended[0])
-            if ended
-            else Cause(f"the probe did not ask {code(parameters.node)} for parameters", ours=True)
+        return why_ended(recording) or Cause(
+            f"the probe did not ask {code(parameters.node)} for parameters", ours=True
         )
     cause = why_services_silent(recording, parameters.node, asked)
     if cause is not None:
@@ -199,16 +196,13 @@ def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
         for call in recording.calls
         if call.service.rpartition("/")[0] == node and call.request and not call.error
     ]
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(what)
-    lost = why_services_silent(recording, node, tuple(calls[-1:]))
+    lost = why_ended(recording) or why_services_silent(recording, node, tuple(calls[-1:]))
     if lost is not None:
         return lost.after(what)
     slow = calls[-1] if calls else None
     took_s = ((slow.answered_ns or 0) - slow.requested_ns) / NS if slow else 0.0
     if slow is None or took_s <= _ANSWER_S:
-        return Cause(f"{what} by the probe", ours=True, disturbed=True)
+        return Cause.to_repeat(f"{what} by the probe")
     seen = (
         f"{what}, because the node's parameter service {code(slow.service.rpartition('/')[2])} "
         f"answered only after {format_duration(took_s)}"

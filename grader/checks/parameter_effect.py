@@ -14,7 +14,7 @@ from grader.assignment.quantity import Duration, Ratio
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import NamedFields, Subject, check
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.fields import (
     FieldTolerance,
     difference_table,
@@ -191,21 +191,16 @@ def _too_few(
     begin_ns = (item.call.answered_ns or 0) + round(parameters.within * NS)
     watched_s = (end_ns - begin_ns) / NS
     seen = f"{counted(number, 'message')} in the {format_duration(max(watched_s, 0.0))} after that"
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(seen)
+    ended = why_ended(recording, seen)
+    if ended is not None:
+        return ended
     due_s = _LEAST_PERIODS * (parameters.period or 0.0)
     if watched_s <= due_s:
-        return Cause(f"{seen}: the scenario is too short to judge", ours=True, disturbed=True)
+        return Cause.to_repeat(f"{seen}: the scenario is too short to judge")
     taken_s = recording.taken_s(begin_ns, end_ns)
     if taken_s > 0.0 and watched_s - taken_s <= due_s:
-        return Cause(f"{seen}, but the machine took {format_duration(taken_s)}", ours=True,
-                     disturbed=True)  # fmt: skip
-    for process in recording.processes:
-        raised = why_raised(recording, seen, process, item.call.requested_ns)
-        if raised is not None:
-            return raised
-    return Cause(
+        return Cause.to_repeat(f"{seen}, but the machine took {format_duration(taken_s)}")
+    return why_raised(recording, seen, item.call.requested_ns) or Cause(
         seen,
         "Publish in every call of the callback, whatever the value of the parameter is."
         if parameters.period is None
@@ -229,7 +224,7 @@ def _why_other_period(
     if median_s > parameters.period and recording.taken_s(times[0], times[-1]) >= off_s * (
         len(times) - 1
     ):
-        return Cause(f"{seen}, but the machine took the time", ours=True, disturbed=True)
+        return Cause.to_repeat(f"{seen}, but the machine took the time")
     return Cause(
         seen,
         "A timer keeps its period: make it anew in add_post_set_parameters_callback(), or set "

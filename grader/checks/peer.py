@@ -138,7 +138,7 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     if contradiction and destroyed is not None and parameters.expect == "match":
         return destroyed.finding(expected)
     if contradiction:
-        return Finding.error(expected, contradiction, disturbed=True)
+        return Finding.to_repeat(expected, contradiction)
     reasons = refusals(offered, requested)
     return Finding.passed(expected, ", ".join(reasons) or "no policy stands against it", evidence)
 

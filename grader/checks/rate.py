@@ -11,7 +11,7 @@ from grader.assignment.quantity import Duration, Frequency
 from grader.assignment.unit import format_duration
 from grader.checks import testimony
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.sighting import first_seen
 from grader.checks.silence import why_few
@@ -98,8 +98,8 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     if low is not None and found_hz < low:
         free_s = span_s - recording.taken_s(first.stamp_ns, last.stamp_ns)
         if free_s <= 0.0 or number / free_s >= low:
-            return Finding.error(
-                expected, f"{observed}, but the machine took time from the process", disturbed=True
+            return Finding.to_repeat(
+                expected, f"{observed}, but the machine took time from the process"
             )
         return Finding.failed(
             expected,
@@ -156,14 +156,12 @@ def _too_long_without(
         f"no message for {format_duration(gap_s)}{until}, from {begin_s:.2f} s after launch on, "
         f"after {counted(sum(m.stamp_ns <= begin_ns for m in messages), 'message')}"
     )
-    ended = dead(recording)
-    if ended and until:
-        return cause_of_death(recording, ended[0]).after(observed).finding(parameters.words)
+    ended = why_ended(recording, observed)
+    if ended is not None and until:
+        return ended.finding(parameters.words)
     if gap_s - recording.taken_s(begin_ns, end_ns) <= parameters.pause:
-        return Finding.error(
-            parameters.words,
-            f"{observed}, but the machine took time from the process",
-            disturbed=True,
+        return Finding.to_repeat(
+            parameters.words, f"{observed}, but the machine took time from the process"
         )
     return Finding.failed(
         parameters.words,

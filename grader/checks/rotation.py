@@ -22,7 +22,7 @@ from grader.checks.conversion import (
     degrees,
     sine_of_pitch,
 )
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.delivery import why_not_sent
 from grader.checks.destroyed import why_unsubscribed
 from grader.checks.finding import Evidence, Finding, Moment
@@ -399,34 +399,23 @@ def _missing(
         f"{len(missing)} of {counted(len(judged), 'case')} without an answer, the first: case "
         f"{missing[0].number}, {conversion.shown(missing[0].row)}"
     )
-    ended = dead(recording)
-    if ended:
-        cause = cause_of_death(recording, ended[0])
-        return cause.after(observed).finding(expected)
-    destroyed = why_unsubscribed(recording, parameters.stimulus, observed, missing[-1].asked_ns)
-    if destroyed is not None:
-        return destroyed.finding(expected)
     received = recording.on(parameters.topic)
     lost = published(received) - len(received)
-    if len(missing) <= lost:
-        return Finding.error(
-            expected, f"{observed}; {counted(lost, 'answer')} got lost on the way", disturbed=True
-        )
-    if any(_starved(recording, case) for case in missing):
-        return Finding.error(
-            expected, f"{observed}, but the machine took the time from the process", disturbed=True
-        )
-    for process in recording.processes:
-        raised = why_raised(recording, observed, process, missing[0].asked_ns)
-        if raised is not None:
-            return raised.finding(expected)
-    return Finding.failed(
-        expected,
+    cause = why_ended(recording, observed) or why_unsubscribed(
+        recording, parameters.stimulus, observed, missing[-1].asked_ns
+    )
+    if cause is None and len(missing) <= lost:
+        cause = Cause.to_repeat(f"{observed}; {counted(lost, 'answer')} got lost on the way")
+    if cause is None and any(_starved(recording, case) for case in missing):
+        cause = Cause.to_repeat(f"{observed}, but the machine took the time from the process")
+    cause = cause or why_raised(recording, observed, missing[0].asked_ns)
+    cause = cause or Cause(
         observed,
         "Publish once in every call of the callback. Look for an exception that is caught, and "
         "for a condition that leaves cases out.",
         evidence,
     )
+    return cause.finding(expected)
 
 
 def _starved(recording: Recording, case: Case) -> bool:
@@ -438,12 +427,9 @@ def _too_few(
     recording: Recording, parameters: Answers, found: Sequence[Case], judged: list[Case]
 ) -> Cause:
     seen = f"only {counted(len(judged), 'case')} of {parameters.at_least} could be sent"
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(seen)
-    destroyed = why_unsubscribed(recording, parameters.stimulus, seen)
-    if destroyed is not None:
-        return destroyed
+    cause = why_ended(recording, seen) or why_unsubscribed(recording, parameters.stimulus, seen)
+    if cause is not None:
+        return cause
     if any(case.behind_s is not None for case in found) or _is_slow(recording, found):
         return Cause(
             f"{seen}, because the answers come late",
@@ -455,7 +441,7 @@ def _too_few(
                 )
             ),
         )
-    return Cause(seen, ours=True, disturbed=True)
+    return Cause.to_repeat(seen)
 
 
 def _is_slow(recording: Recording, found: Sequence[Case]) -> bool:

@@ -13,7 +13,7 @@ from grader.assignment.quantity import Duration
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.fields import (
     FieldTolerance,
     brief,
@@ -155,11 +155,10 @@ def judged_calls(
         return Cause(f"{code(service)} could not be called: {failed.error}", ours=True)
     found = tuple(call for call in calls if has_fields(call.request or {}, request))
     if not found:
-        ended = dead(recording)
-        if ended:
-            return cause_of_death(recording, ended[0])
         asked = f" with {fields_words(request)}" if request else ""
-        return Cause(f"the probe sent no call{asked} to {code(service)}", ours=True, disturbed=True)
+        return why_ended(recording) or Cause.to_repeat(
+            f"the probe sent no call{asked} to {code(service)}"
+        )
     lost = next((call for call in found if call.error), None)
     if lost is not None:
         return why_not_met(recording, SERVICE, service, "could not be called", lost.requested_ns)

@@ -8,7 +8,7 @@ from grader.assignment.unit import format_duration
 from grader.checks import compatibility, testimony
 from grader.checks.blockage import why_blocked, why_never_spun
 from grader.checks.cause import Cause
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.delivery import why_not_delivered
 from grader.checks.destroyed import why_unpublished
 from grader.checks.doubt import was_held_up
@@ -57,14 +57,12 @@ def why_silent(recording: Recording, topic: str) -> Cause:
         or _unmatched(recording, topic, publishers, readers)
         or _held_in_vain(recording, topic)
     )
+    seen = f"no message on {code(topic)}"
+    cause = cause or why_ended(recording, seen)
     if cause is not None:
         return cause
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(f"no message on {code(topic)}")
     asked = _asked_on(recording, topic)
     nodes = {item.node for item in publishers}
-    seen = f"no message on {code(topic)}"
     begin_ns = [recording.sent[name][0].stamp_ns for name in asked if recording.sent[name]]
     blocked = why_blocked(recording, seen, nodes, min(begin_ns, default=recording.launched_ns))
     starved = _starved(recording, topic)
@@ -115,9 +113,9 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
     begin_ns = recording.matched_ns or recording.launched_ns
     watched_s = (recording.stop_ns - begin_ns) / NS
     seen = f"{counted(len(messages), 'message')} on {code(topic)} in {format_duration(watched_s)}"
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(seen)
+    ended = why_ended(recording, seen)
+    if ended is not None:
+        return ended
     moments = tuple(
         Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
         for index, message in enumerate(messages[:10], start=1)
@@ -125,10 +123,8 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
     taken_s = recording.taken_s(begin_ns, recording.stop_ns)
     # With the time that was taken from it, the node may have come to as many as are needed.
     if taken_s > 0.0 and len(messages) * watched_s >= needed * (watched_s - taken_s):
-        return Cause(
-            f"{seen}, but the machine took {format_duration(taken_s)} of them from the process",
-            ours=True,
-            disturbed=True,
+        return Cause.to_repeat(
+            f"{seen}, but the machine took {format_duration(taken_s)} of them from the process"
         )
     destroyed = why_unpublished(recording, topic, seen)
     if destroyed is not None:
@@ -232,11 +228,9 @@ def _held_in_vain(recording: Recording, topic: str) -> Cause | None:
         for item in recording.declared("held")
     ):
         return None
-    return Cause(
+    return Cause.to_repeat(
         f"the publisher on {code(topic)} was not matched by the probe in time, so a message could "
-        "be lost",
-        ours=True,
-        disturbed=True,
+        "be lost"
     )
 
 
@@ -265,11 +259,7 @@ def _unanswered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cau
         f"no message on {code(topic)}, although {counted(len(sent), 'message')} on {code(name)} "
         "reached the node"
     )
-    for process in recording.processes:
-        raised = why_raised(recording, seen, process, sent[0].stamp_ns)
-        if raised is not None:
-            return raised
-    return Cause(
+    return why_raised(recording, seen, sent[0].stamp_ns) or Cause(
         seen,
         "Is publish(msg) reached in the subscription's callback? An `except: pass` hides the error "
         "that would tell why not, and a lock or a loop that never ends keeps it waiting.",
@@ -286,11 +276,9 @@ def _starved(recording: Recording, topic: str) -> Cause | None:
     watched_s = (recording.stop_ns - begin_ns) / NS
     if taken_s < _STARVED * watched_s:
         return None
-    return Cause(
+    return Cause.to_repeat(
         f"no message on {code(topic)}, but the machine took {format_duration(taken_s)} of "
-        f"{format_duration(watched_s)} from the process",
-        ours=True,
-        disturbed=True,
+        f"{format_duration(watched_s)} from the process"
     )
 
 

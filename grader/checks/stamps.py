@@ -71,11 +71,9 @@ def _arrivals_differ(recording: Recording, messages: Sequence[Message]) -> Cause
     arrival_s = median((b - a) / NS for a, b in pairwise(arrivals_ns))
     if abs(arrival_s - source_s) <= max(_RELATIVE * source_s, _ABSOLUTE_S):
         return None
-    return Cause(
+    return Cause.to_repeat(
         f"messages arrive every {format_duration(arrival_s)}, but their source timestamps are "
-        f"{format_duration(source_s)} apart, while the machine was busy",
-        ours=True,
-        disturbed=True,
+        f"{format_duration(source_s)} apart, while the machine was busy"
     )
 
 

@@ -160,11 +160,9 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
     lost_s = taken_s(recording, crossed.time_ns, step.time_ns)
     missing_m = wanted_m - parameters.late - sight.distance_m
     if lost_s > 0.0 and lost_s * fastest >= missing_m:
-        return Cause(
+        return Cause.to_repeat(
             f"{seen}; the machine took up to {format_duration(lost_s)} from the run meanwhile, "
-            "which may explain it",
-            ours=True,
-            disturbed=True,
+            "which may explain it"
         )
     told = [
         item.stamp_ns

@@ -236,7 +236,7 @@ def why_never_appeared(recording: Recording, what: str) -> Cause:
             Evidence(moments=(Moment("launched", 0.0),)),
         )
     if was_held_up(recording):
-        return Cause(f"{seen}, while the machine was busy", ours=True, disturbed=True)
+        return Cause.to_repeat(f"{seen}, while the machine was busy")
     return Cause(
         seen,
         "A node must stay where the environment puts it: set no ROS_DOMAIN_ID, no discovery "

@@ -9,7 +9,7 @@ from grader.assignment.quantity import Duration, Ratio
 from grader.assignment.unit import format_duration
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.period import (
     MOST_INTERVALS,
@@ -97,11 +97,10 @@ def period(recording: Recording, parameters: Period) -> Finding:
         return unbelievable.finding(expected)
     measured = intervals(messages)
     if len(measured) < min(parameters.at_least, len(messages) - 1):
-        return Finding.error(
+        return Finding.to_repeat(
             expected,
             f"of {counted(len(messages), 'message')} so many neighbours were lost on their way to "
             f"the probe that only {counted(len(measured), 'interval')} can be judged",
-            disturbed=True,
         )
     verdict = judge([item.seconds for item in measured], limits)
     if verdict.good:
@@ -116,11 +115,10 @@ def period(recording: Recording, parameters: Period) -> Finding:
     forgivable = not is_declared(recording, verdict, limits)
     if forgivable and judge(forgiven(recording, measured, limits), limits).good:
         taken_s = recording.taken_s(measured[0].begin_ns, measured[-1].end_ns)
-        return Finding.error(
+        return Finding.to_repeat(
             expected,
             f"{_figures(measured, verdict)}; the machine took up to {format_duration(taken_s)} "
             "from the process meanwhile, which may explain it",
-            disturbed=True,
         )
     explanation = explain(recording, parameters.topic, measured, verdict, limits)
     observed = _figures(measured, verdict)
@@ -151,14 +149,8 @@ def _why_ended(
     )
     taken_s = recording.taken_s(last_ns, recording.stop_ns)
     if silent_s - taken_s <= _ENDED_PERIODS * parameters.period:
-        return Cause(
-            f"{seen}; the machine took {format_duration(taken_s)} of them", ours=True,
-            disturbed=True,
-        )  # fmt: skip
-    dying = dead(recording)
-    if dying:
-        return cause_of_death(recording, dying[0]).after(seen)
-    return Cause(
+        return Cause.to_repeat(f"{seen}; the machine took {format_duration(taken_s)} of them")
+    return why_ended(recording, seen) or Cause(
         seen,
         ENDED_HINT,
         Evidence(moments=(Moment("last message", recording.since_launch_s(last_ns)),)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 
 from grader.assignment.unit import format_duration
@@ -56,7 +57,7 @@ def why_unanswered(
         or why_taken(recording, what, asked_ns, recording.stop_ns, within_s)
     )
     if cause is None and process is not None:
-        cause = why_raised(recording, what, process, asked_ns) or why_never_spun(
+        cause = why_raised(recording, what, asked_ns, (process,)) or why_never_spun(
             recording, what, (node,), (process,), (moment,)
         )
     if cause is not None:
@@ -117,15 +118,11 @@ def why_taken(
     excess_s = (end_ns - begin_ns) / NS - within_s
     if excess_s < -_ROUNDING_S:
         ended = format_duration((end_ns - begin_ns) / NS)
-        return Cause(
-            f"{what}: the run ended {ended} later, before that was due", ours=True, disturbed=True
-        )
+        return Cause.to_repeat(f"{what}: the run ended {ended} later, before that was due")
     if taken_s <= 0.0 or taken_s < excess_s:
         return None
-    return Cause(
-        f"{what}, but the machine took {format_duration(taken_s)} from the process meanwhile",
-        ours=True,
-        disturbed=True,
+    return Cause.to_repeat(
+        f"{what}, but the machine took {format_duration(taken_s)} from the process meanwhile"
     )
 
 
@@ -149,15 +146,25 @@ def why_one_cpu(recording: Recording, what: str) -> Cause | None:
     )
 
 
-def why_raised(recording: Recording, what: str, process: Process, begin_ns: int) -> Cause | None:
+def why_raised(
+    recording: Recording, what: str, begin_ns: int, processes: Iterable[Process] | None = None
+) -> Cause | None:
     """An exception that a process printed and survived from a time on; None if there is none.
 
     Args:
         recording: The run.
         what: What came of it, in words.
-        process: Whose.
         begin_ns: From when on.
+        processes: Whose; by default all.
     """
+    candidates = recording.processes if processes is None else processes
+    found = (_why_raised_in(recording, what, begin_ns, process) for process in candidates)
+    return next(filter(None, found), None)
+
+
+def _why_raised_in(
+    recording: Recording, what: str, begin_ns: int, process: Process
+) -> Cause | None:
     lines = [
         line
         for line in recording.log

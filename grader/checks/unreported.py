@@ -11,7 +11,7 @@ from grader.assignment.unit import format_duration
 from grader.checks.callback_run import Reports, spans
 from grader.checks.cause import Cause
 from grader.checks.check import Parameters
-from grader.checks.death import cause_of_death, dead
+from grader.checks.death import why_ended
 from grader.checks.finding import Evidence, Moment
 from grader.checks.silence import why_silent
 from grader.checks.wording import code, codes, counted, value_text
@@ -80,10 +80,9 @@ def why_unreported(
             "nothing before it or after it.",
             evidence,
         )
-    ended = dead(recording)
-    if ended:
-        return cause_of_death(recording, ended[0]).after(f"no complete run of {code(name)}")
-    return _incomplete(recording, reports, name, at_least, evidence)
+    return why_ended(recording, f"no complete run of {code(name)}") or _incomplete(
+        recording, reports, name, at_least, evidence
+    )
 
 
 def _incomplete(
@@ -95,11 +94,9 @@ def _incomplete(
     taken_s = recording.taken_s(begin_ns, recording.stop_ns)
     # With the time that was taken from it, the node may have come to as many as are needed.
     if taken_s > 0.0 and ended * watched_s >= at_least * (watched_s - taken_s):
-        return Cause(
+        return Cause.to_repeat(
             f"{code(name)} ran {counted(ended, 'time')}, but the machine took "
-            f"{format_duration(taken_s)} of {format_duration(watched_s)} from the process",
-            ours=True,
-            disturbed=True,
+            f"{format_duration(taken_s)} of {format_duration(watched_s)} from the process"
         )
     if begun > ended:
         return Cause(
