@@ -9,7 +9,7 @@ from grader.checks.wording import code, codes
 from grader.nearest import nearest
 from grader.recording.model import Recording
 from grader.submission.record import SubmissionRecord
-from grader.submission.rosdistro import PACKAGES
+from grader.submission.rosdistro import PACKAGES, PYTHON_MODULES
 
 _MISSING = re.compile(r"No module named '([A-Za-z_]\w*)")
 _MISSING_ROOT = re.compile(r"No module named '([A-Za-z_]\w*)'$")
@@ -31,7 +31,9 @@ def lacking_package(
         installed: Packages that are known to be there, which a program may keep from itself.
     """
     found = _MISSING_ROOT.match(message)
-    if found is None or found[1] not in PACKAGES or _WITHOUT_PYTHON.fullmatch(found[1]):
+    if found is None or found[1] not in PACKAGES:
+        return None
+    if found[1] not in PYTHON_MODULES and _WITHOUT_PYTHON.fullmatch(found[1]):
         return None
     own = {package.name for package in submission.packages}
     return None if found[1] in {*own, *installed} else found[1]

@@ -52,11 +52,9 @@ def test_without_a_sandbox_everything_that_is_installed_is_there() -> None:
     assert library_hint("No module named 'pandas'", run(None)) is None
 
 
-def test_a_package_of_ros_that_is_not_installed_here_is_not_the_student_s_fault() -> None:
-    submission = run().submission
-    assert lacking_package("No module named 'tf_transformations'", submission) == (
-        "tf_transformations"
-    )
+@pytest.mark.parametrize("name", ["tf_transformations", "rosidl_runtime_py", "rcl_interfaces"])
+def test_a_package_of_ros_that_is_not_installed_here_is_not_the_student_s_fault(name: str) -> None:
+    assert lacking_package(f"No module named '{name}'", run().submission) == name
 
 
 @pytest.mark.parametrize(
@@ -65,6 +63,7 @@ def test_a_package_of_ros_that_is_not_installed_here_is_not_the_student_s_fault(
         "No module named 'tf_transformation'",
         "No module named 'geometry_msgs.msgs'",
         "No module named 'rclcpp'",
+        "No module named 'rosidl_cmake'",
         "No module named 'robot_tools'",
         "No module named 'pandas'",
     ],
