@@ -85,7 +85,8 @@ def echoes(
     """Messages that are followed by lines which show their values.
 
     A line serves one message, so that a single line does not stand for many messages with the
-    same values; unless it lists the values of several, as print(..., end=" ") writes them.
+    same values; unless it lists the values of several, as print(..., end=" ") writes them. Lines
+    need not come in the order of the messages: with several threads they do not.
 
     Args:
         recording: The run.
@@ -98,6 +99,7 @@ def echoes(
     times = [line.time_ns for line in lines]
     printed = [numbers(line.text) for line in lines]
     found: list[Echo] = []
+    used: set[int] = set()
     free = number = 0
     while number < len(wanted):
         item = wanted[number]
@@ -106,25 +108,33 @@ def echoes(
         end_ns = item.due_ns + within_ns
         if forgive:
             end_ns += round(recording.taken_s(begin_ns, end_ns) * NS)
-        first = max(free, bisect_left(times, begin_ns))
         missing = set(item.values)
-        serving: list[str] = []
-        for index in range(first, len(lines)):
+        serving: list[int] = []
+        begin = bisect_left(times, begin_ns)
+        for index in range(begin, len(lines)):
             if times[index] > end_ns:
                 break
+            if index in used:
+                continue
             here = missing & shown(printed[index], item, decimals)
             if not here:
                 continue
             missing -= here
-            serving.append(logged_text(lines[index].text))
-            if not missing and exchanged("\n".join(serving), item.values, decimals):
+            serving.append(index)
+            if missing:
+                continue
+            texts = "\n".join(logged_text(lines[one].text) for one in serving)
+            if exchanged(texts, item.values, decimals):
                 missing, serving = set(item.values), []
-            if not missing:
-                free = index + 1
+            else:
+                used.update(serving)
+                # Lines before it belong to it, such as a title, if they come after all others.
+                first = max(begin, free) if serving[0] >= free else serving[0]
+                served, free = lines[first : index + 1], max(free, index + 1)
                 others = wanted[number : number + len(printed[index]) - 1]
                 before = [one for one in others if one.message.stamp_ns <= times[index]]
                 listed = _listed(printed[index], [item, *before], decimals)
-                found += [Echo(one, lines[first:free]) for one in [item, *before][:listed]]
+                found += [Echo(one, served) for one in [item, *before][:listed]]
                 number += listed - 1
                 break
     return tuple(found)

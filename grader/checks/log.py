@@ -157,7 +157,7 @@ def _too_seldom(
     if parameters.every is None:
         return None
     begin_ns, end_ns = wanted[0].due_ns, wanted[-1].due_ns
-    written = (echo.lines[-1].time_ns for echo in found)
+    written = sorted(echo.lines[-1].time_ns for echo in found)
     gaps = list(pairwise([begin_ns, *(min(time_ns, end_ns) for time_ns in written), end_ns]))
     begin_ns, end_ns = max(gaps, key=lambda gap: _own_s(recording, gap))
     excused = _own_s(recording, (begin_ns, end_ns)) <= parameters.every

@@ -482,6 +482,22 @@ class TestSilence:
         assert "only a part" in found
         assert "from nav_msgs.msg import Odometry" in found
 
+    def test_lines_of_several_threads_in_another_order(self):
+        values = (1.25, 2.5, 3.75, 4.5)
+        sent_ = tuple(
+            message(1.0 + n / 100, odometry(x), sequence=n, topic="/odom", type=ODOMETRY)
+            for n, x in enumerate(values, start=1)
+        )
+        asked = {"topic": "/odom", "fields": ["pose.pose.position.x"], "at_least": 4}
+        shuffled = [f"x {x}" for x in (3.75, 1.25, 4.5, 2.5)]
+        for texts, status in ((shuffled, Status.PASSED), (["x 1.25", *shuffled[:3]], "failed")):
+            log = tuple(
+                line for n, one in enumerate(texts) for line in output(one, time_s=1.1 + n / 1000)
+            )
+            assert (
+                judge("log.follows", run(log, messages={"/odom": sent_}), **asked).status == status
+            )
+
     def test_qos_that_does_not_match(self):
         finding = judge(
             "log.follows", run(endpoints=(subscription(qos=LATCHED), publisher())), **POSITION
