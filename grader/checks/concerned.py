@@ -6,10 +6,11 @@ from grader.recording.model import Node, Owner, Recording
 
 
 def concerned_nodes(recording: Recording) -> tuple[Node, ...]:
-    """The student's nodes that publish or subscribe on a topic of the probe's.
+    """The student's nodes that publish what the probe subscribes to, or subscribe to what it sends.
 
-    A program may have more nodes, such as one that only reads parameters and is destroyed
-    again, or that nobody spins; what becomes of those is its own affair.
+    A program may have more nodes, such as one that only reads parameters or listens to another
+    node of the program, and is destroyed again or never spun; what becomes of those is its own
+    affair.
 
     Args:
         recording: The run.
@@ -17,10 +18,11 @@ def concerned_nodes(recording: Recording) -> tuple[Node, ...]:
     Returns:
         In the order of their appearance; empty if no node has such an endpoint.
     """
-    topics = {item.topic for item in recording.endpoints if item.owner is Owner.PROBE}
+    ends = {(item.kind, item.topic) for item in recording.endpoints if item.owner is Owner.PROBE}
     names = {
         item.node
         for item in recording.endpoints
-        if item.owner is Owner.STUDENT and item.topic in topics
+        if item.owner is Owner.STUDENT
+        and any(kind is not item.kind and topic == item.topic for kind, topic in ends)
     }
     return tuple(node for node in recording.student_nodes if node.name in names)

@@ -111,9 +111,9 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
     """The node stays alive until it is asked to end.
 
     Judged by the process, which must still run when the observation ends, and by the ROS
-    graph, which must not have lost the node before. Of several nodes those count that have an
-    endpoint on a topic that is recorded; a helper node may come and go. What a sandbox never
-    allows, such as a signal to the process that holds it, ends a node.
+    graph, which must not have lost the node before. Of several nodes those count that publish
+    what is recorded, or subscribe to what they are sent; a helper node may come and go. What a
+    sandbox never allows, such as a signal to the process that holds it, ends a node.
 
     Explains an exception (with the line in your file), a crash with its signal, and a main()
     that returned, such as one that does not call rclpy.spin.

@@ -681,6 +681,9 @@ class TestAlive:
         assert judge("node.alive", run).status is Status.PASSED
         mute = recording(nodes=(helper, node()), endpoints=(reader(),), messages={})
         assert judge("node.alive", mute).status is Status.PASSED
+        heard = endpoint(kind=Kind.SUBSCRIPTION, node="/settings")
+        listens = recording(nodes=(helper, node()), endpoints=(endpoint(), heard, reader()))
+        assert judge("node.alive", listens).status is Status.PASSED
 
     def test_a_publisher_that_was_destroyed_while_a_helper_node_lives(self):
         run = recording(
