@@ -15,7 +15,7 @@ from typing import Any
 from grader.checks.cause import Cause
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Moment
-from grader.recording.model import Kind, Process, Qos, Recording
+from grader.recording.model import Declaration, Kind, Process, Qos, Recording
 
 _RELIABILITIES = ("reliable", "best_effort")
 _DURABILITIES = ("volatile", "transient_local")
@@ -120,18 +120,37 @@ def timer_of_zero(recording: Recording) -> bool:
 
 
 def queues(recording: Recording, kind: Kind, topic: str) -> tuple[DeclaredQueue, ...]:
-    """History and depth of the endpoints that the processes declared on a topic."""
+    """History and depth of the endpoints that the processes declared on a topic.
+
+    Those that the program destroyed itself, as rclpy's wait_for_message() does, are left out
+    where it kept others.
+    """
     found = []
-    for item in recording.declared(kind.value):
-        if _text(item.data, "topic") == topic:
-            depth = _number(item.data, "depth")
-            found.append(
-                DeclaredQueue(
-                    history=_text(item.data, "history") or "unknown",
-                    depth=int(depth) if depth is not None else None,
-                )
+    declared = [
+        item for item in recording.declared(kind.value) if _text(item.data, "topic") == topic
+    ]
+    kept = [item for item in declared if not _was_destroyed(recording, item)]
+    for item in kept or declared:
+        depth = _number(item.data, "depth")
+        found.append(
+            DeclaredQueue(
+                history=_text(item.data, "history") or "unknown",
+                depth=int(depth) if depth is not None else None,
             )
+        )
     return tuple(found)
+
+
+def _was_destroyed(recording: Recording, endpoint: Declaration) -> bool:
+    """Whether the process declared an endpoint destroyed before the observation ended."""
+    number = endpoint.data.get("number")
+    return number is not None and any(
+        item.process == endpoint.process
+        and item.data.get("pid") == endpoint.data.get("pid")
+        and item.data.get("number") == number
+        and item.time_ns < recording.stop_ns
+        for item in recording.declared("destroyed")
+    )
 
 
 def profiles(recording: Recording, kind: Kind, topic: str) -> tuple[tuple[str, Qos], ...]:

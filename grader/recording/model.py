@@ -211,10 +211,12 @@ class Declaration:
         process: ``package/executable``.
         kind: ``started``, ``node``, ``publisher``, ``subscription``, ``timer``, ``spin``,
             ``executor``, ``callback_group``, ``held`` (a publisher waited for its match),
+            ``destroyed`` (a publisher or subscription),
             ``exiting`` (Python ends in its usual way), ``foreign`` (another than the tracer
             wrote to the tracer's pipe).
         data: For publisher and subscription: node, topic, type, reliability, durability,
-            history, depth; for subscription also group. For timer: node, period_s, callback,
+            history, depth, number; for subscription also group. For destroyed:
+            number. For timer: node, period_s, callback,
             group (type and id of the callback group). For spin: executor,
             threads. For held: topic, waited_s, matched.
     """

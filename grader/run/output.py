@@ -28,7 +28,7 @@ _KINDS = frozenset(
     {
         *_OF_ENDPOINTS,
         *("started", "imported", "init", "node", "timer", "added", "spin", "published", "held"),
-        *("leaving", "exiting"),
+        *("destroyed", "leaving", "exiting"),
     }
 )
 """What a tracer tells of; see ``tracer/sitecustomize.py``."""

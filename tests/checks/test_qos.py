@@ -261,6 +261,22 @@ class TestDepth:
         found = failing("qos.depth", run, topic="/scan", depth=10, kind="subscription")
         assert "fourth argument of create_subscription" in found
 
+    def test_a_subscription_that_the_program_destroyed_itself_is_its_own_affair(self):
+        told = [
+            declared("subscription", topic="/scan", history="keep_last", depth=depth, number=number)
+            for number, depth in enumerate((1, 10))
+        ]
+        asked = {"topic": "/scan", "depth": 10, "kind": "subscription"}
+        seen = recording(endpoints=(endpoint("/scan", kind=Kind.SUBSCRIPTION),))
+        for number, time_s, status in (
+            (0, 1.0, Status.PASSED),
+            (1, 1.0, Status.FAILED),
+            (0, 99.0, Status.FAILED),
+        ):
+            gone = declared("destroyed", time_s, number=number)
+            run = replace(seen, declarations=(*told, gone))
+            assert judge("qos.depth", run, **asked).status is status
+
     def test_no_publisher(self):
         run = recording(messages={}, endpoints=(endpoint("/cmdvel"),), declarations=())
         assert "`/cmdvel` instead" in failing("qos.depth", run, topic="/cmd_vel", depth=10)

@@ -61,6 +61,15 @@ def test_a_message_published_in_the_constructor_is_received(run_node: RunNode) -
         assert values(recording) == [1.0]
 
 
+def test_a_message_that_the_program_itself_hears_is_received_as_well(run_node: RunNode) -> None:
+    own = nodes.ONE_SHOT.replace(
+        "        self.publisher =",
+        '        self.create_subscription(Twist, "cmd_vel", print, 10)\n        self.publisher =',
+    )
+    for _ in range(5):
+        assert values(run_node(own, until={"quiet": "300 ms"})) == [1.0]
+
+
 def test_a_message_published_just_before_the_process_ends_is_received(run_node: RunNode) -> None:
     for _ in range(5):
         recording = run_node(nodes.ONE_SHOT_THEN_EXIT, until={"quiet": "2 s"})

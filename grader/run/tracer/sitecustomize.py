@@ -20,6 +20,7 @@ never reach the student's program.
 from __future__ import annotations
 
 import gc
+import itertools
 import os
 import sys
 
@@ -110,8 +111,11 @@ def _group(group: Any, node: Any) -> dict[str, Any]:
 def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
     if endpoint.topic_name in _OWN_TOPICS:
         return
+    number = next(_count)
+    _endpoints[id(endpoint)] = number, kind, endpoint.topic_name
     _report(
         kind,
+        number=number,
         node=_full_name(node),
         topic=endpoint.topic_name,
         type=_type_name(endpoint.msg_type),
@@ -120,8 +124,16 @@ def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
     )
 
 
+def _patch_endpoint(endpoint_class: Any) -> None:
+    def destroyed(endpoint: Any) -> None:
+        number, _kind, _topic = _endpoints.pop(id(endpoint))
+        _report("destroyed", number=number)
+
+    _wrap(endpoint_class, "destroy", before=destroyed)
+
+
 def _hold(node: Any, publisher: Any) -> None:
-    """Wait until somebody is matched with a publisher that the probe listens to.
+    """Wait until a publisher that the probe listens to is matched with another process.
 
     Only with a node's first one on the topic: a node that makes a new publisher for every
     message loses them, and that is for the judge to see.
@@ -133,7 +145,8 @@ def _hold(node: Any, publisher: Any) -> None:
     import time
 
     began = time.monotonic()
-    while not publisher.get_subscription_count():
+    own = sum(item[1:] == ("subscription", publisher.topic_name) for item in _endpoints.values())
+    while publisher.get_subscription_count() <= own:
         if time.monotonic() - began > _HOLD_LIMIT_S:
             break
         time.sleep(_HOLD_POLL_S)
@@ -142,7 +155,7 @@ def _hold(node: Any, publisher: Any) -> None:
         "held",
         topic=publisher.topic_name,
         waited_s=time.monotonic() - began,
-        matched=publisher.get_subscription_count() > 0,
+        matched=publisher.get_subscription_count() > own,
     )
 
 
@@ -172,6 +185,9 @@ def _is_in_callback() -> bool:
 
 
 _messages: dict[str, int] = {}
+_endpoints: dict[int, tuple[int, str, str]] = {}
+"""Publishers and subscriptions that are not destroyed: id -> number of the report, kind, topic."""
+_count = itertools.count()
 _publishers: list[Any] = []
 _held: set[tuple[str, str]] = set()
 _added: set[str] = set()
@@ -399,6 +415,8 @@ _PATCHES = {
     "subprocess": _patch_subprocess,
     "rclpy.experimental.events_executor": _patch_events_executor,
     "rclpy.node": _patch_node,
+    "rclpy.publisher": lambda module: _patch_endpoint(module.Publisher),
+    "rclpy.subscription": lambda module: _patch_endpoint(module.Subscription),
     "rclpy.context": _patch_context,
     "rclpy.executors": _patch_executors,
 }
