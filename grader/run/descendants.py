@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import signal
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 _PR_SET_CHILD_SUBREAPER = 36
@@ -133,11 +135,7 @@ def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:
         # One that is dying has lost its command line: the first look counts.
         killed = {**alive, **killed}
         for number in (signal.SIGSTOP, signal.SIGKILL):
-            for pid in alive:
-                try:
-                    os.kill(pid, number)
-                except ProcessLookupError:
-                    continue
+            send(number, alive)
         reap()
     reap()
     return killed
@@ -145,11 +143,14 @@ def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:
 
 def kill_tree(pid: int) -> None:
     """SIGKILL a process and everything that descends from it now."""
-    for victim in (pid, *descendants(pid)):
-        try:
-            os.kill(victim, signal.SIGKILL)
-        except ProcessLookupError:
-            continue
+    send(signal.SIGKILL, (pid, *descendants(pid)))
+
+
+def send(number: signal.Signals, pids: Iterable[int]) -> None:
+    """Send a signal to processes, as far as they are still there."""
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, number)
 
 
 def reap() -> None:
@@ -176,14 +177,11 @@ def kill_by_variable(name: str, value: str, *, limit_s: float = 5.0) -> None:
     wanted = f"{name}={value}".encode()
     deadline = time.monotonic() + limit_s
     while time.monotonic() < deadline:
-        found = [pid for pid in os.listdir("/proc") if pid.isdigit() and _holds(pid, wanted)]  # noqa: PTH208
+        names = os.listdir("/proc")  # noqa: PTH208
+        found = [int(name) for name in names if name.isdigit() and _holds(name, wanted)]
         if not found:
             return
-        for pid in found:
-            try:
-                os.kill(int(pid), signal.SIGKILL)
-            except ProcessLookupError:
-                continue
+        send(signal.SIGKILL, found)
         time.sleep(0.01)
 
 

@@ -110,11 +110,12 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         try:
             super().__init__(
                 [
-                    # The sandbox's own first process has limits as well.
+                    # The sandbox's own first process has limits as well. What is in it inherits
+                    # them, but for what the kernel counts for each user namespace.
                     *enclosure.limits.prlimit(_AROUND),
                     *("bwrap", "--args", str(given), "--json-status-fd", str(status)),
                     *("--seccomp", str(rules), "--"),
-                    *(*enclosure.limits.prlimit(), "--", *argv),
+                    *("prlimit", f"--nproc={enclosure.limits.processes}", "--", *argv),
                 ],
                 cwd="/",
                 env={"PATH": "/usr/bin:/bin"},

@@ -17,10 +17,9 @@ import struct
 import threading
 from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import TypeVar
 
-from grader.sandbox.seccomp import LIMITING, MOST_COUNTED, can_end, is_counted, told_of
+from grader.sandbox.seccomp import MOST_COUNTED, can_end, is_counted, told_of
 
 # linux/seccomp.h
 _SET_MODE_FILTER, _NEW_LISTENER = 1, 1 << 3
@@ -29,8 +28,6 @@ _CONTINUE = 1
 # linux/prctl.h
 _PR_SET_NO_NEW_PRIVS = 38
 _INSTRUCTION_BYTES = 8
-_LIMITED_AT_START = 2
-"""Around bubblewrap and within it: see :class:`~grader.run.enclosure.EnclosedProcess`."""
 _MORE, _END = b"+", b"."
 # id, process, flags, number, architecture, instruction, six arguments
 _ASKED = struct.Struct("=QIIiIQ6Q")
@@ -43,26 +40,21 @@ _Started = TypeVar("_Started")
 class Guard:
     """Starts the student's sandboxes, and refuses what is asked of it."""
 
-    def __init__(
-        self, program: bytes, calls: Mapping[str, int], unheard: bytes | None = None
-    ) -> None:
+    def __init__(self, program: bytes, calls: Mapping[str, int], unheard: bytes) -> None:
         """Stand guard.
 
         Args:
             program: :func:`grader.sandbox.seccomp.guard_filter`.
             calls: :func:`grader.sandbox.seccomp.guarded_calls`.
-            unheard: The filter where nobody can listen; by default the same.
+            unheard: The filter where nobody can listen.
 
         Raises:
             OSError: The kernel takes no such filter.
         """
         self._names = {number: name for name, number in calls.items()}
         self._starter = ThreadPoolExecutor(1, "starter")
-        programs = (program, program if unheard is None else unheard)
-        listener = self._starter.submit(_install, programs, calls["seccomp"]).result()
+        listener = self._starter.submit(_install, (program, unheard), calls["seccomp"]).result()
         self._listeners = [] if listener is None else [listener]
-        self._starts = 0
-        self._limited = 0
         self._ending: set[int] = set()
         self._deeds: list[str] = []
         self._counted = 0
@@ -70,18 +62,12 @@ class Guard:
         self._thread = threading.Thread(target=self._listen, name="guard", daemon=True)
         self._thread.start()
 
-    @classmethod
-    def from_files(cls, program: Path, calls: Mapping[str, int], unheard: Path) -> Guard:
-        """Read the filters from files."""
-        return cls(program.read_bytes(), calls, unheard.read_bytes())
-
     def start(self, start: Callable[[], _Started]) -> _Started:
         """Start something under guard.
 
         Raises:
             OSError: It cannot be executed.
         """
-        self._starts += 1
         return self._starter.submit(start).result()
 
     def watch(self, listener: int) -> None:
@@ -104,8 +90,7 @@ class Guard:
         Args:
             ours: Processes that are not the student's.
         """
-        limited = self._limited > _LIMITED_AT_START * self._starts
-        return bool(self._ending.difference(ours)) or limited or not self.is_heard
+        return bool(self._ending.difference(ours)) or not self.is_heard
 
     @property
     def deeds(self) -> tuple[str, ...]:
@@ -146,21 +131,18 @@ class Guard:
         fcntl.ioctl(listener, _NOTIF_RECV, asked, True)
         number, process, _flags, call, _architecture, _place, *arguments = _ASKED.unpack(asked)
         name = self._names.get(call, f"system call {call}")
-        if is_counted(name):
-            self._counted += 1
-            if self._counted <= MOST_COUNTED:
-                fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, 0, _CONTINUE))
-                return
         deed = told_of(name, arguments)
-        if deed is None and can_end(name, arguments):
-            self._limited += name == LIMITING
-            if name != LIMITING:
-                self._ending.add(process)
-            fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, 0, _CONTINUE))
-            return
-        if deed is not None and deed not in self._deeds:
-            self._deeds.append(deed)
-        fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, -errno.EPERM, 0))
+        self._counted += is_counted(name)
+        if is_counted(name) and self._counted <= MOST_COUNTED:
+            answer = (0, _CONTINUE)
+        elif deed is None and can_end(name, arguments):
+            self._ending.add(process)
+            answer = (0, _CONTINUE)
+        else:
+            if deed is not None and deed not in self._deeds:
+                self._deeds.append(deed)
+            answer = (-errno.EPERM, 0)
+        fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, *answer))
 
 
 def _install(programs: tuple[bytes, bytes], call: int) -> int | None:

@@ -34,7 +34,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.run.descendants import descendants, is_stopped, kill_tree
+from grader.run.descendants import descendants, is_stopped, kill_tree, send
 from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
 from grader.run.readable import readable
 from grader.run.stall import Stall
@@ -259,7 +259,7 @@ class Nursery:
             limit_s: What has not ended by then is killed.
         """
         self._socket.close()
-        self._kill_stopped(self._stopped())
+        send(signal.SIGKILL, self._stopped())
         try:
             self._popen.wait(limit_s)
         except subprocess.TimeoutExpired:
@@ -277,18 +277,12 @@ class Nursery:
         before: frozenset[int] = frozenset()
         while not self._closed.wait(_STOPPED_S):
             stopped = self._stopped()
-            self._kill_stopped(stopped & before)
+            send(signal.SIGKILL, stopped & before)
             before = stopped
 
     def _stopped(self) -> frozenset[int]:
         pids = (self._popen.pid, *descendants(self._popen.pid))
         return frozenset(filter(is_stopped, pids))
-
-    @staticmethod
-    def _kill_stopped(pids: frozenset[int]) -> None:
-        for pid in pids:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
 
     def _kill(self, pid: int) -> None:
         if self._sandbox is None:

@@ -110,9 +110,8 @@ class StudentProcesses:
         self._zygotes = zygotes
         self._guard: Guard | None = None
         if enclosure is not None:
-            self._guard = Guard.from_files(
-                Path(enclosure.guard), enclosure.calls, Path(enclosure.unheard)
-            )
+            program, unheard = Path(enclosure.guard), Path(enclosure.unheard)
+            self._guard = Guard(program.read_bytes(), enclosure.calls, unheard.read_bytes())
             if not self._guard.is_heard:
                 self._enclosure = replace(enclosure, guard=enclosure.unheard)
         self._running: list[_Running] = []

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from grader.recording.model import Breach
+from grader.run.descendants import send
 from grader.sandbox.limits import MIB, Limits, size_words
 from grader.sandbox.namespaces import STUDENT
 from grader.sandbox.usage import (
@@ -93,21 +94,19 @@ class Watchdog:
             self._hidden_bytes = hidden_bytes(usages, room)
             if files_in_flight(usages) > _MOST_IN_FLIGHT:
                 words = f"more than {_MOST_IN_FLIGHT} descriptors on their way between processes"
-                self._note("descriptors in flight", words, str(_MOST_IN_FLIGHT))
-                self._end_all()
+                self._end_all("descriptors in flight", words, str(_MOST_IN_FLIGHT))
         self._looks += 1
         taken = memory_bytes(usages, limits.memory_bytes, self._hidden_bytes)
         if taken > limits.memory_bytes:
-            self._note("memory", f"{size_words(taken)} of memory", size_words(limits.memory_bytes))
-            self._end_all()
+            words = f"{size_words(taken)} of memory"
+            self._end_all("memory", words, size_words(limits.memory_bytes))
         own = own_bytes()
         if own > _OWN_BYTES:
             words = f"{size_words(own)} of memory where messages wait"
-            self._note("memory", words, size_words(_OWN_BYTES))
-            self._end_all()
+            self._end_all("memory", words, size_words(_OWN_BYTES))
         if self._cpu.taken_s(usages) > limits.cpu_s:
-            self._note("cpu time", f"more than {limits.cpu_s} s of CPU time", f"{limits.cpu_s} s")
-            self._end_all()
+            words = f"more than {limits.cpu_s} s of CPU time"
+            self._end_all("cpu time", words, f"{limits.cpu_s} s")
         threads = sum(usage.threads for usage in usages)
         # The last ones that it may start count as too many: no more can be seen.
         if threads >= limits.processes:
@@ -115,23 +114,19 @@ class Watchdog:
         if threads > limits.processes * len(inits) + _JUST_ENDED:
             # More than the kernel lets them start: one of them has got around it.
             words = f"{threads} processes and threads"
-            self._note("escaped processes", words, str(limits.processes))
-            self._end_all()
+            self._end_all("escaped processes", words, str(limits.processes))
         files = open_files(usages)
         if files > limits.open_files:
-            self._note("open files", f"{files} open files", str(limits.open_files))
-            self._end_all()
+            self._end_all("open files", f"{files} open files", str(limits.open_files))
         if len({usage.session for usage in usages}) > _MOST_SESSIONS:
-            self._note("sessions", f"more than {_MOST_SESSIONS} sessions", str(_MOST_SESSIONS))
-            self._end_all()
+            words = f"more than {_MOST_SESSIONS} sessions"
+            self._end_all("sessions", words, str(_MOST_SESSIONS))
         written = self._output_bytes()
         if written > limits.output_bytes:
             allowed = size_words(limits.output_bytes)
-            self._note("output", f"{size_words(written)} of output", allowed)
-            self._end_all()
+            self._end_all("output", f"{size_words(written)} of output", allowed)
         for kind, deed in self._deeds():
-            self._note(kind, deed, "")
-            self._end_all()
+            self._end_all(kind, deed, "")
         self._look_at(STUDENT / "disk", "disk", "/tmp and home")
         self._look_at(STUDENT / "shared", "shared memory", "/dev/shm")
 
@@ -146,9 +141,6 @@ class Watchdog:
     def _note(self, what: str, taken: str, allowed: str) -> None:
         self._breaches.setdefault(what, Breach(time.time_ns(), what, taken, allowed))
 
-    def _end_all(self) -> None:
-        for init in self._inits():
-            try:
-                os.kill(init, signal.SIGKILL)
-            except ProcessLookupError:
-                continue
+    def _end_all(self, what: str, taken: str, allowed: str) -> None:
+        self._note(what, taken, allowed)
+        send(signal.SIGKILL, self._inits())

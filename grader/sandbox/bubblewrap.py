@@ -18,7 +18,8 @@ from pathlib import Path
 
 UID = 61_000
 """The user that sandboxes run as where rosgrade runs as root: nobody's (systemd, UIDs-GIDs)."""
-_BUILD_UIDS = itertools.cycle(range(UID + 1, UID + 101))
+_BUILD_UIDS = 100
+_BUILDS = itertools.count()
 """What the kernel counts for a user (see :mod:`grader.sandbox.limits`) is each build's own."""
 PLAIN_ENVIRONMENT = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
 """Of bubblewrap itself: the sandbox's first process shows it to everybody inside."""
@@ -179,8 +180,9 @@ def launch(
 
 
 def build_uid() -> int:
-    """A user that no other sandbox runs as at the moment, where we are root."""
-    return next(_BUILD_UIDS)
+    """A user that hardly any other sandbox runs as at the moment, where we are root."""
+    # The workers of a class are processes of their own, which all begin to count at 0.
+    return UID + 1 + (os.getpid() + next(_BUILDS)) % _BUILD_UIDS
 
 
 def give(path: Path, uid: int = UID) -> None:

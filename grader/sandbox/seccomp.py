@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
+_INT = 0xFFFFFFFF
 _AIMED = {"ptrace": 1, "process_vm_readv": 0, "process_vm_writev": 0}
 """Calls on another process, and which argument is its id; refused whatever that is."""
 _SIGNALLING = {
@@ -31,17 +32,17 @@ _UNHEARD_OF = (
 _COUNTED = ("inotify_init", "inotify_init1")
 """Calls that make something of which all that a user runs has a certain number together."""
 MOST_COUNTED = 8
-_ENDING = (signal.SIGKILL, signal.SIGSTOP)
+_ENDING = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 # RLIMIT_CPU and F_SETSIG: asm-generic/resource.h, linux/fcntl.h. A program may also end with the
 # status by which a shell tells of a signal.
 _RLIMIT_CPU, _F_SETSIG, _SIGNALLED = 0, 10, 128
-LIMITING = "prlimit64"
-"""The call that bounds the CPU time of a process, at the end of which the kernel kills it."""
 _WAYS: tuple[tuple[str, int, tuple[int, ...], int], ...] = (
-    *((name, place, _ENDING, 0xFFFFFFFF) for name, place in _SIGNALLING.items()),
-    ("pidfd_send_signal", 1, _ENDING, 0xFFFFFFFF),
-    ("fcntl", 1, (_F_SETSIG,), 0xFFFFFFFF),
-    ("setrlimit", 0, (_RLIMIT_CPU,), 0xFFFFFFFF),
+    *((name, place, _ENDING, _INT) for name, place in _SIGNALLING.items()),
+    ("pidfd_send_signal", 1, _ENDING, _INT),
+    ("fcntl", 1, (_F_SETSIG,), _INT),
+    # At the end of its CPU time the kernel kills a process.
+    ("setrlimit", 0, (_RLIMIT_CPU,), _INT),
+    ("prlimit64", 1, (_RLIMIT_CPU,), _INT),
     *(
         (name, 0, tuple(_SIGNALLED + number for number in _ENDING), 0xFF)
         for name in ("exit", "exit_group")
@@ -49,8 +50,8 @@ _WAYS: tuple[tuple[str, int, tuple[int, ...], int], ...] = (
     # Its signal is in memory, where a filter cannot look.
     ("timer_create", 0, (0,), 0),
 )
-"""Ways to SIGKILL and SIGSTOP, which nothing can catch, within a sandbox, or to what looks like
-them: a call, the place of an argument, its values, and the bits of it that count."""
+"""Ways to kill or to stop a process within a sandbox, or to what looks like that: a call, the
+place of an argument, its values, and the bits of it that count."""
 _LEADER = 2
 """What a sandbox is started with; of a build that is colcon."""
 INIT = 1
@@ -89,7 +90,6 @@ _TIOCSTI, _TIOCLINUX = 0x5412, 0x541C
 _OWNERS, _OWNING = (8, 15), (0x8901, 0x8902)
 # linux/fcntl.h: a user has a certain number of pages in pipes.
 _F_SETPIPE_SZ = 1031
-_INT = 0xFFFFFFFF
 # AF_UNIX, AF_INET, AF_INET6, AF_NETLINK (getifaddrs): linux/socket.h
 _FAMILIES = (1, 2, 10, 16)
 _FAMILY_BITS = 6
@@ -173,8 +173,6 @@ def guard_filter(*, heard: bool = True) -> bytes:
             for value in values:
                 argument = seccomp.Arg(place, seccomp.MASKED_EQ, mask, value)
                 _add(rules, seccomp.NOTIFY, name, argument)
-        of_cpu = seccomp.Arg(1, seccomp.MASKED_EQ, _INT, _RLIMIT_CPU)
-        _add(rules, seccomp.NOTIFY, LIMITING, of_cpu, seccomp.Arg(2, seccomp.NE, 0))
     return _program(rules)
 
 
@@ -182,9 +180,10 @@ def guarded_calls() -> dict[str, int]:
     """The numbers of the calls that :func:`guard_filter` tells of, and of ``seccomp`` itself."""
     from pyseccomp import resolve_syscall, system_arch
 
-    names = (*_AIMED, *_UNHEARD_OF, *_COUNTED, *_SIGNALLING, "pidfd_open", "seccomp", LIMITING)
-    every = (*names, *(name for name, *_ in _WAYS))
-    return {name: resolve_syscall(system_arch(), name) for name in every}
+    names = (*_AIMED, *_UNHEARD_OF, *_COUNTED, *(name for name, *_ in _WAYS))
+    return {
+        name: resolve_syscall(system_arch(), name) for name in (*names, "pidfd_open", "seccomp")
+    }
 
 
 def can_end(name: str, arguments: Sequence[int]) -> bool:
@@ -194,7 +193,7 @@ def can_end(name: str, arguments: Sequence[int]) -> bool:
         name: The call, of which the guard was told.
         arguments: Its arguments, as the kernel gives them.
     """
-    return name == LIMITING or any(
+    return any(
         name == way and arguments[place] & mask in values for way, place, values, mask in _WAYS
     )
 
@@ -215,7 +214,8 @@ def told_of(name: str, arguments: Sequence[int]) -> str | None:
         return f"called `{name}`"
     if name in _COUNTED:
         return f"called `{name}` more than {MOST_COUNTED} times"
-    if arguments[_AIMED.get(name, 0)] & _INT != INIT:
+    place = {**dict.fromkeys((*_SIGNALLING, "pidfd_open"), 0), **_AIMED}.get(name)
+    if place is None or arguments[place] & _INT != INIT:
         # A debugger or a sanitizer looks at the student's own processes.
         return None
     if name not in _SIGNALLING:

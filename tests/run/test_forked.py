@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import select
+import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -12,8 +13,10 @@ from pathlib import Path
 import pytest
 
 from grader.run import forked
-from grader.run.enclosure import Enclosure
+from grader.run.descendants import descendants, send
+from grader.run.enclosure import EnclosedProcess, Enclosure
 from grader.run.forked import ForkedProcess, NotForked
+from grader.run.guard import Guard
 from grader.sandbox.limits import Limits
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
@@ -50,6 +53,27 @@ def zygote() -> Iterator[tuple[socket.socket, socket.socket]]:
         for one in (nursery, zygote):
             one.settimeout(_LIMIT_S)
         yield nursery, zygote
+
+
+def test_a_sandbox_that_is_set_up_looks_like_no_attempt_to_end_what_runs_in_it(
+    enclosure: Enclosure,
+) -> None:
+    programs = [Path(file).read_bytes() for file in (enclosure.guard, enclosure.unheard)]
+    guard = Guard(programs[0], enclosure.calls, programs[1])
+    started = guard.start(lambda: EnclosedProcess(enclosure, ("/usr/bin/cat",), {}, (), held=True))
+    assert started.stdin is not None
+    assert started.stdout is not None
+    assert started.stderr is not None
+    with started.stdin, started.stdout, started.stderr:
+        os.write(started.stdin.fileno(), b".")
+        assert started.stdout.read(1) == b"."
+        assert started.init is not None
+        send(signal.SIGKILL, descendants(started.init))
+        started.wait(_LIMIT_S)
+    assert started.exit_code == -signal.SIGKILL
+    assert guard.can_have_ended(()) is guard.can_have_ended({started.init}) is True
+    assert not guard.can_have_ended({started.pid, started.init})
+    guard.close()
 
 
 def fork(enclosure: Enclosure, zygote: socket.socket) -> None:

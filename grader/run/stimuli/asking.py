@@ -45,15 +45,7 @@ class Asked:
     @property
     def record(self) -> Call:
         """For the recording."""
-        return Call(
-            self.service,
-            self.type,
-            self.requested_ns,
-            self.answered_ns,
-            self.request,
-            self.response,
-            self.error,
-        )
+        return Call(**vars(self))
 
 
 class Asker:

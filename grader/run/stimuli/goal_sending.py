@@ -57,25 +57,14 @@ class SentGoal:
     @property
     def record(self) -> Goal:
         """For the recording."""
+        order = self.order
+        seen = {key: value for key, value in vars(self).items() if key != "order"}
         return Goal(
-            action=self.order.action,
-            type=self.order.type,
-            goal=self.goal,
-            sent_ns=self.sent_ns,
-            accepted=self.accepted,
-            answered_ns=self.answered_ns,
-            feedback=tuple(self.feedback),
-            statuses=tuple(self.statuses),
-            cancel_after_s=self.order.cancel_after_s,
-            canceled_ns=self.canceled_ns,
-            cancel_answered_ns=self.cancel_answered_ns,
-            cancel_accepted=self.cancel_accepted,
-            status=self.status,
-            result=self.result,
-            result_ns=self.result_ns,
-            preempts=self.order.preempt,
-            preempted=self.preempted,
-            error=self.error,
+            action=order.action,
+            type=order.type,
+            cancel_after_s=order.cancel_after_s,
+            preempts=order.preempt,
+            **{**seen, "feedback": tuple(self.feedback), "statuses": tuple(self.statuses)},
         )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 
 @dataclass(frozen=True)
@@ -182,17 +182,7 @@ StimulusOrder = (
 )
 
 _KINDS: dict[str, Callable[..., StimulusOrder]] = {
-    one.__name__: one
-    for one in (
-        PublishOrder,
-        JoinOrder,
-        KillOrder,
-        RestartOrder,
-        ListParametersOrder,
-        CallOrder,
-        ParametersOrder,
-        GoalOrder,
-    )
+    one.__name__: one for one in get_args(StimulusOrder)
 }
 
 

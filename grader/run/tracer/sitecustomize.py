@@ -469,27 +469,14 @@ def _passes_on(file: str) -> bool:
 
 
 def _is_guarded(frame: Any) -> bool:
-    """Whether what a frame executes stands in a `try` or a `with`.
+    """Whether what a frame executes stands in a `try` or a `with`."""
+    import ast
 
-    See "Exception handling table format" in Objects/exception_handling_notes.txt of CPython.
-    """
-    table = iter(getattr(frame.f_code, "co_exceptiontable", b""))
-
-    def number() -> int:
-        byte = next(table)
-        value = byte & 63
-        while byte & 64:
-            byte = next(table)
-            value = value << 6 | byte & 63
-        return value
-
-    try:
-        while True:
-            begin, size, _target, _depth = number(), number(), number(), number()
-            if 2 * begin <= frame.f_lasti < 2 * (begin + size):
-                return True
-    except StopIteration:
-        return False
+    with open(frame.f_code.co_filename, "rb") as file:
+        nodes = ast.walk(ast.parse(file.read()))
+    kinds = (ast.Try, getattr(ast, "TryStar", ast.Try), ast.With, ast.AsyncWith)
+    guards = (node for node in nodes if isinstance(node, kinds))
+    return any(node.lineno <= frame.f_lineno <= (node.end_lineno or 0) for node in guards)
 
 
 def _importing_module(import_module: Any) -> Any:
