@@ -12,13 +12,20 @@ from grader.assignment.source import Model
 from grader.checks.node_name import node_name
 
 MOST_CALLS = 1000
-_AFTER = (
-    "Not before so long after the first match, nor before the answers to what is asked earlier. "
-    "What has the same `after` is asked in the order of the list; a goal is answered when it was "
-    "accepted or rejected."
-)
 
 QualifiedNode = Annotated[str, AfterValidator(node_name)]
+_After = Annotated[
+    DurationOrZero,
+    Field(
+        description="Not before so long after the first match, nor before the answers to what is "
+        "asked earlier. What has the same `after` is asked in the order of the list; a goal is "
+        "answered when it was accepted or rejected.",
+        validate_default=False,
+    ),
+]
+_Within = Annotated[
+    Duration, Field(description="How long to wait for each answer.", validate_default=False)
+]
 
 
 class ListParameters(Model):
@@ -47,11 +54,7 @@ class CallService(Model):
     requests: tuple[dict[str, Any], ...] = Field(
         (), description="Several requests, one after another, in place of one."
     )
-    after: DurationOrZero = Field(
-        0.0,
-        description=_AFTER,
-        validate_default=False,
-    )
+    after: _After = 0.0
     every: Duration | None = Field(
         None,
         description="Time between two calls; by default the next one follows the answer, or "
@@ -87,14 +90,8 @@ class ReadParameters(Model):
     read_parameters: QualifiedNode = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
-    after: DurationOrZero = Field(
-        0.0,
-        description=_AFTER,
-        validate_default=False,
-    )
-    within: Duration = Field(
-        2.0, description="How long to wait for each answer.", validate_default=False
-    )
+    after: _After = 0.0
+    within: _Within = 2.0
 
 
 class SetParameters(Model):
@@ -109,14 +106,8 @@ class SetParameters(Model):
     node: QualifiedNode = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
-    after: DurationOrZero = Field(
-        0.0,
-        description=_AFTER,
-        validate_default=False,
-    )
-    within: Duration = Field(
-        2.0, description="How long to wait for each answer.", validate_default=False
-    )
+    after: _After = 0.0
+    within: _Within = 2.0
 
 
 class SendGoal(Model):
@@ -131,11 +122,7 @@ class SendGoal(Model):
         description="Interface, such as example_interfaces/action/Fibonacci."
     )
     goal: dict[str, Any] = Field(default_factory=dict, description="The fields of the goal.")
-    after: DurationOrZero = Field(
-        0.0,
-        description=_AFTER,
-        validate_default=False,
-    )
+    after: _After = 0.0
     cancel_after: Duration | None = Field(
         None, description="Ask to cancel it so long after it was accepted."
     )

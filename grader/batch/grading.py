@@ -210,7 +210,7 @@ class Grading:
             run = partial(self._run, prepared, folder, remaps)
             self._run_all(run, again, recordings, faults, alone=False)
             self._run_all(run, alone, recordings, faults, alone=True)
-            runs.update(dict.fromkeys((*again, *alone), attempt))
+            runs.update((name, runs.get(name, 0) + 1) for name in (*again, *alone))
             result = grade(self._loaded, prepared.record, recordings, faults)
             if not result.full_points:
                 check_there(recordings)
@@ -218,6 +218,8 @@ class Grading:
             if attempt < MOST_RUNS and renamed:
                 remaps = {name: known | result.remaps[name] for name, known in remaps.items()}
                 again, alone, first = renamed, [], attempt + 1
+                # What is run again for its names is not run again for the machine.
+                runs.update(dict.fromkeys(renamed, 0))
                 continue
             alone = sorted(
                 set(result.disturbed_scenarios(Status.ERROR))

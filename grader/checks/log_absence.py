@@ -76,7 +76,7 @@ def why_not_logged(
     if cause is not None:
         return cause
     if found:
-        return _few(recording, topic, wanted, found, needed)
+        return _few(recording, topic, wanted, found, needed, nodes)
     near = _near(recording, wanted, within_ns)
     return (
         _behind(recording, topic, wanted, near, decimals, within_ns)
@@ -140,6 +140,7 @@ def _few(
     wanted: Sequence[Wanted],
     found: Sequence[Echo],
     needed: int,
+    nodes: set[str],
 ) -> Cause:
     times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
@@ -147,11 +148,7 @@ def _few(
         f"log lines follow only {len(found)} of {counted(len(wanted), 'message')} on "
         f"{code(topic)}, written {written} after launch"
     )
-    slow = why_slow(
-        recording,
-        seen,
-        {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)},
-    )
+    slow = why_slow(recording, seen, nodes)
     if slow is not None:
         return slow
     seldom_is_right = needed <= _SOME * len(wanted)

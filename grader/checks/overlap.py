@@ -55,13 +55,12 @@ def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
             Evidence(spans=spans(recording, reports)),
         )
     worst = max(found, key=lambda item: item.seconds)
-    exchanged = why_exchanged(recording)
-    declared = exchanged.observed if exchanged else concurrency.declared_words(recording)
+    declared, hint = _why(recording, _exclusion_hint(recording, names, worst))
     return Finding.failed(
         expected,
         f"{_overlap_words(recording, worst)}, and {counted(len(found), 'overlap')} in all"
-        + (f"; {declared}" if declared else ""),
-        exchanged.hint if exchanged else _exclusion_hint(recording, names, worst),
+        + declared,
+        hint,
         Evidence(
             moments=(
                 Moment(
@@ -105,6 +104,13 @@ def _exclusion_hint(recording: Recording, names: Sequence[str], overlap: Overlap
 
 def _all(found: Sequence[Overlap]) -> list[Run]:
     return [item for overlap in found for item in (overlap.one, overlap.other)]
+
+
+def _why(recording: Recording, hint: str) -> tuple[str, str]:
+    """What the declarations tell, to follow what was seen, and what to try next."""
+    exchanged = why_exchanged(recording)
+    declared = exchanged.observed if exchanged else concurrency.declared_words(recording)
+    return f"; {declared}" if declared else "", exchanged.hint if exchanged else hint
 
 
 class Overlapping(Reported):
@@ -183,15 +189,13 @@ def _serial(
     )
     if excused is not None:
         return excused
-    exchanged = why_exchanged(recording)
-    declared = exchanged.observed if exchanged else concurrency.declared_words(recording)
-    ended = reports.ended({callback, *parameters.others})
+    names = {callback, *parameters.others}
+    declared, hint = _why(recording, _concurrency_hint(recording, len(names)))
+    ended = reports.ended(names)
     return Finding.failed(
         expected,
-        observed + (f"; {declared}" if declared else ""),
-        exchanged.hint
-        if exchanged
-        else _concurrency_hint(recording, len({callback, *parameters.others})),
+        observed + declared,
+        hint,
         Evidence(
             moments=(Moment("first run", recording.since_launch_s(ended[0].begin_ns)),),
             spans=spans(recording, reports, reports.of(callback)),

@@ -330,16 +330,14 @@ def _kept(recording: Recording, parameters: Depth) -> int | None:
     """
     times_ns = [item.stamp_ns for item in recording.on(parameters.topic)]
     often = len(times_ns) > _FEWEST and times_ns[-1] - times_ns[0] < len(times_ns) * NS
-    for item in recording.student_endpoints(Kind(parameters.kind), parameters.topic):
+    own = recording.student_endpoints(Kind(parameters.kind), parameters.topic)
+    for item in own:
         if item.kept is None or item.kept == parameters.depth:
             continue
         full = item.heartbeats >= max(_FEWEST, len(times_ns) // 2) and often
         if item.kept > parameters.depth or (full and 2 * item.kept < parameters.depth):
             return item.kept
-    kept = {
-        item.kept for item in recording.student_endpoints(Kind(parameters.kind), parameters.topic)
-    }
-    return parameters.depth if kept == {parameters.depth} else None
+    return parameters.depth if {item.kept for item in own} == {parameters.depth} else None
 
 
 def _depth_hint(parameters: Depth) -> str:

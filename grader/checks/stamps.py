@@ -33,7 +33,8 @@ def why_not_believed(recording: Recording, messages: Sequence[Message]) -> Cause
         messages: In the order of their source timestamps.
 
     Returns:
-        A cause, an error where the host's disturbance may explain the difference, or None.
+        A cause, an error where the host's disturbance may explain the difference, or None. What
+        the middleware alone may have held up has to happen twice.
     """
     given = any(message.stamp_ns for message in messages)
     if not given and recording.environment.get("rmw") not in _STAMPING:
@@ -65,6 +66,7 @@ def _arrivals_differ(recording: Recording, messages: Sequence[Message]) -> Cause
             "time: the timestamps are not the times of publishing",
             _HINT,
             _arrival(recording, late[0]),
+            disturbed=True,
         )
     arrivals_ns = sorted(message.received_ns for message in live)
     source_s = median((b.stamp_ns - a.stamp_ns) / NS for a, b in pairwise(live))

@@ -261,6 +261,8 @@ def why_never_appeared(recording: Recording, what: str) -> Cause:
         "A node must stay where the environment puts it: set no ROS_DOMAIN_ID, no discovery "
         "server and no profile of the middleware, and leave the names of rclpy's methods alone.",
         Evidence(moments=(Moment("launched", 0.0),)),
+        # What was created right before the end may not have been seen yet.
+        disturbed=True,
     )
 
 

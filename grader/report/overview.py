@@ -21,7 +21,7 @@ from grader.report.clean import one_line
 from grader.report.distribution import draw_distribution
 from grader.report.html import asset, environment
 from grader.report.policy import content_security_policy
-from grader.report.result_model import CheckPart
+from grader.report.result_model import CheckPart, ScenarioPart
 from grader.report.svg import element
 from grader.report.words import STATUS, number
 
@@ -49,18 +49,6 @@ class Column:
     def total(self) -> int:
         """Submissions in which it was there."""
         return sum(self.counts.values())
-
-
-@dataclass(frozen=True)
-class Disturbed:
-    """A scenario that was run again because the machine disturbed it."""
-
-    row: ClassRow
-    scenario: str
-    runs: int
-    taken_s: float
-    worst_late_s: float
-    faults: tuple[str, ...]
 
 
 def render_overview(rows: Sequence[ClassRow]) -> str:
@@ -174,20 +162,14 @@ def _why_ungraded(row: ClassRow) -> str:
     return row.note or "nothing was graded"
 
 
-def _disturbed(rows: Sequence[ClassRow]) -> list[Disturbed]:
+def _disturbed(rows: Sequence[ClassRow]) -> list[tuple[ClassRow, ScenarioPart]]:
     """The runs that were repeated or could not be used, the most repeated first."""
     found = [
-        Disturbed(
-            row,
-            run.id,
-            run.runs,
-            run.disturbance.taken_s,
-            run.disturbance.worst_late_s,
-            run.faults,
-        )
+        (row, run)
         for row in rows
         if row.result is not None
         for run in row.result.scenarios
         if run.disturbed
     ]
-    return sorted(found, key=lambda item: (-item.runs, -item.taken_s))[:MOST_DISTURBED]
+    found.sort(key=lambda item: (-item[1].runs, -item[1].disturbance.taken_s))
+    return found[:MOST_DISTURBED]

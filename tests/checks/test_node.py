@@ -256,6 +256,7 @@ class TestExists:
     def test_a_node_that_is_declared_but_never_seen_is_excused_by_a_busy_machine_only(self):
         run = nodeless(declarations=(declared("started"), declared("node", node=NODE)))
         assert "never appeared in the ROS graph" in failing("node.exists", run, name=NODE)
+        assert judge("node.exists", run, name=NODE).disturbed
         busy = replace(run, disturbance=taken(0.1, 1.0, waited_s=0.6))
         finding = judge("node.exists", busy, name=NODE)
         assert (finding.status, finding.disturbed) == (Status.ERROR, True)

@@ -438,7 +438,10 @@ class TestForgery:
         return recording(messages={"/cmd_vel": stream}, stop_s=8, **changes)
 
     def test_stamps_that_arrivals_contradict(self):
-        found = failing("timing.period", self.forged(0.3, 0.5), topic="/cmd_vel", period="300 ms")
+        asked = {"topic": "/cmd_vel", "period": "300 ms"}
+        found = failing("timing.period", self.forged(0.3, 0.5), **asked)
+        # It counts if it happens twice.
+        assert judge("timing.period", self.forged(0.3, 0.5), **asked).disturbed
         assert "11 messages of 12 came up to 2.2 s earlier or later" in found
         assert "the timestamps are not the times of publishing" in found
 
