@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, DataEnd, Metadata, Schema
@@ -16,45 +16,12 @@ from mcap_ros2.decoder import DecoderFactory
 from pydantic import TypeAdapter
 
 from grader.errors import UsageError
-from grader.recording.interaction import Goal, Service
 from grader.recording.mcap_writer import CHANNELS, FORMAT, JOIN, SENT, TOPIC
-from grader.recording.model import (
-    Breach,
-    Call,
-    Declaration,
-    Disturbance,
-    Endpoint,
-    Incident,
-    Intervention,
-    Join,
-    LogLine,
-    Message,
-    Node,
-    Process,
-    Recording,
-    Truth,
-    Wait,
-)
+from grader.recording.model import Message, Recording
 from grader.submission.record import SubmissionRecord
 
-_FACTS: dict[str, type] = {
-    "nodes": Node,
-    "endpoints": Endpoint,
-    "processes": Process,
-    "log": LogLine,
-    "declarations": Declaration,
-    "calls": Call,
-    "services": Service,
-    "goals": Goal,
-    "waits": Wait,
-    "joins": Join,
-    "interventions": Intervention,
-    "breaches": Breach,
-    "disturbance": Disturbance,
-    "truth": Truth,
-    "incidents": Incident,
-}
-assert _FACTS.keys() == CHANNELS.keys()
+_FIELDS = get_type_hints(Recording)
+_FACTS: dict[str, type] = {name: get_args(_FIELDS[name])[0] for name in CHANNELS}
 _PLAIN = frozenset({bool, int, float, str, bytes})
 """Types of the primitive fields, and of an array of bytes."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import sys
@@ -216,15 +217,14 @@ def _open_files(pid: int) -> int:
 def _in_flight(pid: int) -> int:
     folder = f"{_PROC}/{pid}/fd"
     found = 0
-    try:
+    # It may have ended, keep to itself what it has open, or close any of it meanwhile.
+    with contextlib.suppress(OSError):
         for name in os.listdir(folder):  # noqa: PTH208  often
-            if os.readlink(f"{folder}/{name}").startswith("socket:"):  # noqa: PTH115  often
-                with open(f"{folder}info/{name}", "rb") as file:  # noqa: PTH123  often
-                    told = re.search(rb"^scm_fds:\s*(\d+)$", file.read(), re.MULTILINE)
-                found += int(told[1]) if told else 0
-    except OSError:
-        # It has ended, or keeps to itself what it has open.
-        return found
+            with contextlib.suppress(FileNotFoundError):
+                if os.readlink(f"{folder}/{name}").startswith("socket:"):  # noqa: PTH115  often
+                    with open(f"{folder}info/{name}", "rb") as file:  # noqa: PTH123  often
+                        told = re.search(rb"^scm_fds:\s*(\d+)$", file.read(), re.MULTILINE)
+                    found += int(told[1]) if told else 0
     return found
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import os
 import resource
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +20,7 @@ from grader.recording.model import Breach
 from grader.run.enclosure import Enclosure
 from grader.sandbox.limits import BUILD, Limits
 from grader.sandbox.usage import (
+    files_in_flight,
     folder_usage,
     hidden_bytes,
     memory_bytes,
@@ -177,3 +179,16 @@ def test_what_the_shell_does_not_allow_is_no_fault_of_the_student(
 def test_limits_of_a_usual_shell_are_enough() -> None:
     Limits().check_allowed()
     BUILD.check_allowed()
+
+
+def test_descriptors_in_flight_are_counted_although_others_are_closed_meanwhile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    gone, listed = "1000000", os.listdir
+    monkeypatch.setattr(os, "listdir", lambda path: [gone, *listed(path)])
+    ours = [usage for usage in usage_of([os.getpid()]) if usage.pid == os.getpid()]
+    here, there = socket.socketpair()
+    with here, there:
+        before = files_in_flight(ours)
+        socket.send_fds(here, [b"."], [0, 0, 0])
+        assert files_in_flight(ours) == before + 3
