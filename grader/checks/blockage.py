@@ -42,7 +42,7 @@ def first_unanswered(recording: Recording, nodes: Collection[str], since_ns: int
         for call in recording.calls
         if call.service.rpartition("/")[0] in nodes
         and not call.error
-        and _left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
+        and left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
     ]
     unanswered = [call for call in calls if call.answered_ns is None]
     if not unanswered or any((call.answered_ns or 0) >= since_ns for call in calls):
@@ -64,12 +64,12 @@ def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float
     for call in recording.calls:
         if call.service.rpartition("/")[0] in nodes and not call.error:
             end_ns = call.answered_ns or recording.stop_ns
-            waits.append((call, _left_s(recording, call.requested_ns, end_ns)))
+            waits.append((call, left_s(recording, call.requested_ns, end_ns)))
     waits.sort(key=lambda item: item[1])
     return waits[-2] if len(waits) > 1 else None
 
 
-def _left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
+def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
     """Time without what the machine took of it."""
     return (end_ns - begin_ns) / NS - recording.taken_s(begin_ns, end_ns)
 

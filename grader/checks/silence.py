@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from grader.assignment.unit import format_duration
 from grader.checks import compatibility, testimony
-from grader.checks.blockage import why_blocked, why_never_spun
+from grader.checks.blockage import left_s, why_blocked, why_never_spun
 from grader.checks.cause import Cause
 from grader.checks.death import why_ended
 from grader.checks.delivery import why_not_delivered
@@ -32,6 +32,8 @@ ENDED_HINT = (
 _ENDED_PERIODS = 3.0
 # Share of the observation that the host may take before silence says nothing any more.
 _STARVED = 0.5
+# Without what the host took: in so long a node answers what it was asked.
+_OWN_S = 2.0
 
 
 def why_silent(recording: Recording, topic: str) -> Cause:
@@ -66,12 +68,14 @@ def why_silent(recording: Recording, topic: str) -> Cause:
     begin_ns = [recording.sent[name][0].stamp_ns for name in asked if recording.sent[name]]
     blocked = why_blocked(recording, seen, nodes, min(begin_ns, default=recording.launched_ns))
     starved = _starved(recording, topic)
+    own_s = left_s(recording, min(begin_ns), recording.stop_ns) if begin_ns else 0.0
+    guilty = blocked or (_unanswered(recording, topic, asked) if own_s >= _OWN_S else None)
     return (
         why_unpublished(recording, topic, seen)
         or _undelivered(recording, topic, asked)
         or (_slow(recording, topic) if not asked else None)
         # A callback that never returns burns what CPU the machine leaves it.
-        or (starved and blocked and replace(blocked, disturbed=True))
+        or (starved and guilty and replace(guilty, disturbed=True))
         or starved
         or why_never_spun(recording, seen, nodes)
         or why_time_stands_still(recording, seen)

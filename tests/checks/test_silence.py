@@ -134,6 +134,13 @@ class TestNotAnswered:
         # It is run again all the same, and counts if it happens twice.
         assert judge("messages.count", run, topic="/cmd_vel", at_least=1).disturbed
 
+    def test_a_node_that_had_time_of_its_own_to_answer_is_judged_without_calls_too(self):
+        long = {"calls": (), "stop_s": 10.0, "end_s": 10.1}
+        busy = taken(0.4, 9.9, waited_s=6.0)
+        run = asked(listener(), times_s=every(0.3, 5), disturbance=busy, **long)
+        assert "although 5 messages on `/chatter` reached the node" in why(run)
+        assert judge("messages.count", run, topic="/cmd_vel", at_least=1).disturbed
+
     def test_a_node_that_got_no_cpu_is_not_blocked(self):
         calls = tuple(call(0.5 * n, None) for n in range(2, 9))
         starved = taken(0.4, 4.4, waited_s=3.2)
