@@ -411,8 +411,18 @@ def _patch_subprocess(module: Any) -> None:
     module.Popen.__init__ = made
 
 
+def _patch_multiprocessing(module: Any) -> None:
+    start = module.spawnv_passfds
+
+    def started(path: Any, args: Any, passfds: Any) -> Any:
+        return start(path, args, {*passfds, _FD} if _pipe(_FD) == _PIPE else passfds)
+
+    module.spawnv_passfds = started
+
+
 _PATCHES = {
     "subprocess": _patch_subprocess,
+    "multiprocessing.util": _patch_multiprocessing,
     "rclpy.experimental.events_executor": _patch_events_executor,
     "rclpy.node": _patch_node,
     "rclpy.publisher": lambda module: _patch_endpoint(module.Publisher),
