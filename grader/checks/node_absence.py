@@ -136,7 +136,8 @@ def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
         ended = [process for process in dead(recording) if process.exit_code != 0]
         if ended:
             return cause_of_death(recording, ended[0])
-    declared = {item.data.get("node") for item in recording.declared("node")}
+    # A process may declare anything, also what is no text.
+    declared = {str(item.data.get("node")) for item in recording.declared("node")}
     # A process that shows as many nodes as it declared only calls them by other names.
     if wanted in declared and len(declared) > len(set(names)):
         return testimony.why_never_appeared(recording, f"the node {code(wanted)}").after(there)

@@ -154,8 +154,8 @@ def test_an_interrupted_check_leaves_nothing_behind(number: signal.Signals, tmp_
         stderr=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        # Tests in the background of a shell inherit that Ctrl-C is ignored.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509
+        # Tests in the background of a shell inherit that Ctrl-C is ignored, below nohup SIGHUP.
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),  # noqa: PLW1509
     )
     assert check.stderr is not None
     for line in check.stderr:

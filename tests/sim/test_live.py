@@ -51,7 +51,8 @@ def test_without_a_terminal_it_writes_a_line_in_a_second(
 ) -> None:
     assert main([ROOM, "--domain-id", domain, "--duration", "2.0"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["1.00", "2.00"]
+    # A busy machine may let a step more pass before the line is written.
+    assert [round(float(line.split()[0])) for line in lines] == [1, 2]
     assert "ahead 3.00 m" in lines[0]
 
 
