@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import select
 import time
-import types
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,7 +56,6 @@ class Cell:
         domain_id: int,
         probe: Probe,
         wire: Wire | None = None,
-        zygotes: Mapping[str, int] = types.MappingProxyType({}),
     ) -> None:
         """Set the cell up; nothing of the student's runs yet."""
         self._order = order
@@ -66,7 +64,7 @@ class Cell:
         self._wire = wire
         on_line = tell_line if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
-        self._students = StudentProcesses(self._output, order.enclosure, zygotes)
+        self._students = StudentProcesses(self._output, order.enclosure)
         self._other_domains: tuple[int, ...] = ()
         self._graph = GraphObserver(
             probe.node,

@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import gc
 import os
-import types
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,7 +49,6 @@ def main(
     folder: Path,
     avoid_domains: tuple[int, ...],
     rights: Rights | None = None,
-    zygotes: Mapping[str, int] = types.MappingProxyType({}),
 ) -> int:
     """Get ready, wait for the word, run the order in the folder.
 
@@ -59,7 +56,6 @@ def main(
         folder: The cell's own.
         avoid_domains: Domains not to use.
         rights: In a sandbox: what the cell got hold of before it gave up its rights.
-        zygotes: Descriptors of those that fork, by :func:`grader.run.zygote.key_of`.
     """
     # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
     gc.disable()
@@ -78,7 +74,7 @@ def main(
         wire = rights.wire if rights is not None else None
         probe.listen(order.topics, order.limits)
         try:
-            recording = Cell(order, domain.domain_id, probe, wire, zygotes).run()
+            recording = Cell(order, domain.domain_id, probe, wire).run()
         except Abandoned:
             return 1
         finally:

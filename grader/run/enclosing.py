@@ -27,8 +27,6 @@ _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
 _FILTER, _GUARD, _UNHEARD = "student.bpf", "guard.bpf", "unheard.bpf"
 _WORLD, _PASSWD_FILE = "world.yaml", "passwd"
 _SYSTEM = "system"
-_MIDDLEWARE = b"RMW_IMPLEMENTATION"
-_READ_BYTES = 2**20
 
 
 def enclose(
@@ -89,7 +87,6 @@ def enclose(
             calls=sandbox.guarded_calls,
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},
-            may_fork=not (sandbox.libraries or ros.underlays or _loads_otherwise(install)),
         ),
         facts={
             **order.facts,
@@ -118,18 +115,6 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
         *bubblewrap.HIDDEN_INIT,
         *("--remount-ro", "/", "--remount-ro", "/dev"),
     ]
-
-
-def _loads_otherwise(install: Path) -> bool:
-    """Whether a program may load its libraries in another way than one that imported ahead.
-
-    The linker looks for folders of libraries at the start only, and rcl compares the middleware
-    that is asked for with the one that is there as it is loaded.
-    """
-    files = [file for file in install.rglob("*") if file.is_file()]
-    return any(
-        ".so" in file.suffixes or _MIDDLEWARE in file.read_bytes()[:_READ_BYTES] for file in files
-    )
 
 
 def _copy(folders: Iterable[Path], into: Path) -> dict[Path, str]:

@@ -45,8 +45,6 @@ class Enclosure:
         calls: Numbers of the calls that it asks about.
         limits: What its processes may take.
         folders: Folder inside -> where the cell finds it.
-        may_fork: Whether a zygote's process can be what an interpreter would be that is started
-            in it.
     """
 
     arguments: tuple[str, ...]
@@ -56,7 +54,6 @@ class Enclosure:
     calls: dict[str, int]
     limits: Limits
     folders: dict[str, str]
-    may_fork: bool = False
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Enclosure:
@@ -81,8 +78,6 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         argv: Sequence[str],
         environment: Mapping[str, str],
         pass_fds: Sequence[int],
-        *,
-        held: bool = False,
     ) -> None:
         """Start it.
 
@@ -91,7 +86,6 @@ class EnclosedProcess(subprocess.Popen[bytes]):
             argv: What to execute.
             environment: Its variables.
             pass_fds: Descriptors that it inherits.
-            held: Whether its standard input is a pipe of ours.
 
         Raises:
             OSError: It cannot be executed.
@@ -119,7 +113,7 @@ class EnclosedProcess(subprocess.Popen[bytes]):
                 ],
                 cwd="/",
                 env={"PATH": "/usr/bin:/bin"},
-                stdin=subprocess.PIPE if held else subprocess.DEVNULL,
+                stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 pass_fds=(*pass_fds, given, rules, status),
@@ -138,11 +132,6 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         return self._init
 
     @property
-    def group(self) -> int | None:
-        """Process group of the student's process; None before there is one."""
-        return self.init
-
-    @property
     def was_set_up(self) -> bool:
         """Whether the sandbox stood and the student's program was started; asked at its end."""
         return "exit-code" in self._read_status()
@@ -150,10 +139,7 @@ class EnclosedProcess(subprocess.Popen[bytes]):
     @property
     def exit_code(self) -> int | None:
         """As in :mod:`subprocess`: negative for the signal that ended it."""
-        return self._as_signal(self.returncode)
-
-    @staticmethod
-    def _as_signal(code: int | None) -> int | None:
+        code = self.returncode
         if code is not None and code > _SIGNALLED and code - _SIGNALLED in _signal_numbers():
             return _SIGNALLED - code
         return code
@@ -164,16 +150,16 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         Raises:
             ProcessLookupError: It is not there.
         """
-        init, group = self.init, self.group
-        if group is None and number is not signal.SIGKILL:
+        init = self.init
+        if init is None and number is not signal.SIGKILL:
             raise ProcessLookupError
-        if init is None or group is None or number is not signal.SIGKILL:
-            os.killpg(group or self.pid, number)
+        if init is None or number is not signal.SIGKILL:
+            os.killpg(init or self.pid, number)
             return
         # Without its init everything would be gone, and nobody could say what was left behind.
         for pid in descendants(init):
             with contextlib.suppress(ProcessLookupError):
-                if os.getpgid(pid) == group:
+                if os.getpgid(pid) == init:
                     os.kill(pid, number)
 
     def _read_status(self) -> dict[str, Any]:

@@ -28,7 +28,6 @@ _CONTINUE = 1
 # linux/prctl.h
 _PR_SET_NO_NEW_PRIVS = 38
 _INSTRUCTION_BYTES = 8
-_MORE, _END = b"+", b"."
 # id, process, flags, number, architecture, instruction, six arguments
 _ASKED = struct.Struct("=QIIiIQ6Q")
 # id, value, negative error, flags
@@ -54,7 +53,7 @@ class Guard:
         self._names = {number: name for name, number in calls.items()}
         self._starter = ThreadPoolExecutor(1, "starter")
         listener = self._starter.submit(_install, (program, unheard), calls["seccomp"]).result()
-        self._listeners = [] if listener is None else [listener]
+        self._listener = listener
         self._ending: set[int] = set()
         self._deeds: list[str] = []
         self._counted = 0
@@ -70,19 +69,10 @@ class Guard:
         """
         return self._starter.submit(start).result()
 
-    def watch(self, listener: int) -> None:
-        """Answer as well what is asked through another filter.
-
-        Args:
-            listener: Descriptor; closed with the guard.
-        """
-        self._listeners.append(listener)
-        os.write(self._wake_write, _MORE)
-
     @property
     def is_heard(self) -> bool:
         """Whether it is told of what the student's processes do."""
-        return bool(self._listeners)
+        return self._listener is not None
 
     def can_have_ended(self, ours: Collection[int | None]) -> bool:
         """Whether the student's processes may have killed or stopped one of them themselves.
@@ -99,26 +89,23 @@ class Guard:
 
     def close(self) -> None:
         """End; call it when nothing that was started lives any more."""
-        os.write(self._wake_write, _END)
+        os.close(self._wake_write)
         self._thread.join()
         self._starter.shutdown()
-        for descriptor in (self._wake_read, self._wake_write, *self._listeners):
-            os.close(descriptor)
+        os.close(self._wake_read)
+        if self._listener is not None:
+            os.close(self._listener)
 
     def _listen(self) -> None:
         poll = select.poll()
-        poll.register(self._wake_read, select.POLLIN)
-        watched = 0
+        poll.register(self._wake_read, 0)
+        if self._listener is not None:
+            poll.register(self._listener, select.POLLIN)
         while True:
-            new = self._listeners[watched:]
-            for descriptor in new:
-                poll.register(descriptor, select.POLLIN)
-            watched += len(new)
             for descriptor, events in poll.poll():
                 if descriptor == self._wake_read:
-                    if os.read(descriptor, 1) == _END:
-                        return
-                elif events & select.POLLIN:
+                    return
+                if events & select.POLLIN:
                     # Whoever asked may have been killed meanwhile.
                     with contextlib.suppress(OSError):
                         self._answer(descriptor)

@@ -5,9 +5,6 @@ descriptor. Interpreter start, imports and loading of the DDS libraries are most
 costs; here they are paid once for all cells of a batch. Nothing of a student's is ever imported
 by it, and it has neither a node nor a thread of its own, so that a fork of it is a whole
 process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without them.)
-
-Students' programs are not forked from it but from interpreters of their own, which it keeps; see
-:mod:`grader.run.zygote`.
 """
 
 from __future__ import annotations
@@ -28,7 +25,7 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -38,7 +35,6 @@ from grader.run.descendants import descendants, is_stopped, kill_tree, send
 from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
 from grader.run.readable import readable
 from grader.run.stall import Stall
-from grader.run.zygote import Zygotes
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.namespaces import CELL, enter
@@ -74,8 +70,8 @@ class ForkedCell:
         stdin: It goes on while this is open.
         stdout: Its progress.
         returncode: As in :mod:`subprocess`, or None while it runs.
-        cpu_s: CPU time of it and of all processes of the student, and what the nursery and its
-            zygotes took since another one ended; known at its end.
+        cpu_s: CPU time of it and of all processes of the student, and what the nursery
+            took since another one ended; known at its end.
     """
 
     def __init__(
@@ -221,20 +217,6 @@ class Nursery:
                 os.close(descriptor)
         return ForkedCell(open(in_write, "w"), open(out_read), status_read, self._kill)  # noqa: PTH123
 
-    def expect(self, argv: Sequence[str], environment: Mapping[str, str], seccomp: int) -> None:
-        """Say that a cell is about to start a program of a student's in its sandbox.
-
-        Args:
-            argv: Python and the program.
-            environment: Its variables, without those of one run.
-            seccomp: Number of seccomp(2) on this machine.
-        """
-        program = {"argv": list(argv), "environment": dict(environment), "seccomp": seccomp}
-        asked = {"program": program}
-        # Whoever starts the next cell finds out whether it has ended.
-        with contextlib.suppress(OSError):
-            self._socket.send(json.dumps(asked).encode())
-
     def _send(self, request: bytes, descriptors: list[int]) -> None:
         deadline = time.monotonic() + _IN_FLIGHT_S
         while True:
@@ -271,8 +253,8 @@ class Nursery:
     def _end_stopped(self) -> None:
         """Kill what a signal such as SIGSTOP has stopped: whoever waits for it would hang.
 
-        That is this process, a cell or an interpreter that imported ahead. A cell itself ends
-        student's processes that are stopped, and sooner.
+        That is this process or a cell. A cell itself ends student's processes that are stopped,
+        and sooner.
         """
         before: frozenset[int] = frozenset()
         while not self._closed.wait(_STOPPED_S):
@@ -308,16 +290,12 @@ def _serve(requests: socket.socket) -> None:
     signal.set_wakeup_fd(ended_write, warn_on_full_buffer=False)
     signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
     sources = [requests.fileno(), ended_read]
-    zygotes = Zygotes()
     told_s = 0.0
     # Without anybody to ask for more, the cells that run are still waited for, but not those
     # that hang: whoever could kill them is gone.
     limit_s: float | None = None
     while len(sources) > 1 or running:
-        heard = zygotes.sockets()
-        ready = readable((*sources, *heard), limit_s)
-        for descriptor in ready & set(heard):
-            zygotes.hear(descriptor)
+        ready = readable(tuple(sources), limit_s)
         if not ready:
             for pid in running:
                 kill_tree(pid)
@@ -325,7 +303,7 @@ def _serve(requests: socket.socket) -> None:
         if ended_read in ready:
             with contextlib.suppress(BlockingIOError):
                 os.read(ended_read, 4096)
-            own_s = time.process_time() + zygotes.cpu_s
+            own_s = time.process_time()
             if _tell_ended(running, own_s - told_s):
                 told_s = own_s
         if requests.fileno() in ready:
@@ -333,12 +311,9 @@ def _serve(requests: socket.socket) -> None:
             request = json.loads(text) if text else {}
             if request.get("kill") in running:
                 os.kill(request["kill"], signal.SIGKILL)
-            elif "program" in request:
-                zygotes.ask(**request["program"])
             elif "arguments" in request:
-                _fork(requests, request, descriptors, running, zygotes.ready())
+                _fork(requests, request, descriptors, running)
             elif not text:
-                zygotes.close()
                 sources.remove(requests.fileno())
                 limit_s = _ORPHANED_LIMIT_S
 
@@ -348,14 +323,13 @@ def _fork(
     request: dict[str, Any],
     descriptors: list[int],
     running: dict[int, int],
-    zygotes: dict[str, int],
 ) -> None:
     _import(request["imports"])
     *standard, status = descriptors
     pid = os.fork()
     if pid == 0:
         requests.close()
-        _become_cell(request["arguments"], standard, zygotes, private=request["private"])
+        _become_cell(request["arguments"], standard, private=request["private"])
     for descriptor in standard:
         os.close(descriptor)
     running[pid] = status
@@ -382,10 +356,7 @@ def _tell_ended(running: dict[int, int], own_s: float) -> bool:
             return has_told
         if not pid:
             return has_told
-        descriptor = running.pop(pid, None)
-        if descriptor is None:
-            # A zygote.
-            continue
+        descriptor = running.pop(pid)
         cpu_s = usage.ru_utime + usage.ru_stime + (0.0 if has_told else own_s)
         has_told = True
         told = _TOLD.pack(os.waitstatus_to_exitcode(status), cpu_s)
@@ -395,9 +366,7 @@ def _tell_ended(running: dict[int, int], own_s: float) -> bool:
         os.close(descriptor)
 
 
-def _become_cell(
-    arguments: list[str], descriptors: list[int], zygotes: dict[str, int], *, private: bool
-) -> None:
+def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool) -> None:
     """Run a cell in this process, which was just forked, and end it."""
     status = 1
     try:
@@ -410,7 +379,7 @@ def _become_cell(
             os.dup2(descriptor, target)
         # Of a class on a large machine there are hundreds, one for each cell that runs.
         for descriptor in [int(path.name) for path in Path("/proc/self/fd").iterdir()]:
-            if descriptor > 2 and descriptor not in zygotes.values():
+            if descriptor > 2:
                 with contextlib.suppress(OSError):
                     os.close(descriptor)
         folder, rights = Path(arguments[0]), None
@@ -419,7 +388,7 @@ def _become_cell(
             stall = Stall(Path("/proc/1"))
             rights = enter(folder, stall.sentence)
             folder = CELL
-        status = main(folder, tuple(map(int, arguments[1:])), rights, zygotes)
+        status = main(folder, tuple(map(int, arguments[1:])), rights)
         sys.stdout.flush()
     except BaseException:
         traceback.print_exc()

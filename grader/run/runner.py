@@ -252,8 +252,6 @@ class Runner:
                     worlds,
                     remaps,
                 )
-                if order.enclosure is not None and order.enclosure.may_fork:
-                    self._expect(order, order.enclosure.calls["seccomp"])
                 recording.parent.mkdir(parents=True, exist_ok=True)
                 launched_ns = time.time_ns()
                 try:
@@ -324,13 +322,6 @@ class Runner:
         if self._nursery is None:
             self._nursery = Nursery(self.ros, self.sandbox)
         return CellProcess(self._nursery, imports)
-
-    def _expect(self, order: CellOrder, seccomp: int) -> None:
-        for command in order.commands:
-            if command.argv[0] == str(self.ros.python):
-                with self._lock:
-                    if self._nursery is not None:
-                        self._nursery.expect(command.argv, order.environment, seccomp)
 
     def _give_back(self, cell: CellProcess) -> None:
         cell.close()

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import time
-import types
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,13 +23,11 @@ from grader.run.descendants import (
 )
 from grader.run.disturbance import DisturbanceMeter
 from grader.run.enclosure import EnclosedProcess, Enclosure
-from grader.run.forked import ForkedProcess, NotForked
 from grader.run.guard import Guard
 from grader.run.order import Limits
 from grader.run.output import OutputReader
 from grader.run.shared_memory import remove_orphaned_segments
 from grader.run.stopwatch import Stopwatch
-from grader.run.zygote import key_of
 
 _AFTERMATH_S = 0.5
 _STOP_TICK_S = 0.005
@@ -93,21 +90,18 @@ class StudentProcesses:
         self,
         output: OutputReader,
         enclosure: Enclosure | None = None,
-        zygotes: Mapping[str, int] = types.MappingProxyType({}),
     ) -> None:
         """Prepare; nothing is started yet.
 
         Args:
             output: Reads what they write.
             enclosure: The sandbox that each of them gets, or None.
-            zygotes: Descriptors of those that fork, by :func:`grader.run.zygote.key_of`.
 
         Raises:
             OSError: Nobody can watch over a sandbox here.
         """
         self._output = output
         self._enclosure = enclosure
-        self._zygotes = zygotes
         self._guard: Guard | None = None
         if enclosure is not None:
             program, unheard = Path(enclosure.guard), Path(enclosure.unheard)
@@ -174,13 +168,6 @@ class StudentProcesses:
     ) -> subprocess.Popen[bytes]:
         variables = {**environment, **of_run}
         if self._enclosure is not None and self._guard is not None:
-            zygote = self._zygotes.get(key_of(argv, environment))
-            if zygote is not None and self._enclosure.may_fork:
-                watch = self._guard.watch
-                with contextlib.suppress(NotForked):
-                    return self._guard.start(
-                        partial(ForkedProcess, self._enclosure, zygote, variables, pass_fds, watch)
-                    )
             return self._guard.start(
                 partial(EnclosedProcess, self._enclosure, argv, variables, pass_fds)
             )

@@ -103,7 +103,6 @@ def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(tmp_pat
     next(sandbox.python_tree.glob("lib/python3*/site-packages/rclpy/node.py")).unlink()
     with pytest.raises(GraderFault, match="files of the students' Python were deleted"):
         check()
-    # Its zygotes would start from what is left of them.
     assert not nursery.is_alive
     nursery.close()
 

@@ -28,12 +28,6 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-if "ROSGRADE_ZYGOTE_FD" in os.environ:
-    import _rosgrade_zygote  # type: ignore[import-not-found]
-
-    _rosgrade_zygote.serve()
-    del _rosgrade_zygote
-
 _FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
 _SEEN_FD = int(os.environ.get("ROSGRADE_SEEN_FD", "-1"))
 _HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
