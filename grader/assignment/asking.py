@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 from grader.assignment.name import InterfaceName, TopicName
 from grader.assignment.quantity import Duration, DurationOrZero
 from grader.assignment.source import Model
-from grader.checks.node_name import node_name
+from grader.checks.node.node_name import node_name
 
 MOST_CALLS = 1000
 

@@ -15,12 +15,12 @@ from grader.assignment.document import Place
 from grader.assignment.draft import Draft
 from grader.assignment.model import Scenario
 from grader.assignment.unit import format_duration
-from grader.checks.action import OfGoals, Result
-from grader.checks.action_end import Cancels, Preempts
-from grader.checks.lifecycle import State
-from grader.checks.parameter import Declared, OfParameter, same_value
-from grader.checks.service import Concurrent, Responds
-from grader.checks.source import Ruff
+from grader.checks.action.action import OfGoals, Result
+from grader.checks.action.action_end import Cancels, Preempts
+from grader.checks.lifecycle.lifecycle import State
+from grader.checks.parameter.parameter import Declared, OfParameter, same_value
+from grader.checks.service.service import Concurrent, Responds
+from grader.checks.source.source import Ruff
 from grader.errors import GraderFault, Problem
 from grader.nearest import did_you_mean
 from grader.submission.lint import find_ruff, known_rules

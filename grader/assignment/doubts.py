@@ -12,9 +12,9 @@ from grader.assignment.mutant import Mutant
 from grader.assignment.quantity import QuantityOf
 from grader.assignment.stimulus import Join, Publish
 from grader.assignment.unit import Dimension, format_duration
-from grader.checks.drive import Drives
-from grader.checks.messages import Count
-from grader.checks.timing import Period
+from grader.checks.messages.messages import Count
+from grader.checks.motion.drive import Drives
+from grader.checks.timing.timing import Period
 from grader.checks.tolerance import TimeTolerance
 from grader.checks.wording import percent
 from grader.nearest import did_you_mean

@@ -18,7 +18,7 @@ from typing import Any
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Scenario
-from grader.checks.measure import metres
+from grader.checks.motion.measure import metres
 from grader.checks.wording import counted
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.grade import Grade

@@ -1,47 +1,20 @@
-"""The catalogue of checks: every check by its name."""
+"""The catalogue of checks: every check by its name.
+
+A family is a package beside this module, named as the first part of the names of its checks; a
+check is whatever one of its modules makes with :func:`grader.checks.check.check`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
+from pkgutil import iter_modules
 from types import MappingProxyType, ModuleType
 
+from grader import checks
 from grader.checks.check import Check
 from grader.nearest import did_you_mean
-
-FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "package": ("package", "dependency"),
-        "interface": ("interface",),
-        "source": ("source",),
-        "node": ("node",),
-        "topic": ("topic", "untouched"),
-        "qos": ("qos", "peer", "late_joiner"),
-        "messages": ("messages", "following", "sequence"),
-        "timing": ("timing", "rate", "latency"),
-        "executor": ("executor", "timer"),
-        "callbacks": ("callbacks", "overlap", "together"),
-        "service": ("service",),
-        "action": ("action", "action_end"),
-        "parameter": ("parameter", "parameter_effect"),
-        "lifecycle": ("lifecycle",),
-        "log": ("log", "log_content"),
-        "motion": (
-            "drive",
-            "straight",
-            "stop",
-            "contact",
-            "goal",
-            "turning",
-            "proportional",
-            "limits",
-            "slowing",
-        ),
-        "rotation": ("rotation",),
-    }
-)
-"""First part of the names of checks -> modules of this package that define them."""
 
 
 def gather(modules: Iterable[ModuleType]) -> Mapping[str, Check]:
@@ -61,10 +34,20 @@ def gather(modules: Iterable[ModuleType]) -> Mapping[str, Check]:
     return MappingProxyType(found)
 
 
+def families() -> list[str]:
+    """First parts of the names of checks: each is a package beside this module."""
+    return sorted(found.name for found in iter_modules(checks.__path__) if found.ispkg)
+
+
 @cache
 def _family(family: str) -> Mapping[str, Check]:
-    modules = FAMILIES.get(family, ())
-    return gather(import_module(f"grader.checks.{module}") for module in modules)
+    if family not in families():
+        return MappingProxyType({})
+    package = import_module(f"{checks.__name__}.{family}")
+    names = sorted(found.name for found in iter_modules(package.__path__))
+    # What the whole family is about comes first.
+    names.sort(key=lambda name: name != family)
+    return gather(import_module(f"{package.__name__}.{name}") for name in names)
 
 
 class _Catalogue(Mapping[str, Check]):
@@ -74,7 +57,7 @@ class _Catalogue(Mapping[str, Check]):
         return _family(name.partition(".")[0])[name]
 
     def __iter__(self) -> Iterator[str]:
-        for family in FAMILIES:
+        for family in families():
             yield from _family(family)
 
     def __len__(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 
-from grader.checks.lateness import taken_s
+from grader.checks.motion.lateness import taken_s
 from grader.recording.model import NS, Recording
 
 # As long as a timer of 10 Hz makes a command wait anyway; tolerances are made for that.

@@ -17,7 +17,7 @@ from grader.assignment.model import CheckSpec
 from grader.checks.check import Subject
 from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Finding, Status
-from grader.checks.runtime_imports import with_runtime_imports
+from grader.checks.package.runtime_imports import with_runtime_imports
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding
 from grader.grade.order import dependency_order
 from grader.grade.points import points_for

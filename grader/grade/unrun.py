@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from grader.checks.finding import Finding
-from grader.checks.unbuilt import why_lacking, why_not_built
+from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.submission.record import SubmissionRecord
 
 

@@ -9,7 +9,7 @@ from itertools import groupby
 
 from markupsafe import Markup
 
-from grader.checks.track import REST_M_S, REST_RAD_S
+from grader.checks.motion.track import REST_M_S, REST_RAD_S
 from grader.recording.model import Recording, Scene, Truth
 from grader.report import axis
 from grader.report.axis import time_axis

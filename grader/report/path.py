@@ -10,9 +10,9 @@ from itertools import accumulate
 
 from markupsafe import Markup
 
-from grader.checks.ground import ahead
-from grader.checks.measure import metres
-from grader.checks.track import first_rest, has_moved
+from grader.checks.motion.ground import ahead
+from grader.checks.motion.measure import metres
+from grader.checks.motion.track import first_rest, has_moved
 from grader.checks.wording import counted, listing
 from grader.recording.model import NS, Recording, Scene, Truth
 from grader.report import ground_plan

@@ -15,7 +15,7 @@ from typing import Any
 from markupsafe import Markup
 
 from grader.assignment.model import Assignment, Scenario
-from grader.checks.measure import metres
+from grader.checks.motion.measure import metres
 from grader.recording.model import NS, Message, Recording, Scene, Truth
 from grader.report.clean import one_line
 from grader.report.ground_plan import places

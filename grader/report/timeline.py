@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from grader.checks.finding import Moment
-from grader.checks.topic_absence import OWN_TOPICS
 from grader.checks.wording import counted, listing
+from grader.diagnosis.no_endpoint import OWN_TOPICS
 from grader.recording.model import NS, Call, LogLine, Owner, Process, Recording
 from grader.report import axis
 from grader.report.axis import time_axis

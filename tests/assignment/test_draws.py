@@ -17,15 +17,15 @@ from grader.assignment.drawing import draw_values, world_values
 from grader.assignment.load import load_assignment
 from grader.assignment.own_check import load_function
 from grader.assignment.simulation import read_scenario_world
-from grader.checks.conversion import (
+from grader.checks.field import value_at
+from grader.checks.log.printed import shows
+from grader.checks.rotation.conversion import (
     CONVERSIONS,
     Group,
     oracle,
     rotations_of_answers,
 )
-from grader.checks.field import value_at
-from grader.checks.printed import shows
-from grader.checks.rotation_slip import SLIPS
+from grader.checks.rotation.rotation_mistakes import SLIPS
 from sim.lidar import Lidar
 
 Rows = NDArray[np.float64]

@@ -12,7 +12,7 @@ from grader.assignment.drawing import draw_values, world_values
 from grader.assignment.load import load_assignment
 from grader.assignment.model import Scenario
 from grader.assignment.simulation import read_scenario_world
-from grader.checks.following import Follows
+from grader.checks.messages.following import Follows
 from sim.robot import make_robot
 from sim.simulation import STEP_S, Sensors, Simulation
 

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from functools import cache
 from importlib import import_module
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -184,7 +184,8 @@ def test_every_check_is_tried_here():
 
 def test_every_check_that_is_defined_is_found_by_its_family():
     modules = [
-        import_module(f"grader.checks.{module.name}") for module in iter_modules(checks.__path__)
+        import_module(module.name)
+        for module in walk_packages(checks.__path__, f"{checks.__name__}.")
     ]
     defined = {
         item.name for module in modules for item in vars(module).values() if isinstance(item, Check)
@@ -251,7 +252,7 @@ def test_the_catalogue_cannot_be_changed():
 
 
 def test_two_checks_of_one_name_are_refused():
-    from grader.checks import node
+    from grader.checks.node import node
 
     with pytest.raises(ValueError, match="two checks are called"):
         gather((node, node))

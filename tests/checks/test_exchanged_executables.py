@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.checks.exchanged_executables import why_exchanged
+from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.recording.model import Kind
 from tests.checks.builder import (
     BOT,

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.failure import (
+from grader.diagnosis.process.raised import (
     fatal_failure,
     interrupted_place,
     parse_failures,

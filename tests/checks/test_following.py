@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from grader.checks.finding import Status
-from grader.checks.source_value import yaw
+from grader.checks.messages.source_value import yaw
 from grader.recording.model import Kind, Recording, Scene
 from tests.checks.builder import (
     declarations,

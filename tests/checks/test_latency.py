@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
-from grader.checks.latency import reactions
+from grader.checks.timing.latency import reactions
 from grader.recording.model import Kind
 from tests.checks.builder import (
     declarations,

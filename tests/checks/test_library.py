@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.checks.library import lacking_package, library_hint
+from grader.diagnosis.process.missing_library import lacking_package, library_hint
 from grader.recording.model import Ending, Recording
 from grader.submission.record import PackageRecord, SubmissionRecord
 

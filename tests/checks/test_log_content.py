@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.checks.logged import logged
+from grader.checks.log.logged import logged
 from grader.recording.model import Ending
 from tests.checks.asking import logs
 from tests.checks.builder import (

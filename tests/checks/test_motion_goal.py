@@ -9,11 +9,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from grader.assignment.load import load_assignment
-from grader.checks.approach import Approach
 from grader.checks.finding import Status
-from grader.checks.law import Sample, examine
-from grader.checks.measure import degrees
-from grader.checks.misread_yaw import misread_yaw
+from grader.checks.motion.approach import Approach
+from grader.checks.motion.control_law import Sample, examine
+from grader.checks.motion.measure import degrees
+from grader.diagnosis.motion.misread_yaw import misread_yaw
 from sim.motion import Pose
 from tests.checks.builder import (
     INSTALLED,

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from grader.checks.finding import Status
-from grader.checks.ground import ahead, edge_m, nearest
-from grader.checks.law import Law, Sample, examine
-from grader.checks.measure import degrees, metres, point, side, speed
+from grader.checks.motion.control_law import Law, Sample, examine
+from grader.checks.motion.ground import ahead, edge_m, nearest
+from grader.checks.motion.measure import degrees, metres, point, side, speed
 from grader.checks.reference import (
     AngleOrName,
     Goal,

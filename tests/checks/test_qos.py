@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from grader.checks.compatibility import refusals
 from grader.checks.finding import Status
+from grader.checks.qos.compatibility import refusals
 from grader.recording.model import Kind, Qos
 from tests.checks.builder import (
     RELIABLE,

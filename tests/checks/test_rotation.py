@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from grader.assignment.load import find_assignment
 from grader.assignment.own_check import load_function
-from grader.checks.conversion import CONVERSIONS, Group, angles_between, oracle
 from grader.checks.finding import Status
-from grader.checks.rotation_case import rows
-from grader.checks.rotation_slip import SLIPS
+from grader.checks.rotation.conversion import CONVERSIONS, Group, angles_between, oracle
+from grader.checks.rotation.rotation_case import rows
+from grader.checks.rotation.rotation_mistakes import SLIPS
 from tests.checks.builder import (
     died,
     endpoint,

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from grader.checks.finding import Case, Cases, Comparison, Evidence, Finding, Moment, Plot, Span
-from grader.checks.track import speed_plot
+from grader.checks.motion.track import speed_plot
 from grader.grade import grade
 from grader.recording.model import Breach, Recording
 from grader.report.replay import Replay, make_replay

@@ -16,7 +16,7 @@ from uuid import uuid4
 import pytest
 
 from grader import ros
-from grader.checks import testimony
+from grader.checks import declarations as testimony
 from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Status
 from grader.errors import GraderFault

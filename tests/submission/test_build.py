@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.checks.unbuilt import why_not_built
+from grader.diagnosis.not_built import why_not_built
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.run.descendants import descendants

@@ -7,7 +7,7 @@ from typing import Any
 
 from rclpy.serialization import serialize_message
 
-from grader.checks.compatibility import refusals
+from grader.checks.qos.compatibility import refusals
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Kind, Qos, Wait
 from grader.run.probe import import_interface, qos_profile

@@ -1,0 +1,260 @@
+"""Checks of callbacks that report when they start and end: whether they run at the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydantic import Field
+
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
+from grader.checks.callbacks import concurrency
+from grader.checks.callbacks.callback_run import (
+    Overlap,
+    Reports,
+    Run,
+    overlaps,
+    read_reports,
+    spans,
+)
+from grader.checks.check import Subject, check
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.wording import code, codes, counted, listing
+from grader.diagnosis.exchanged_executables import why_exchanged
+from grader.diagnosis.missing_reports import Reported, why_unreported
+from grader.recording.model import NS, Recording
+
+
+class NeverOverlap(Reported):
+    """Parameters of callbacks.never_overlap."""
+
+    at_least: int = Field(2, ge=1, description="How often each callback must have run.")
+
+
+@check("callbacks.never_overlap", Subject.RECORDING, NeverOverlap)
+def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
+    """Callbacks never run at the same time.
+
+    No two runs of the named callbacks may overlap, neither of different ones nor of the same one.
+    Judged by their reports on the wire; the executor and the callback groups that the process
+    declared only help to explain.
+
+    Explains several threads where one is expected, and a callback in a reentrant group.
+    """
+    names = parameters.callbacks
+    expected = (
+        f"no two runs of {codes(names, 'or')} at the same time"
+        if len(names) > 1
+        else f"{code(names[0])} never running twice at the same time"
+    )
+    reports = read_reports(recording.on(parameters.topic))
+    cause = why_unreported(
+        recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
+    )
+    if cause is not None:
+        return cause.finding(expected)
+    runs = reports.ended(names)
+    found = list(overlaps(runs))
+    if not found:
+        return Finding.passed(
+            expected,
+            f"{counted(len(runs), 'run')}, one after the other",
+            Evidence(spans=spans(recording, reports)),
+        )
+    worst = max(found, key=lambda item: item.seconds)
+    declared, hint = _why(recording, _exclusion_hint(recording, names, worst))
+    return Finding.failed(
+        expected,
+        f"{_overlap_words(recording, worst)}, and {counted(len(found), 'overlap')} in all"
+        + declared,
+        hint,
+        Evidence(
+            moments=(
+                Moment(
+                    f"{worst.one.callback} and {worst.other.callback} overlap",
+                    recording.since_launch_s(worst.other.begin_ns),
+                ),
+            ),
+            spans=spans(recording, reports, _all(found)),
+        ),
+    )
+
+
+def _overlap_words(recording: Recording, overlap: Overlap) -> str:
+    when_s = recording.since_launch_s(overlap.other.begin_ns)
+    at_once = (
+        f"at the same time for {format_duration(overlap.seconds)}, {when_s:.2f} s after launch"
+    )
+    if overlap.one.callback == overlap.other.callback:
+        return f"{code(overlap.one.callback)} ran twice {at_once}"
+    return f"{code(overlap.one.callback)} and {code(overlap.other.callback)} ran {at_once}"
+
+
+def _exclusion_hint(recording: Recording, names: Sequence[str], overlap: Overlap) -> str:
+    if concurrency.forbids(recording, itself=overlap.one.callback == overlap.other.callback):
+        return (
+            "The executor and the groups would not allow it, so something else runs the work: a "
+            "thread that a callback starts, a second executor or a second process. Work in the "
+            "callback itself, from its first report to its last."
+        )
+    if overlap.one.callback == overlap.other.callback:
+        return (
+            "Give the subscription a MutuallyExclusiveCallbackGroup: "
+            "self.create_subscription(..., callback_group=self.group). In a "
+            "ReentrantCallbackGroup a callback may run again while it still runs."
+        )
+    return (
+        "A SingleThreadedExecutor, which rclpy.spin(node) uses too, runs one callback at a time; "
+        "with a MultiThreadedExecutor only those of one MutuallyExclusiveCallbackGroup do."
+    )
+
+
+def _all(found: Sequence[Overlap]) -> list[Run]:
+    return [item for overlap in found for item in (overlap.one, overlap.other)]
+
+
+def _why(recording: Recording, hint: str) -> tuple[str, str]:
+    """What the declarations tell, to follow what was seen, and what to try next."""
+    exchanged = why_exchanged(recording)
+    declared = exchanged.observed if exchanged else concurrency.declared_words(recording)
+    return f"; {declared}" if declared else "", exchanged.hint if exchanged else hint
+
+
+class Overlapping(Reported):
+    """Parameters of callbacks.overlap."""
+
+    others: tuple[str, ...] = Field(
+        min_length=1, description="Callbacks with which each of them must overlap, with any."
+    )
+    at_least: int = Field(2, ge=1, description="How often.")
+    by: Duration = Field(
+        0.05,
+        description="How long both must run for it to count, by default 50 ms.",
+        validate_default=False,
+    )
+
+
+@check("callbacks.overlap", Subject.RECORDING, Overlapping)
+def overlap(recording: Recording, parameters: Overlapping) -> Finding:
+    """Callbacks run at the same time.
+
+    Each of the named callbacks must overlap with one of the others, at least `at_least` times by
+    `by` or longer. Judged by their reports on the wire; the executor and the callback groups that
+    the process declared only help to explain.
+
+    Explains an executor with one thread or fewer threads than callbacks, and callbacks in one
+    mutually exclusive group. A MultiThreadedExecutor takes as many threads as there are CPUs; the
+    grader gives it four at least, and os.cpu_count() says so. Where that is not possible and the
+    machine has one CPU, it cannot be judged, which costs no point.
+    """
+    expected = (
+        f"{codes(parameters.callbacks)} running at the same time as "
+        f"{codes(parameters.others, 'or')}, "
+        f"{counted(parameters.at_least, 'time')} or more by "
+        f"{format_duration(parameters.by)}"
+    )
+    reports = read_reports(recording.on(parameters.topic))
+    everybody = (*parameters.callbacks, *parameters.others)
+    cause = why_unreported(recording, parameters.topic, everybody, reports)
+    if cause is not None:
+        return cause.finding(expected)
+    told = []
+    for callback in parameters.callbacks:
+        number = len(_with_others(reports, callback, parameters, parameters.by))
+        told.append(f"{code(callback)} did so {counted(number, 'time')}")
+        if number < parameters.at_least:
+            return _serial(recording, parameters, reports, callback, number, expected)
+    return Finding.passed(expected, listing(told), Evidence(spans=spans(recording, reports)))
+
+
+def _with_others(
+    reports: Reports, callback: str, parameters: Overlapping, least_s: float
+) -> list[Overlap]:
+    runs = reports.ended({callback, *parameters.others})
+    return [
+        item
+        for item in overlaps(runs, least_s)
+        if callback in (item.one.callback, item.other.callback)
+        and {item.one.callback, item.other.callback} - {callback} & set(parameters.others)
+    ]
+
+
+def _serial(
+    recording: Recording,
+    parameters: Overlapping,
+    reports: Reports,
+    callback: str,
+    number: int,
+    expected: str,
+) -> Finding:
+    """The finding of a callback that does not overlap often enough."""
+    seen = f"only {counted(number, 'time')}" if number else "never"
+    observed = f"{code(callback)} {seen} ran at the same time as {codes(parameters.others, 'or')}"
+    most = number + _prevented(recording, parameters, reports, callback)
+    excused = concurrency.not_judged(
+        recording, expected, observed, prevented=most >= parameters.at_least
+    )
+    if excused is not None:
+        return excused
+    names = {callback, *parameters.others}
+    declared, hint = _why(recording, _concurrency_hint(recording, len(names)))
+    ended = reports.ended(names)
+    return Finding.failed(
+        expected,
+        observed + declared,
+        hint,
+        Evidence(
+            moments=(Moment("first run", recording.since_launch_s(ended[0].begin_ns)),),
+            spans=spans(recording, reports, reports.of(callback)),
+        ),
+    )
+
+
+def _prevented(
+    recording: Recording, parameters: Overlapping, reports: Reports, callback: str
+) -> int:
+    """How many more runs could have overlapped had the host taken nothing, at most."""
+    others = reports.ended(parameters.others)
+    done = {item for both in _with_others(reports, callback, parameters, parameters.by)
+            for item in (both.one, both.other)}  # fmt: skip
+    found = 0
+    for one in reports.ended([callback]):
+        if one in done:
+            continue
+        for other in others:
+            first, second = sorted((one, other), key=lambda item: item.begin_ns)
+            lacking_s = (second.begin_ns - (first.end_ns or 0)) / NS + parameters.by
+            taken_s = recording.taken_s(first.begin_ns, second.begin_ns)
+            if other is not one and taken_s >= lacking_s:
+                found += 1
+                break
+    return found
+
+
+def _concurrency_hint(recording: Recording, callbacks: int) -> str:
+    if concurrency.single(recording):
+        return (
+            "rclpy.spin(node) and a SingleThreadedExecutor run one callback at a time. Create a "
+            "MultiThreadedExecutor(), give it the node with add_node(node), and call its spin()."
+        )
+    if concurrency.shares_exclusive_group(recording):
+        return (
+            "Without callback_group=... every timer and subscription is in the node's default "
+            "group, which is mutually exclusive. Create a ReentrantCallbackGroup() and give it to "
+            "both timers: self.create_timer(1.0, self.callback, callback_group=self.group)."
+        )
+    if concurrency.allows(recording) and concurrency.threads(recording) < callbacks:
+        return (
+            f"{callbacks} callbacks can run at once only if the executor has {callbacks} threads "
+            f"or more: MultiThreadedExecutor(num_threads={callbacks + 1})."
+        )
+    if concurrency.allows(recording):
+        return (
+            "The executor and the groups would allow it, so something else makes one callback "
+            "wait for the other: look for a lock, for timers that do not fire together, and for "
+            "callbacks of one mutually exclusive group."
+        )
+    return (
+        "It takes both: a MultiThreadedExecutor with two threads or more, and callbacks that are "
+        "in a ReentrantCallbackGroup or in different groups."
+    )

@@ -1,0 +1,309 @@
+"""What the student's processes said of themselves through the tracer.
+
+All of it is *declared by the process*. Nothing here may be used where the wire can tell,
+absence means something only in a process that the tracer was in (:func:`traced`), and every
+value is read as hostile: the student's process could have written the line itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from grader.checks.doubt import was_held_up
+from grader.checks.finding import Evidence, Moment
+from grader.diagnosis.cause import Cause
+from grader.recording.model import Declaration, Kind, Process, Qos, Recording
+
+_RELIABILITIES = ("reliable", "best_effort")
+_DURABILITIES = ("volatile", "transient_local")
+
+
+@dataclass(frozen=True)
+class DeclaredTimer:
+    """A timer as the process created it.
+
+    Attributes:
+        period_s: Its period.
+        declared_ns: When the probe read of it.
+        callback: Qualified name of what it calls.
+    """
+
+    period_s: float
+    declared_ns: int
+    callback: str = ""
+
+
+@dataclass(frozen=True)
+class DeclaredQueue:
+    """History of an endpoint as the process asked for it.
+
+    Attributes:
+        history: ``keep_last``, ``keep_all`` or another word of the process's.
+        depth: Queue depth, or None where the process gave no number.
+    """
+
+    history: str
+    depth: int | None
+
+
+def traced(recording: Recording, process: str | None = None) -> bool:
+    """Whether the tracer was in the process (or, without a name, in all of them)."""
+    started = {item.process for item in recording.declared("started")}
+    if process is not None:
+        return process in started
+    return bool(started) and all(item.name in started for item in recording.processes)
+
+
+def said(recording: Recording, kind: str, process: str | None = None) -> bool:
+    """Whether the process (or any) declared something of a kind, such as ``spin``."""
+    return any(process in (None, item.process) for item in recording.declared(kind))
+
+
+def never_spun(recording: Recording, process: str | None = None) -> bool:
+    """Whether the tracer was there and no executor ever waited for work."""
+    return traced(recording, process) and not said(recording, "spin", process)
+
+
+def in_no_executor(recording: Recording, node: str) -> bool:
+    """Whether the process of a node spun, but gave this node to no executor.
+
+    Args:
+        recording: The run.
+        node: Fully qualified name.
+    """
+    process = process_of(recording, node)
+    if process is None or not declares(recording, "node", "node", node):
+        return False
+    spins = [item.data for item in recording.declared("spin") if item.process == process.name]
+    # Older recordings do not tell, and neither does an EventsExecutor, which is made in C++.
+    tells = bool(spins) and all("tells_added" in spin for spin in spins)
+    return tells and not declares(recording, "added", "node", node)
+
+
+def exiting_ns(recording: Recording, process: str) -> int | None:
+    """When Python began to end in its usual way in the process, or None where it did not."""
+    began = [item for item in recording.declared("started") if item.process == process]
+    # A process may have been started again, and children may have ended under its name.
+    pid = began[-1].data.get("pid") if began else None
+    return next(
+        (
+            item.time_ns
+            for item in recording.declared("exiting")
+            if began and item.process == process and item.data.get("pid") == pid
+        ),
+        None,
+    )
+
+
+def broke_off(recording: Recording, process: str) -> bool:
+    """Whether the tracer was there and Python did not end in its usual way."""
+    return traced(recording, process) and exiting_ns(recording, process) is None
+
+
+def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
+    """Timers that the processes declared, in the order of their declaration."""
+    found = []
+    for item in recording.declared("timer"):
+        period_s = _number(item.data, "period_s")
+        if period_s is not None and period_s > 0.0:
+            callback = _text(item.data, "callback") or ""
+            found.append(DeclaredTimer(period_s, item.time_ns, callback))
+    return tuple(found)
+
+
+def timer_of_zero(recording: Recording) -> bool:
+    """Whether the processes declared a timer without a period, which :func:`timers` leaves out."""
+    return any(_number(item.data, "period_s") == 0.0 for item in recording.declared("timer"))
+
+
+def queues(recording: Recording, kind: Kind, topic: str) -> tuple[DeclaredQueue, ...]:
+    """History and depth of the endpoints that the processes declared on a topic.
+
+    Those that the program destroyed itself, as rclpy's wait_for_message() does, are left out
+    where it kept others.
+    """
+    found = []
+    declared = [
+        item for item in recording.declared(kind.value) if _text(item.data, "topic") == topic
+    ]
+    kept = [item for item in declared if not _was_destroyed(recording, item)]
+    for item in kept or declared:
+        depth = _number(item.data, "depth")
+        found.append(
+            DeclaredQueue(
+                history=_text(item.data, "history") or "unknown",
+                depth=int(depth) if depth is not None else None,
+            )
+        )
+    return tuple(found)
+
+
+def _was_destroyed(recording: Recording, endpoint: Declaration) -> bool:
+    """Whether the process declared an endpoint destroyed before the observation ended."""
+    number = endpoint.data.get("number")
+    return number is not None and any(
+        item.process == endpoint.process
+        and item.data.get("pid") == endpoint.data.get("pid")
+        and item.data.get("number") == number
+        and item.time_ns < recording.stop_ns
+        for item in recording.declared("destroyed")
+    )
+
+
+def profiles(recording: Recording, kind: Kind, topic: str) -> tuple[tuple[str, Qos], ...]:
+    """Node and QoS of the endpoints that the processes declared on a topic.
+
+    Only reliability and durability are told; any other word than DDS's counts as unknown.
+    """
+    return tuple(
+        (
+            _text(item.data, "node") or "unknown",
+            Qos(
+                reliability=_one_of(item.data, "reliability", _RELIABILITIES),
+                durability=_one_of(item.data, "durability", _DURABILITIES),
+            ),
+        )
+        for item in recording.declared(kind.value)
+        if _text(item.data, "topic") == topic
+    )
+
+
+def left_open(recording: Recording, kind: Kind, topic: str, node: str) -> frozenset[str]:
+    """Policies that a node left to the middleware: it asked for the best that is available.
+
+    DDS shows only what this came to with those who were there. Of several endpoints of the node
+    on the topic, a policy counts if each of them left it open.
+
+    Args:
+        recording: The run.
+        kind: Of the endpoint.
+        topic: Its topic.
+        node: Its node's fully qualified name.
+    """
+    own = [
+        item.data
+        for item in recording.declared(kind.value)
+        if _text(item.data, "topic") == topic and _text(item.data, "node") == node
+    ]
+    return frozenset(
+        policy
+        for policy in ("reliability", "durability")
+        if own and all(_text(data, policy) == "best_available" for data in own)
+    )
+
+
+def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
+    """Whether a declaration of a kind holds a text, such as a ``publisher`` on a ``topic``."""
+    return any(_text(item.data, key) == value for item in recording.declared(kind))
+
+
+def not_in_callback(recording: Recording, topic: str) -> bool:
+    """Whether no executor had called what published the newest message that was told of.
+
+    A last message that stops a robot may well be published by main() after Ctrl+C.
+    """
+    told = [
+        item.data for item in recording.declared("published") if item.time_ns <= recording.stop_ns
+    ]
+    newest = [data.get("in_callback") for data in told if _text(data, "topic") == topic][-1:]
+    # What an EventsExecutor calls, it calls from C++.
+    return newest == [False] and not declares(recording, "spin", "executor", "EventsExecutor")
+
+
+def why_undeclared(recording: Recording, what: str) -> Cause:
+    """Why the process did not declare what the ROS graph shows of it.
+
+    The tracer is in each program of Python that is started by its entry point, and in the Python
+    programs that this one starts.
+
+    Args:
+        recording: The run.
+        what: A publisher or a subscription, in words.
+    """
+    seen = f"the process did not declare {what}"
+    compiled = any(item.build_type == "ament_cmake" for item in recording.submission.packages)
+    launched = any("launch" in item.name.rpartition("/")[2] for item in recording.processes)
+    if not traced(recording) and (compiled or launched):
+        return Cause(f"{seen}: only programs in Python declare what they create", ours=True)
+    return Cause(
+        f"{seen}: it was created past rclpy, in a program that was started without the "
+        "environment of the first, or after the file descriptors of rosgrade were closed",
+        "Create it by the method of rclpy's Node, in the program that `ros2 run` starts, and "
+        "leave its environment and the file descriptors that you did not open as they are.",
+        Evidence(moments=(Moment("launched", 0.0),)),
+    )
+
+
+def why_never_appeared(recording: Recording, what: str) -> Cause:
+    """Why what the process declared is not in the ROS graph.
+
+    Args:
+        recording: The run.
+        what: A node or an endpoint, in words.
+    """
+    seen = f"the process declared {what}, but it never appeared in the ROS graph"
+    changed = sorted({_text(item.data, "changed") or "" for item in recording.declared("init")})
+    names = [name for text in changed for name in text.split()]
+    if names:
+        return Cause(
+            f"{seen}: the program changed {', '.join(names)}, by which a node finds others",
+            f"Leave {', '.join(names)} as the environment has it, in the code too: no "
+            "os.environ[...] and no domain_id.",
+            Evidence(moments=(Moment("launched", 0.0),)),
+        )
+    if was_held_up(recording):
+        return Cause.to_repeat(f"{seen}, while the machine was busy")
+    return Cause(
+        seen,
+        "A node must stay where the environment puts it: set no ROS_DOMAIN_ID, no discovery "
+        "server and no profile of the middleware, and leave the names of rclpy's methods alone.",
+        Evidence(moments=(Moment("launched", 0.0),)),
+        # What was created right before the end may not have been seen yet.
+        disturbed=True,
+    )
+
+
+def made_twice(recording: Recording) -> str:
+    """Fully qualified name of a node that one operating-system process made twice, or nothing."""
+    seen: set[tuple[str, str]] = set()
+    for item in recording.declared("node"):
+        name = _text(item.data, "node")
+        if name is None:
+            continue
+        if (item.process, name) in seen:
+            return name
+        seen.add((item.process, name))
+    return ""
+
+
+def process_of(recording: Recording, node: str) -> Process | None:
+    """The process that declared a node, or the only one there is, or None."""
+    if len(recording.processes) == 1:
+        return recording.processes[0]
+    for item in recording.declared("node"):
+        if _text(item.data, "node") == node:
+            return next((p for p in recording.processes if p.name == item.process), None)
+    return None
+
+
+def _number(data: Mapping[str, Any], key: str) -> float | None:
+    value = data.get(key)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    # An integer of the process's may be too long for a float.
+    if isinstance(value, int) and abs(value) > 2**63:
+        return None
+    return float(value) if math.isfinite(value) else None
+
+
+def _text(data: Mapping[str, Any], key: str) -> str | None:
+    value = data.get(key)
+    return value if isinstance(value, str) else None
+
+
+def _one_of(data: Mapping[str, Any], key: str, words: tuple[str, ...]) -> str:
+    value = _text(data, key)
+    return value if value in words else "unknown"

@@ -1,0 +1,354 @@
+"""Checks of the executor: whether callbacks let it come round."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from statistics import median
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, field_validator
+
+from grader.assignment.quantity import Duration, Ratio
+from grader.assignment.unit import format_duration
+from grader.checks import declarations as testimony
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.doubt import was_held_up
+from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.first_seen import nodes_seen
+from grader.checks.node.node_name import node_name
+from grader.checks.node.target_nodes import concerned_nodes
+from grader.checks.wording import code, codes, counted
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_node import why_no_node, why_not_node
+from grader.diagnosis.process.blocked_executor import why_not_given
+from grader.diagnosis.process.process_exit import cause_of_death, ended_early, why_ended
+from grader.diagnosis.process.raised import interrupted_place
+from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
+from grader.recording.model import NS, Call, Kind, Process, Recording
+
+_FORGIVING_FROM = 3
+_MOST_MOMENTS = 5
+_LONG_NS = NS
+"""In this time the graph tells which services a node has, several times over."""
+_MOST_HELD_NS = 3 * NS
+"""Longer than the tracer holds a publisher; a process could declare any time."""
+
+
+class Responsive(Parameters):
+    """Parameters of executor.responsive."""
+
+    within: Duration = Field(1.0, description="How long an answer may take, by default 1 s.")
+    share: Ratio = Field(
+        0.9,
+        description="Share of the calls that must be answered in time. Of three calls or more "
+        "one may be late, unless it is 100 %.",
+    )
+    typically: Duration | None = Field(
+        None,
+        description="How long the median of the answers may take; by default it does not matter.",
+    )
+    node: Annotated[str, AfterValidator(node_name)] | None = Field(
+        None,
+        description="Name of the node; by default every node of the student that has an endpoint "
+        "on a recorded topic, or every node if none has.",
+    )
+
+    @field_validator("share")
+    @classmethod
+    def _not_more_than_all(cls, share: float) -> float:
+        if share > 1.0:
+            raise ValueError("more than 100 % of the calls cannot be answered")
+        return share
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """Calls to one node.
+
+    Attributes:
+        node: Fully qualified name.
+        judged: Calls that count.
+        late: Those that were not answered in time.
+    """
+
+    node: str
+    judged: tuple[Call, ...]
+    late: tuple[Call, ...]
+
+    def enough(self, share: float, late: int) -> bool:
+        """Whether so many late calls are allowed."""
+        number = len(self.judged)
+        one = 1 if number >= _FORGIVING_FROM and share < 1.0 else 0
+        # The small amount is float noise of (1 - share).
+        return late <= max(int((1.0 - share) * number + 1e-9), one)
+
+
+@check("executor.responsive", Subject.RECORDING, Responsive)
+def responsive(recording: Recording, parameters: Responsive) -> Finding:
+    """The executor keeps spinning while the node works.
+
+    The probe calls the service `list_parameters` that every node has, and `get_type_description`
+    of a node without parameter services; a node can answer only while its executor spins. Where
+    several nodes have one name, each of them must answer. Calls count from the node's first
+    message on (or, if it publishes nothing, from its appearance); those that were sent too late
+    to be answered before the end do not count. A callback may be busy for a while, as long as
+    answers come in time; with `typically`, only as long as most of them come soon.
+
+    Explains a loop with `time.sleep()` in the constructor, in main() or in a callback, and
+    `rclpy.spin()` that was never called. Where no call can be judged it relies on what the
+    process declared: that it spins and has a timer.
+    """
+    expected = f"services of the node answer within {format_duration(parameters.within)}"
+    if parameters.node:
+        missing = why_not_node(recording, parameters.node)
+    else:
+        missing = why_no_node(recording)
+    if missing is not None:
+        return missing.finding(expected)
+    nodes = concerned_nodes(recording) or recording.student_nodes
+    names = [parameters.node] if parameters.node else [node.name for node in nodes]
+    groups = [_answers(recording, name, parameters) for name in dict.fromkeys(names)]
+    groups = [group for group in groups if group.judged]
+    if not groups:
+        return _unasked(recording, names, expected)
+    bad = [group for group in groups if not group.enough(parameters.share, len(group.late))]
+    if not bad:
+        return _judge_median(recording, parameters, groups, expected) or Finding.passed(
+            expected, _summary(groups, parameters), _evidence(recording, groups)
+        )
+    if all(_excused(recording, group, parameters) for group in bad):
+        return Finding.to_repeat(
+            expected, f"{_summary(bad, parameters)}, but the machine took the time from the process"
+        )
+    worst = max(bad, key=lambda group: len(group.late) / len(group.judged))
+    return _blocked(recording, worst, parameters).finding(expected)
+
+
+def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answers:
+    within_ns = int(parameters.within * NS)
+    begin_ns = _working_from(recording, node)
+    judged, late = [], []
+    others = {item.name for item in recording.services if item.node != node} - {
+        item.name for item in recording.services if item.node == node
+    }
+    for call in recording.calls:
+        # An answer in its place, by a service of another node's, says nothing of this one.
+        if call.service not in executor_services(node) or call.service in others:
+            continue
+        answered = call.answered_ns is not None and (
+            call.answered_ns - call.requested_ns <= within_ns
+        )
+        # An answer in time is one, however late or early it was asked for.
+        if answered or begin_ns <= call.requested_ns <= recording.stop_ns - within_ns:
+            judged.append(call)
+            if not answered:
+                late.append(call)
+    return _Answers(node, tuple(judged), tuple(late))
+
+
+def _working_from(recording: Recording, node: str) -> int:
+    """When a node began to publish, or when it was left to itself if it publishes nothing."""
+    topics = {
+        item.topic for item in recording.student_endpoints(Kind.PUBLISHER) if item.node == node
+    }
+    stamps = [recording.on(topic)[0].received_ns for topic in topics if recording.on(topic)]
+    if stamps:
+        return min(stamps)
+    appeared = [item.appeared_ns for item in recording.student_nodes if item.name == node]
+    begin_ns = min(appeared or [recording.launched_ns])
+    begin_ns = max(begin_ns, _spun_from(recording, node))
+    # Its first publisher was held by us until it had matched, in vain if its type is another one.
+    process = testimony.process_of(recording, node)
+    held = [
+        item.time_ns
+        for item in recording.declared("held")
+        if process is not None and item.process == process.name
+    ]
+    return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
+
+
+def _spun_from(recording: Recording, node: str) -> int:
+    """When a node's process said that an executor spins, but not after the first answer; or 0.
+
+    Before that its constructor may wait for something, and a node that never answers does not
+    spin, whatever its process says.
+    """
+    process = testimony.process_of(recording, node)
+    spun = [
+        item.time_ns
+        for item in recording.declared("spin")
+        if process is not None and item.process == process.name
+    ]
+    answered = [
+        call.answered_ns
+        for call in recording.calls
+        if call.service in executor_services(node) and call.answered_ns is not None
+    ]
+    return min(*spun, *answered) if spun and answered else 0
+
+
+def _excused(recording: Recording, group: _Answers, parameters: Responsive) -> bool:
+    """Whether few enough calls were late for another reason than what the host took."""
+    unexcused = sum(
+        _wait_s(recording, call, excused=True) > parameters.within for call in group.late
+    )
+    return group.enough(parameters.share, unexcused)
+
+
+def _judge_median(
+    recording: Recording, parameters: Responsive, groups: list[_Answers], expected: str
+) -> Finding | None:
+    """The finding of nodes that answer in time, but mostly late; or None."""
+    allowed_s = parameters.typically
+    if allowed_s is None:
+        return None
+    expected += f", the median within {format_duration(allowed_s)}"
+    for group in groups:
+        median_s = median(_wait_s(recording, call) for call in group.judged)
+        if median_s <= allowed_s:
+            continue
+        observed = f"{code(group.node)} answered after {format_duration(median_s)} (median)"
+        own_s = median(_wait_s(recording, call, excused=True) for call in group.judged)
+        if own_s <= allowed_s:
+            return Finding.to_repeat(
+                expected, f"{observed}, but the machine took the time from the process"
+            )
+        return Finding.failed(
+            expected,
+            f"{observed}: callbacks keep the executor busy most of the time",
+            "A callback does its work and returns at once: no time.sleep() in it. The timer calls "
+            "it again when its period is over.",
+            Evidence(
+                moments=tuple(
+                    Moment("call answered late", recording.since_launch_s(call.requested_ns))
+                    for call in group.judged
+                    if _wait_s(recording, call) > allowed_s
+                )[:_MOST_MOMENTS],
+                plots=_evidence(recording, groups).plots,
+            ),
+        )
+    return None
+
+
+def _wait_s(recording: Recording, call: Call, *, excused: bool = False) -> float:
+    """How long a call waited for its answer, perhaps without what the machine took meanwhile."""
+    end_ns = call.answered_ns or recording.stop_ns
+    taken_s = recording.taken_s(call.requested_ns, end_ns) if excused else 0.0
+    return (end_ns - call.requested_ns) / NS - taken_s
+
+
+def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> Cause:
+    process = testimony.process_of(recording, group.node)
+    seen = _summary([group], parameters)
+    if process is not None and ended_early(recording, process):
+        return cause_of_death(recording, process).after(seen)
+    evidence = _evidence(recording, [group])
+    place = interrupted_place(recording, process.name) if process is not None else None
+    if place is not None:
+        evidence = Evidence(moments=evidence.moments, places=(place,), plots=evidence.plots)
+    where = f" ({place.file}:{place.line})" if place else ""
+    number = sum(len(found) for found in recording.messages.values())
+    meanwhile = f" while {counted(number, 'message was', 'messages were')} published"
+    seen += meanwhile if number else ""
+    servers = max(call.servers for call in group.late)
+    if servers > 1:
+        return Cause(
+            f"{seen}: {servers} nodes offer these services under its name, and not every one of "
+            "them answers",
+            "The name of a node must be its own: give every node another one, and spin each.",
+            evidence,
+        )
+    if _never_spun(recording, process):
+        return Cause(
+            f"{seen}: rclpy.spin() was never called{where}",
+            "A loop such as `while True: publish(); time.sleep(0.3)` never gives way to the "
+            "executor, and rate.sleep() waits for ever where none spins. Create a timer with "
+            "self.create_timer(0.3, self.callback), and call rclpy.spin(node) in main().",
+            evidence,
+        )
+    if testimony.timer_of_zero(recording):
+        return Cause(
+            f"{seen}: the process declared a timer of 0 s, whose callbacks take all of the "
+            f"executor's time{where}",
+            "create_timer takes its period in seconds, and less than a second becomes 0 in whole "
+            "numbers, as in 300 // 1000 or int(0.3).",
+            evidence,
+        )
+    return why_not_given(recording, seen, (group.node,), evidence.moments) or Cause(
+        f"{seen}: something keeps the executor from coming round{where}",
+        "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
+        "callback, in the constructor or in a loop around spin_once(), and let a timer call again "
+        "instead.",
+        evidence,
+    )
+
+
+def _never_spun(recording: Recording, process: Process | None) -> bool:
+    return testimony.never_spun(recording, process.name if process else None)
+
+
+def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
+    """No call that counts: what the process declared must do."""
+    ended = why_ended(recording)
+    if ended is not None:
+        return ended.finding(expected)
+    lacking = [name for name in names if _without_services(recording, name)]
+    if lacking:
+        # What a process says of itself would be all that there is, and it can say anything.
+        busy = was_held_up(recording)
+        return Cause(
+            f"{codes(lacking)} has none of the services "
+            f"{codes(EXECUTOR_SERVICES, 'and')} that rclpy makes for every node: "
+            "nothing shows from outside whether its executor spins",
+            "Leave at least one of them on: do not set both start_parameter_services and "
+            "start_type_description_service to False.",
+            Evidence(moments=nodes_seen(recording)),
+            ours=busy,
+            disturbed=busy,
+        ).finding(expected)
+    if testimony.said(recording, "spin") and testimony.said(recording, "timer"):
+        return Finding.passed(
+            expected,
+            f"{codes(names)} answered no call that could be judged; the process declared a timer "
+            "and that its executor spins",
+        )
+    return Finding.error(
+        expected,
+        f"no call to {codes(executor_services(name)[0] for name in names)} could be judged, of "
+        f"{counted(len(recording.calls), 'call')} that the probe sent",
+    )
+
+
+def _without_services(recording: Recording, name: str) -> bool:
+    """Whether a node was there for long, and offered nothing that its executor answers."""
+    offered = {service.name for service in recording.services if service.node == name}
+    appeared = [node.appeared_ns for node in recording.student_nodes if node.name == name]
+    long = bool(appeared) and recording.stop_ns - min(appeared) > _LONG_NS
+    return long and offered.isdisjoint(executor_services(name))
+
+
+def _summary(groups: list[_Answers], parameters: Responsive) -> str:
+    return "; ".join(
+        f"{code(group.node)} answered {len(group.judged) - len(group.late)} of "
+        f"{counted(len(group.judged), 'call')} within {format_duration(parameters.within)}"
+        for group in groups
+    )
+
+
+def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
+    late = [call for group in groups for call in group.late]
+    answered = [call for group in groups for call in group.judged if call.answered_ns is not None]
+    plot = Plot(
+        title="Time until the service answered",
+        x_label="time since launch (s)",
+        y_label="time to the answer (s)",
+        x=tuple(recording.since_launch_s(call.requested_ns) for call in answered),
+        y=tuple(((call.answered_ns or 0) - call.requested_ns) / NS for call in answered),
+    )
+    return Evidence(
+        moments=tuple(
+            Moment("call not answered in time", recording.since_launch_s(call.requested_ns))
+            for call in late[:_MOST_MOMENTS]
+        ),
+        plots=(plot,) if answered else (),
+    )

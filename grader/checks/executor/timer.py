@@ -1,0 +1,78 @@
+"""Check of what calls the code that publishes: a timer of the node, or a loop that sleeps."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from grader.assignment.name import TopicName
+from grader.assignment.unit import format_duration
+from grader.checks import declarations as testimony
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.first_seen import first_seen
+from grader.checks.wording import code, counted
+from grader.diagnosis.no_messages import why_silent
+from grader.recording.model import Recording
+
+# How the tracer names a callback that is None: create_rate() makes a timer that calls nothing.
+_NOTHING = "NoneType"
+_HINT = (
+    "A thread or a loop that sleeps adds what its work takes to every period, and goes on where "
+    "the executor has stopped. Create a timer in the constructor, "
+    "self.timer = self.create_timer(period, self.callback) with the period in seconds, publish in "
+    "its callback, and call rclpy.spin(node) in main()."
+)
+
+
+class Timer(Parameters):
+    """Parameters of executor.timer."""
+
+    topic: TopicName = Field(description="Topic on which the callback of a timer publishes.")
+
+
+@check("executor.timer", Subject.RECORDING, Timer)
+def timer(recording: Recording, parameters: Timer) -> Finding:
+    """The process has a timer.
+
+    Messages of a thread that sleeps look like those of a timer, so this is judged by what the
+    process declared: a process that created its publisher on the topic and no timer at all does
+    not publish in the callback of one. Any timer with a callback will do, whatever its period.
+    Where the process did not declare its publisher either, it is an error, which costs no point.
+
+    Explains a thread, a loop with `time.sleep()` and a rate, which has a timer that calls nothing.
+    """
+    expected = f"a timer, in whose callback the node publishes on {code(parameters.topic)}"
+    messages = recording.on(parameters.topic)
+    if not messages:
+        return why_silent(recording, parameters.topic).finding(expected)
+    if not testimony.declares(recording, "publisher", "topic", parameters.topic):
+        cause = testimony.why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
+        return cause.finding(expected)
+    timers = testimony.timers(recording)
+    if testimony.not_in_callback(recording, parameters.topic):
+        return Finding.failed(
+            expected,
+            f"{counted(len(messages), 'message was', 'messages were')} published, outside of "
+            "every callback: a thread or a loop calls publish()",
+            _HINT,
+            Evidence(moments=first_seen(recording, messages)),
+        )
+    calling = [item for item in timers if item.callback != _NOTHING]
+    if calling or testimony.timer_of_zero(recording):
+        first = calling[0] if calling else None
+        period = f" of {format_duration(first.period_s)}" if first else ""
+        name = f", which calls {code(first.callback)}" if first and first.callback else ""
+        when_s = [recording.since_launch_s(first.declared_ns)] if first else []
+        return Finding.passed(
+            expected,
+            f"the process declared a timer{period}{name}",
+            Evidence(moments=tuple(Moment("timer created", item) for item in when_s)),
+        )
+    rate = " but that of a rate, which calls nothing" if timers else ""
+    return Finding.failed(
+        expected,
+        f"{counted(len(messages), 'message was', 'messages were')} published, but the process "
+        f"declared no timer{rate}: something else calls publish(), such as a thread or a loop",
+        _HINT,
+        Evidence(moments=first_seen(recording, messages)),
+    )

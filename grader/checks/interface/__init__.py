@@ -1,0 +1,1 @@
+"""Checks of messages, services and actions that a package defines."""

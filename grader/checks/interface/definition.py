@@ -1,0 +1,125 @@
+"""The student's definition of an interface: where it is, or why it is not there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from grader.checks.finding import Evidence
+from grader.checks.wording import code, codes
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.not_built import existing_package, why_no_package
+from grader.nearest import nearest
+from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
+
+
+@dataclass(frozen=True)
+class InterfaceName:
+    """The parts of an interface's name, such as ``bot_msgs/msg/BotStatus``.
+
+    Attributes:
+        package: The package.
+        kind: ``msg``, ``srv`` or ``action``; folder and suffix of its definition.
+        name: The last part.
+    """
+
+    package: str
+    kind: str
+    name: str
+
+    @classmethod
+    def of(cls, interface: str) -> InterfaceName:
+        """Take a name apart."""
+        return cls(*interface.split("/"))
+
+    @property
+    def file(self) -> str:
+        """The file of its definition, in the package's folder."""
+        return f"{self.kind}/{self.name}.{self.kind}"
+
+    def __str__(self) -> str:
+        """Write it in full."""
+        return f"{self.package}/{self.kind}/{self.name}"
+
+
+def find_definition(submission: SubmissionRecord, interface: InterfaceName) -> Definition | Cause:
+    """The definition of an interface, as the build took it or else as it was handed in.
+
+    Args:
+        submission: What was handed in.
+        interface: What is looked for.
+
+    Returns:
+        The definition with its path in the submission, or why there is none.
+    """
+    cause = why_no_package(submission, interface.package)
+    if cause is not None:
+        return cause
+    package = existing_package(submission, interface.package)
+    own = [item for item in package.definitions if item.file == package.file(interface.file)]
+    built = [item for item in package.generated if item.file == interface.file]
+    if built:
+        # Where CMakeLists.txt takes it from is the student's affair.
+        same = [item for item in (*own, *package.definitions) if item.text == built[0].text]
+        return same[0] if same else Definition(package.file(interface.file), built[0].text)
+    return own[0] if own else _why_none(submission, package, interface)
+
+
+def _why_none(
+    submission: SubmissionRecord, package: PackageRecord, interface: InterfaceName
+) -> Cause:
+    wanted = package.file(interface.file)
+    near = _near(package, interface)
+    if near is not None:
+        found, what = near
+        return Cause(
+            f"found {code(found.file)}: {what}",
+            f"Name it {code(wanted)}, and write {code(interface.file)} in CMakeLists.txt.",
+            Evidence(places=(SourceError(found.file, None, what),)),
+        )
+    for other in submission.packages:
+        if other.name == interface.package:
+            continue
+        for item in other.definitions:
+            if PurePosixPath(item.file).name == PurePosixPath(wanted).name:
+                return Cause(
+                    f"found {code(item.file)}, in the package {code(other.name)}",
+                    f"Move it to {code(wanted)}: the package is a part of the interface's name.",
+                    Evidence(places=(SourceError(item.file, None, "in another package"),)),
+                )
+    there = [item.file for item in package.definitions]
+    return Cause(
+        f"there is no {code(interface.file)}"
+        + (f"; found {codes(there)} only" if there else f", and no .{interface.kind} file at all"),
+        f"Make the folder {code(interface.kind)} beside package.xml, and in it the file "
+        f"{code(f'{interface.name}.{interface.kind}')}.",
+    )
+
+
+def _near(package: PackageRecord, interface: InterfaceName) -> tuple[Definition, str] | None:
+    """A file that was probably meant, with what is wrong with it."""
+    files = [(item, PurePosixPath(item.file)) for item in package.definitions]
+    suffix = f".{interface.kind}"
+    for item, path in files:
+        if (path.stem, path.suffix) == (interface.name, suffix):
+            folder = path.parent.name
+            where = f"the folder is called {code(folder)}" if folder else "it is in no folder"
+            if folder == interface.kind:
+                where = "this folder does not lie beside package.xml"
+            return item, f"{where}, and the definition belongs into {code(interface.kind)}"
+    for item, path in files:
+        if path.stem == interface.name:
+            told = code(path.suffix) if path.suffix else "missing"
+            return item, f"its suffix is {told}, not {code(suffix)}"
+    for item, path in files:
+        if path.stem.lower() == interface.name.lower():
+            return item, "upper and lower case differ"
+        if _folded(path.stem) == _folded(interface.name):
+            return item, "the name of an interface is in CamelCase"
+    stems = {path.stem: item for item, path in files if path.suffix.lower() == suffix}
+    match = nearest(interface.name, stems)
+    return (stems[match], f"it is not called {code(interface.name)}") if match else None
+
+
+def _folded(name: str) -> str:
+    return name.replace("_", "").replace("-", "").lower()

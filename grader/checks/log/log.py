@@ -1,0 +1,218 @@
+"""Checks of what a node logs: that it follows the messages that the node was sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Literal
+
+from pydantic import Field
+
+from grader.assignment.model import TopicName
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
+from grader.checks.check import NamedFields, Parameters, Subject, check
+from grader.checks.field import FieldPath, value_at
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.first_seen import endpoints_seen
+from grader.checks.log.echo import Echo, Wanted, echoes, wanted_values
+from grader.checks.log.printed import quote
+from grader.checks.value import NoSuchField
+from grader.checks.wording import code, codes, counted
+from grader.diagnosis.destroyed_endpoint import why_unsubscribed
+from grader.diagnosis.no_log import why_not_logged
+from grader.diagnosis.process.blocked_executor import why_slow
+from grader.recording.model import NS, Kind, Message, Recording
+
+_BACKLOG_NS = NS
+"""What the machine holds up so long before keeps later messages waiting."""
+_SHOWN_LINES = 5
+_SENT = {
+    "any": "",
+    "before_launch": " that were published before the launch",
+    "after_launch": " that were published after the launch",
+}
+
+
+class Follows(Parameters):
+    """Parameters of log.follows."""
+
+    topic: TopicName = Field(
+        description="Fully qualified name of a topic that the simulated robot or a stimulus sends."
+    )
+    fields: tuple[FieldPath, ...] = Field(
+        min_length=1,
+        description="Numbers of the message that must be logged, such as "
+        "`pose.pose.position.x` or `ranges[0]`.",
+    )
+    decimals: int = Field(
+        2, ge=0, le=9, description="How many decimals must be right; rounding and cutting off are."
+    )
+    sent: Literal["any", "before_launch", "after_launch"] = Field(
+        "any",
+        description="Which messages count: those that a stimulus published before the node was "
+        "launched, those after, or any.",
+    )
+    at_least: int = Field(
+        1, ge=1, description="How many messages must be followed, each by log lines of its own."
+    )
+    within: Duration = Field(
+        0.5,
+        description="How soon after its message a line must come, by default 500 ms; for a "
+        "message from before the launch it is the time since the first match.",
+        validate_default=False,
+    )
+    every: Duration | None = Field(
+        None,
+        description="Longest time without such a line while messages come; by default any.",
+    )
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields whose numbers are logged."""
+        for number, field in enumerate(self.fields):
+            yield NamedFields(("fields", number), self.topic, field)
+
+
+@check("log.follows", Subject.RECORDING, Follows)
+def follows(recording: Recording, parameters: Follows) -> Finding:
+    """The node logs what it receives.
+
+    Lines on stdout and stderr (rclpy's loggers write to stderr) must follow messages on the
+    topic and show the values of their fields. Any formatting is right: one line or several,
+    rounded or exact, the whole message; other numbers and other lines do not matter. Only the
+    name that stands right before a number, as in `x = 1.37`, must not be that of another of the
+    fields. Where the lines come from does not matter either, a callback or a timer.
+
+    Explains a subscription that is missing, of another type, or that requests a QoS that the
+    publisher does not offer; an executor that never spins or that a callback blocks; other values
+    (another beam of a scan, the nearest of all, z instead of y, centimetres, too few decimals); two
+    fields under each other's names; values that are logged only in the callback of another topic;
+    a callback that logs nothing, and one that logs too seldom.
+    """
+    carried = recording.carried(parameters.topic)
+    expected = _words(parameters, carried)
+    own = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
+    if own:
+        return Finding.failed(
+            expected,
+            f"the node itself publishes on {code(parameters.topic)}, so its log shows nothing of "
+            "what it was sent",
+            "Only the robot publishes its sensors: remove this publisher, and subscribe.",
+            Evidence(moments=endpoints_seen(recording, own)),
+        )
+    messages = [
+        message
+        for message in carried
+        if parameters.sent == "any"
+        or (parameters.sent == "before_launch") == (message.stamp_ns < recording.launched_ns)
+    ]
+    ready_ns = recording.matched_ns or recording.launched_ns
+    try:
+        wanted = wanted_values(messages, parameters.fields, ready_ns)
+    except NoSuchField as error:
+        return Finding.error(
+            expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
+        )
+    within_ns = round(parameters.within * NS)
+    found = echoes(recording, wanted, parameters.decimals, within_ns)
+    if len(found) >= parameters.at_least:
+        finding = _too_seldom(recording, parameters, expected, wanted, found)
+        if finding is not None:
+            return finding
+        return _passed(recording, parameters, expected, found, len(messages))
+    return why_not_logged(
+        recording,
+        parameters.topic,
+        wanted,
+        found,
+        needed=parameters.at_least,
+        decimals=parameters.decimals,
+        within_ns=within_ns,
+    ).finding(expected)
+
+
+def _words(parameters: Follows, messages: Sequence[Message]) -> str:
+    """What is expected; whole numbers have no decimals to speak of."""
+    try:
+        values = [value_at(messages[0].value, path) for path in parameters.fields]
+        whole = all(isinstance(value, int) for value in values)
+    except (IndexError, NoSuchField):
+        whole = False
+    decimals = "" if whole else f"to {counted(parameters.decimals, 'decimal')}, "
+    return (
+        f"log lines that show {codes(parameters.fields)} of messages on {code(parameters.topic)}, "
+        f"{decimals}within {format_duration(parameters.within)} of "
+        f"{counted(parameters.at_least, 'message')} or more{_SENT[parameters.sent]}"
+    )
+
+
+def _too_seldom(
+    recording: Recording,
+    parameters: Follows,
+    expected: str,
+    wanted: Sequence[Wanted],
+    found: Sequence[Echo],
+) -> Finding | None:
+    """The finding of a time without a line, while messages came, that is too long; or None."""
+    if parameters.every is None:
+        return None
+    begin_ns, end_ns = wanted[0].due_ns, wanted[-1].due_ns
+    written = sorted(echo.lines[-1].time_ns for echo in found)
+    gaps = list(pairwise([begin_ns, *(min(time_ns, end_ns) for time_ns in written), end_ns]))
+    begin_ns, end_ns = max(gaps, key=lambda gap: _own_s(recording, gap))
+    excused = _own_s(recording, (begin_ns, end_ns)) <= parameters.every
+    if excused:
+        begin_ns, end_ns = max(gaps, key=lambda gap: gap[1] - gap[0])
+    gap_s = (end_ns - begin_ns) / NS
+    if gap_s <= parameters.every:
+        return None
+    begin_s = recording.since_launch_s(begin_ns)
+    expected += f", and never longer than {format_duration(parameters.every)} without one"
+    observed = f"no such line for {format_duration(gap_s)}, from {begin_s:.2f} s after launch on"
+    if excused:
+        return Finding.to_repeat(
+            expected, f"{observed}, but the machine took the time from the process"
+        )
+    observed += f", although messages came on {code(parameters.topic)}"
+    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, parameters.topic)}
+    cause = why_unsubscribed(recording, parameters.topic, observed) or why_slow(
+        recording, observed, nodes
+    )
+    if cause is not None:
+        return cause.finding(expected)
+    return Finding.failed(
+        expected,
+        observed,
+        "Log in every call of the callback, or at least once in a second.",
+        Evidence(moments=(Moment("no line from here on", begin_s),)),
+    )
+
+
+def _own_s(recording: Recording, gap: tuple[int, int]) -> float:
+    """How long a gap is without what the machine took in it, and shortly before."""
+    begin_ns, end_ns = gap
+    return (end_ns - begin_ns) / NS - recording.taken_s(begin_ns - _BACKLOG_NS, end_ns)
+
+
+def _passed(
+    recording: Recording,
+    parameters: Follows,
+    expected: str,
+    found: tuple[Echo, ...],
+    number: int,
+) -> Finding:
+    lines = [line for echo in found for line in echo.lines]
+    return Finding.passed(
+        expected,
+        f"log lines follow {len(found)} of {counted(number, 'message')}: " + quote(lines[-1].text),
+        Evidence(
+            moments=tuple(
+                Moment(
+                    f"logged a message on {parameters.topic}",
+                    recording.since_launch_s(echo.lines[-1].time_ns),
+                )
+                for echo in (found[0], found[-1])
+            ),
+            log=tuple(line.text for line in lines[:_SHOWN_LINES]),
+        ),
+    )

@@ -1,0 +1,323 @@
+"""Check of messages that are made of other messages: their values follow them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from pydantic import Field
+
+from grader.assignment.name import TopicName
+from grader.assignment.quantity import Duration
+from grader.assignment.unit import format_duration
+from grader.checks.check import NamedFields, Parameters, Subject, check
+from grader.checks.field import FieldPath
+from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
+from grader.checks.first_seen import endpoints_seen
+from grader.checks.messages.derived_messages import MadeOf, Sample
+from grader.checks.messages.source_value import SourceText, SourceValue, mistakes, spread
+from grader.checks.value import NoSuchField
+from grader.checks.wording import code, codes, counted, listing
+from grader.diagnosis.no_messages import why_few, why_silent
+from grader.recording.model import NS, Kind, Recording
+
+# What varies by fewer tolerances cannot tell one value from another.
+_TELLING = 4.0
+_MOST_EXPLAINED = 100
+# Share of the messages for which an explanation must hold.
+_NEARLY_ALL = 0.9
+_NOT_FINITE = "not a finite number"
+_NOT_THERE = "not a finite number, or not there at all: the array is too short"
+_NEVER_SET = "always 0, as one that is never set"
+_ALWAYS_THE_SAME = "always the same"
+
+
+class Follows(Parameters):
+    """Parameters of messages.follows."""
+
+    topic: TopicName = Field(description="Topic of the messages that are judged.")
+    source: TopicName = Field(description="Recorded topic that their values come from.")
+    fields: dict[FieldPath, SourceText] = Field(
+        min_length=1,
+        description="Field of the judged message -> where its value comes from: a field of the "
+        "source, or `yaw(pose.pose.orientation)` for the heading of a quaternion.",
+    )
+    tolerance: float = Field(
+        gt=0, allow_inf_nan=False, description="Largest difference, in the unit of the field."
+    )
+    within: Duration = Field(
+        0.5, description="How old the newest values may be.", validate_default=False
+    )
+    settle: Duration = Field(
+        2.0,
+        description="So long after the first message of the source a node may still publish what "
+        "it had before it received one.",
+        validate_default=False,
+    )
+    at_least: int = Field(5, ge=1, description="How many messages must have come to judge.")
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The judged fields, and those of the source."""
+        for field, text in self.fields.items():
+            value = SourceValue.of(text)
+            yield NamedFields(("fields", field), self.topic, field)
+            for path in value.paths:
+                yield NamedFields(("fields", field), self.source, path)
+
+
+@check("messages.follows", Subject.RECORDING, Follows)
+def follows(recording: Recording, parameters: Follows) -> Finding:
+    """The values of the messages follow those of another topic.
+
+    Every message must hold the values of one message of the source that was published at most
+    `within` before it; what the machine took from the node is not held against it. Angles are
+    compared on the circle. What is published before the source has said anything does not count.
+
+    Explains, from the data: another field of the source, a part of a quaternion taken for an
+    angle, degrees, a wrong sign, half of the angle, values that never change, that are never set
+    or that lag behind, and values of different moments in one message. If nothing was published
+    it says why, as messages.count does.
+    """
+    topic, source = code(parameters.topic), code(parameters.source)
+    pairs = listing(f"{code(field)} = {code(value)}" for field, value in parameters.fields.items())
+    expected = f"on {topic} the values of {source}: {pairs} (within {parameters.tolerance:g})"
+    messages, sources = recording.on(parameters.topic), recording.on(parameters.source)
+    if not messages:
+        return why_silent(recording, parameters.topic).finding(expected)
+    if not sources:
+        return Finding.error(expected, f"nothing was recorded on {source}, so nobody can tell")
+    try:
+        made_of = MadeOf.of(
+            recording,
+            messages,
+            sources,
+            parameters.fields,
+            parameters.tolerance,
+            parameters.within,
+        )
+    except NoSuchField as error:
+        return Finding.error(expected, f"the assignment expects what does not exist: {error}")
+    if not _is_telling(made_of.table, parameters.tolerance):
+        return _untold(recording, parameters, expected)
+    judged, wrong = _judged(recording, parameters, made_of)
+    if len(judged) < parameters.at_least:
+        if len(messages) < parameters.at_least:
+            return why_few(recording, parameters.topic, parameters.at_least).finding(expected)
+        return Finding.failed(
+            expected,
+            f"of {counted(len(messages), 'message')} only {len(judged)} came after the first one "
+            f"on {source}",
+            f"Publish from the callback of {source}, or from a timer that goes on.",
+            Evidence(
+                moments=tuple(
+                    Moment("the last message", recording.since_launch_s(item.stamp_ns))
+                    for item in messages[-1:]
+                )
+            ),
+        )
+    if wrong:
+        return _failure(recording, parameters, made_of, judged, wrong, expected)
+    late = [one for one in judged if not made_of.fits(one, one.window[one.excused :])]
+    if late:
+        return Finding.to_repeat(
+            expected,
+            f"{len(late)} of {counted(len(judged), 'message')} have older values, but the machine "
+            "took the time from the process",
+        )
+    plots = tuple(_plot(recording, made_of, judged, index) for index in range(len(made_of.fields)))
+    seen = f"so it is in all of {counted(len(judged), 'message')}"
+    return Finding.passed(expected, seen, Evidence(plots=plots))
+
+
+def _judged(
+    recording: Recording, parameters: Follows, made_of: MadeOf
+) -> tuple[list[Sample], list[Sample]]:
+    """The messages that count, and those of them that are wrong."""
+    # One that fits nothing may be made of a message that was not recorded.
+    fits = {sample.number: made_of.fits(sample) for sample in made_of.samples}
+    known = [sample for sample in made_of.samples if sample.is_known or fits[sample.number]]
+    begin_ns = made_of.sources[0].stamp_ns
+    settled_ns = begin_ns + round(parameters.settle * NS)
+    settled_ns += round(recording.taken_s(begin_ns, settled_ns) * NS)
+    first = next((index for index, sample in enumerate(known) if fits[sample.number]), 0)
+    if first and known[first - 1].message.stamp_ns > settled_ns:
+        first = 0
+    judged = known[first:]
+    return judged, [sample for sample in judged if not fits[sample.number]]
+
+
+def _is_telling(table: Sequence[tuple[float, ...]], tolerance: float) -> bool:
+    """Whether the values of every field vary, so that a wrong one shows."""
+    return all(spread(column) > _TELLING * tolerance for column in zip(*table, strict=True))
+
+
+def _untold(recording: Recording, parameters: Follows, expected: str) -> Finding:
+    scene = recording.scene
+    if scene is not None and recording.student_endpoints(Kind.PUBLISHER, scene.command_topic):
+        return Finding.failed(
+            expected,
+            f"the node publishes on {code(scene.command_topic)} itself and keeps the robot from "
+            f"moving as it should, so that nothing can be followed on {code(parameters.source)}",
+            f"Remove the publisher on {code(scene.command_topic)}: this node only listens.",
+            Evidence(
+                moments=endpoints_seen(
+                    recording, recording.student_endpoints(Kind.PUBLISHER, scene.command_topic)
+                )
+            ),
+        )
+    return Finding.error(
+        expected, f"the values on {code(parameters.source)} hardly change, so nobody can tell"
+    )
+
+
+def _failure(
+    recording: Recording,
+    parameters: Follows,
+    made_of: MadeOf,
+    judged: Sequence[Sample],
+    wrong: Sequence[Sample],
+    expected: str,
+) -> Finding:
+    first = wrong[len(wrong) // 2] if len(wrong) > 2 else wrong[0]
+    told = wrong[:: max(1, len(wrong) // _MOST_EXPLAINED)]
+    seen = judged[:: max(1, len(judged) // _MOST_EXPLAINED)]
+    bad = [
+        index
+        for index in range(len(made_of.fields))
+        if any(not made_of.fits(sample, fields=[index]) for sample in told)
+    ]
+    row = made_of.nearest(first)
+    late_s = _lag_s(made_of, told)
+    if late_s is not None:
+        observed = (
+            f"the values are those of {code(parameters.source)} {format_duration(late_s)} earlier"
+        )
+        hint = (
+            f"Publish from the callback of {code(parameters.source)}, or store its newest message "
+            "there and publish that. A callback that sleeps lets the newer ones wait."
+        )
+    elif not bad:
+        observed = f"the values are of different moments of {code(parameters.source)}"
+        hint = "Fill all fields from one message: `msg` of the callback."
+    else:
+        observed = _wrong_fields(made_of, first, row, bad, _explanation(made_of, seen, told, bad))
+        hint = (
+            f"Set {codes(made_of.fields[index] for index in bad)} in the callback of "
+            f"{code(parameters.source)}, from {codes(made_of.values[index].text for index in bad)} "
+            "of its message."
+        )
+    rows = tuple(
+        (field, f"{made_of.table[row][index]:.6g}", f"{first.values[index]:.6g}")
+        for index, field in enumerate(made_of.fields)
+    )
+    label = f"message {first.number}"
+    moment = Moment(f"{label} is wrong", recording.since_launch_s(first.message.stamp_ns))
+    shown = bad or range(len(made_of.fields))
+    return Finding.failed(
+        expected,
+        f"{observed} ({len(wrong)} of {counted(len(judged), 'message')} wrong)",
+        hint,
+        Evidence(
+            moments=(moment,),
+            plots=tuple(_plot(recording, made_of, judged, index) for index in shown),
+            tables=(Table(label.capitalize(), ("field", "expected", "observed"), rows),),
+        ),
+    )
+
+
+def _wrong_fields(
+    made_of: MadeOf, sample: Sample, row: int, bad: Sequence[int], why: Mapping[int, str]
+) -> str:
+    """The wrong fields of a message, with what stands in each."""
+    fields = [
+        f"{code(made_of.fields[index])} = {sample.values[index]:.4g} instead of "
+        f"{made_of.table[row][index]:.4g}"
+        for index in bad
+    ]
+    if len(bad) > 1 and all(why.get(index) in (_NEVER_SET, _ALWAYS_THE_SAME) for index in bad):
+        return f"{listing(fields)}: they never change"
+    return listing(
+        f"{field}: it is {why[index]}" if index in why else field
+        for field, index in zip(fields, bad, strict=True)
+    )
+
+
+def _lag_s(made_of: MadeOf, wrong: Sequence[Sample]) -> float | None:
+    """How old the values are, if all wrong messages have those of an older source."""
+    ages = []
+    for sample in wrong:
+        older = range(sample.window[0])
+        row = next((r for r in reversed(older) if made_of.fits(sample, range(r, r + 1))), None)
+        if row is None:
+            return None
+        ages.append((sample.message.stamp_ns - made_of.sources[row].stamp_ns) / NS)
+    still = spread([sample.values[0] for sample in wrong]) <= made_of.tolerance
+    # A value that never changes is old as well, but that says less.
+    return None if still and len(wrong) > 1 else sorted(ages)[len(ages) // 2]
+
+
+def _explanation(
+    made_of: MadeOf, seen: Sequence[Sample], wrong: Sequence[Sample], bad: Sequence[int]
+) -> dict[int, str]:
+    """What stands in the wrong fields, as far as the data tells."""
+    found = {}
+    for index in bad:
+        numbers = [sample.values[index] for sample in seen]
+        if any(not math.isfinite(number) for number in numbers):
+            found[index] = _NOT_THERE if "[" in made_of.fields[index] else _NOT_FINITE
+        elif len(numbers) > 1 and spread(numbers) <= 0.0:
+            found[index] = _ALWAYS_THE_SAME if numbers[0] else _NEVER_SET
+        else:
+            off = [sample for sample in wrong if not made_of.fits(sample, fields=[index])]
+            words = _mistaken(made_of, seen, off, index)
+            if words:
+                found[index] = words
+    return found
+
+
+def _mistaken(
+    made_of: MadeOf, seen: Sequence[Sample], wrong: Sequence[Sample], index: int
+) -> str | None:
+    """What stands in a field: in nearly all messages, and in nearly all of those that are wrong.
+
+    Of a number that is not negative, what has lost its sign is right as well, and says nothing of
+    the few that are wrong.
+    """
+    value = made_of.values[index]
+    rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
+    taken = {row: list(mistakes(value, made_of.sources[row].value)) for row in rows}
+    for number, (words, _) in enumerate(taken[rows[0]]):
+        # Of an array in the source, not every message need have as many elements.
+        if any(len(entries) <= number for entries in taken.values()):
+            break
+        series = {row: entries[number][1] for row, entries in taken.items()}
+        if not spread(list(series.values())) > made_of.tolerance:
+            continue
+        if all(_hits(samples, index, series, made_of.tolerance) for samples in (seen, wrong)):
+            return words
+    return None
+
+
+def _hits(
+    samples: Sequence[Sample], index: int, series: Mapping[int, float], tolerance: float
+) -> bool:
+    """Whether a field of nearly all of these holds what follows from a source."""
+    hits = sum(
+        any(abs(sample.values[index] - series[row]) <= tolerance for row in sample.window)
+        for sample in samples
+    )
+    return hits >= _NEARLY_ALL * len(samples)
+
+
+def _plot(recording: Recording, made_of: MadeOf, judged: Sequence[Sample], index: int) -> Plot:
+    field = made_of.fields[index]
+    errors = [made_of.error(sample, index) for sample in judged]
+    finite = [(s, e) for s, e in zip(judged, errors, strict=True) if math.isfinite(e)]
+    return Plot(
+        f"{field}: how far it is off",
+        "time since launch (s)",
+        f"error of {field}",
+        tuple(recording.since_launch_s(sample.message.stamp_ns) for sample, _ in finite),
+        tuple(error for _, error in finite),
+        (-made_of.tolerance, made_of.tolerance),
+    )

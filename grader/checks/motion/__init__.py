@@ -1,0 +1,1 @@
+"""Checks of the true motion of a simulated robot."""

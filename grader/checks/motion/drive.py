@@ -1,0 +1,274 @@
+"""Checks of driving ahead: the speed and the way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import groupby
+from statistics import median
+
+from pydantic import Field
+
+from grader.assignment.quantity import PositiveLength, Ratio, Speed
+from grader.assignment.unit import format_duration
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.first_seen import until_the_end
+from grader.checks.motion.contact import why_touched
+from grader.checks.motion.ground import ahead, nearest
+from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.measure import metres, speed
+from grader.checks.motion.scan import misreading
+from grader.checks.motion.track import (
+    MOVED_M,
+    REST_M_S,
+    REST_RAD_S,
+    departure,
+    final_rest,
+    gone_ahead_m,
+    speed_plot,
+    way_m,
+)
+from grader.checks.wording import counted, percent
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
+from grader.recording.model import NS, Recording, Scene, Truth
+
+_LEAST_SHARE = 0.9
+_LEAST_STEPS = 30
+# Besides what the robot needs to speed up, a node may bring its commands up in steps.
+_IN_STEPS_S = 0.5
+_WAY_TOLERANCE_M = 2e-3
+_TURN_HINT = "The speed ahead is linear.x, the turn is angular.z."
+_SPEED_HINT = "linear.x is the speed in metres per second."
+_IN_BETWEEN_HINT = (
+    "Log what makes it stop: a range that is not measured (inf, 0.0) may count as an obstacle, and "
+    "a second place that publishes, such as a timer, may contradict the callback."
+)
+_BACKWARDS_HINT = "Forward is a positive linear.x (REP-103)."
+
+
+class Drives(Parameters):
+    """Parameters of motion.drives."""
+
+    speed: Speed = Field(description="Expected speed ahead.")
+    tolerance: Ratio = Field(0.10, description="How far the speed may be off: a share of it.")
+    until_distance: PositiveLength | None = Field(
+        None,
+        description="With something straight ahead that is nearer than this, the speed no longer "
+        "counts. By default it always counts.",
+    )
+
+
+@check("motion.drives", Subject.RECORDING, Drives)
+def drives(recording: Recording, parameters: Drives) -> Finding:
+    """The robot drives ahead at the right speed.
+
+    Judged by the true speed, while nothing is near ahead: after it has sped up (half a second,
+    and what the robot's acceleration needs to that speed), and until it comes to rest for good.
+    The median must be the speed within `tolerance`, and nine tenths of the time must be, too.
+
+    Explains a robot that never moved (the process ended, nothing published, commands of zero
+    or not-a-number), a factor, a limit of the robot, driving backwards, driving on and off, and
+    a speed that varies.
+    """
+    wanted, share = parameters.speed, parameters.tolerance
+    expected = f"drives at {speed(wanted)} (within {percent(share)}) while nothing is near ahead"
+    cause = why_not_moved(recording)
+    if cause is not None or recording.scene is None:
+        return (cause or Cause("there is no world", ours=True)).finding(expected)
+    low, high = sorted((wanted * (1.0 - share), wanted * (1.0 + share)))
+    steps = _free(recording.truth, recording.scene, parameters)
+    evidence = Evidence(plots=(speed_plot(recording, (low, high)),))
+    if not steps:
+        return _too_short(recording).finding(expected)
+    middle = median(step.linear_m_s for step in steps)
+    good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
+    seen = f"median {speed(middle)}, in that range for {percent(round(good, 3))} of the time"
+    if low <= middle <= high and good >= _LEAST_SHARE:
+        return Finding.passed(expected, seen, evidence)
+    deeper = why_cut_short(recording) or why_touched(recording)
+    if deeper is not None and low <= middle <= high:
+        return deeper.finding(expected)
+    words, hint = _wrong_speed(steps, recording.scene, wanted, middle, (low, high))
+    off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
+    moment = Moment("first out of that range", recording.since_launch_s(off.time_ns))
+    evidence = Evidence(moments=(moment,), plots=evidence.plots)
+    return Finding.failed(expected, f"{seen}: {words}", hint, evidence)
+
+
+def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Truth]:
+    """The steps in which the speed counts."""
+    begin = departure(truth)
+    if begin is None:
+        return []
+    rest = final_rest(truth)
+    end = len(truth) if rest is None else rest
+    # Braking before the final rest is judged where the robot stopped.
+    while rest is not None and end > begin and not truth[end - 1].command_m_s:
+        end -= 1
+    speeding_up_s = _IN_STEPS_S + abs(parameters.speed) / scene.acceleration_m_s2
+    since_ns = truth[begin].time_ns + round(speeding_up_s * NS)
+    found = []
+    for step in truth[begin:end]:
+        if step.contact is not None:
+            break
+        if step.time_ns < since_ns:
+            continue
+        if parameters.until_distance is not None:
+            sight = ahead(scene, step)
+            if sight is not None and sight.distance_m < parameters.until_distance:
+                continue
+        found.append(step)
+    return found if len(found) >= _LEAST_STEPS else []
+
+
+def _too_short(recording: Recording) -> Cause:
+    cause = why_cut_short(recording) or why_touched(recording)
+    if cause is not None:
+        return cause
+    way = metres(way_m(recording.truth))
+    return Cause(
+        f"the robot drove too shortly to tell its speed: {way} in all",
+        "Drive on as long as nothing is near ahead; one command holds until the next.",
+        _since_departure(recording),
+    )
+
+
+def _wrong_speed(
+    steps: Sequence[Truth], scene: Scene, wanted: float, middle: float, band: tuple[float, float]
+) -> tuple[str, str]:
+    """What is wrong with the speed, and what to try."""
+    low, high = band
+    command = median(step.command_m_s for step in steps)
+    if abs(middle) < 1e-3 and any(abs(step.angular_rad_s) > 0.01 for step in steps):
+        return (
+            "the robot turns on the spot instead of driving",
+            _TURN_HINT,
+        )
+    pauses = [
+        list(pause)
+        for rests, pause in groupby(steps, key=lambda step: abs(step.linear_m_s) < REST_M_S)
+        if rests
+    ]
+    if pauses:
+        turned = any(abs(step.angular_rad_s) > REST_RAD_S for pause in pauses for step in pause)
+        did = "turned on the spot" if turned else "stood still"
+        return f"the robot {did} in between, {counted(len(pauses), 'time')}", _IN_BETWEEN_HINT
+    told = groupby(steps, key=lambda step: step.command_m_s == 0.0)
+    halts = sum(1 for stops, _ in told if stops)
+    if halts >= 2:
+        return (
+            f"the robot was told {halts} times to stop, and to drive on before it stood",
+            _IN_BETWEEN_HINT,
+        )
+    if middle * wanted < 0.0:
+        return "the robot drives backwards", _BACKWARDS_HINT
+    limit = scene.max_linear_m_s
+    if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
+        return (
+            f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}",
+            _SPEED_HINT,
+        )
+    if low <= middle <= high:
+        slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)
+        return (
+            f"the speed varies between {speed(slowest)} and {speed(fastest)}",
+            "Publish the same speed every time, as long as nothing is near ahead.",
+        )
+    factor = middle / wanted
+    words = f"{factor:.3g} times the expected speed"
+    if abs(command - middle) > 0.05 * abs(command):
+        words += f", although {speed(command)} was commanded"
+    return words, _SPEED_HINT
+
+
+class KeepsDriving(Parameters):
+    """Parameters of motion.keeps_driving."""
+
+    distance: PositiveLength = Field(
+        description="How far it must go ahead at least, along its path."
+    )
+
+
+@check("motion.keeps_driving", Subject.RECORDING, KeepsDriving)
+def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
+    """The robot drives on where nothing is ahead.
+
+    Judged by the way ahead along its true path; what it drives backwards is taken off.
+
+    Explains an obstacle beside the path that counted as one ahead (`min(ranges)`), a beam
+    without return (0.0 or inf) that counted as one, contact, a robot that drives backwards, is
+    too slow or never moved, and a process that ended.
+    """
+    wanted_m = parameters.distance
+    expected = f"drives {metres(wanted_m)} ahead without stopping, for nothing is near ahead"
+    cause = why_not_moved(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    truth = recording.truth
+    gone_m = gone_ahead_m(truth)
+    if gone_m >= wanted_m - _WAY_TOLERANCE_M:
+        evidence = Evidence(plots=(speed_plot(recording),))
+        return Finding.passed(expected, f"went {metres(gone_m)} ahead", evidence)
+    cause = why_cut_short(recording) or why_touched(recording)
+    if cause is None:
+        cause = _why_not_ahead(recording, gone_m)
+    return cause.finding(expected)
+
+
+def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
+    if gone_m < -_WAY_TOLERANCE_M:
+        return Cause(
+            f"the robot drove {metres(-gone_m)} backwards",
+            _BACKWARDS_HINT,
+            _since_departure(recording),
+        )
+    if way_m(recording.truth) < MOVED_M:
+        return Cause("the robot only turned on the spot", _TURN_HINT, _since_departure(recording))
+    rest = final_rest(recording.truth)
+    seen = f"{metres(gone_m)} in all"
+    return _too_slow(recording, seen) if rest is None else _stopped(recording, rest, seen)
+
+
+def _stopped(recording: Recording, rest: int, seen: str) -> Cause:
+    step = recording.truth[rest]
+    when_s = recording.since_launch_s(step.time_ns)
+    evidence = Evidence(
+        moments=(Moment("the robot stopped", when_s),), plots=(speed_plot(recording),)
+    )
+    around = nearest(recording.scene, step) if recording.scene is not None else None
+    misread = misreading(recording, step.time_ns, around)
+    if misread is not None:
+        return Cause(f"stopped after {seen}: {misread.words}", misread.hint, evidence)
+    return Cause(
+        f"stopped after {seen}, {when_s:.2f} s after launch",
+        "Which message made it stop? Log what the callback compares.",
+        evidence,
+    )
+
+
+def _too_slow(recording: Recording, seen: str) -> Cause:
+    truth = recording.truth
+    begin = departure(truth) or 0
+    driven_s = (truth[-1].time_ns - truth[begin].time_ns) / NS
+    waited_s = (truth[begin].time_ns - truth[0].time_ns) / NS
+    average = way_m(truth) / driven_s if driven_s else 0.0
+    lost_s = taken_s(recording, truth[0].time_ns, truth[-1].time_ns)
+    words = (
+        f"was still on its way when the observation ended: {seen}, at {speed(average)} on "
+        f"average, {format_duration(waited_s)} after the beginning"
+    )
+    if lost_s > 0.25 * (driven_s + waited_s):
+        return Cause.to_repeat(f"{words}; the machine took {format_duration(lost_s)} from the run")
+    evidence = Evidence(moments=(until_the_end(recording),), plots=(speed_plot(recording),))
+    return Cause(words, _SPEED_HINT, evidence)
+
+
+def _since_departure(recording: Recording) -> Evidence:
+    """The speed, and when the robot set off."""
+    truth = recording.truth
+    begin = truth[departure(truth) or 0]
+    return Evidence(
+        moments=(Moment("set off", recording.since_launch_s(begin.time_ns)),),
+        plots=(speed_plot(recording),),
+    )

@@ -1,0 +1,351 @@
+"""Checks of reaching a goal pose: where the robot ends, when, and by which way."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from pydantic import Field, model_validator
+
+from grader.assignment.quantity import Angle, Duration, PositiveLength, Ratio
+from grader.assignment.unit import format_duration
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.first_seen import until_the_end
+from grader.checks.motion.approach import Approach, approach
+from grader.checks.motion.contact import why_touched
+from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.measure import degrees, metres, point, speed, turn
+from grader.checks.motion.track import final_rest, is_at_rest, speed_plot, way_m
+from grader.checks.reference import GoalPose
+from grader.checks.wording import percent
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.missed_goal import why_not_aligned, why_not_there
+from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
+from grader.diagnosis.motion.off_course import why_off_course, why_unsteered
+from grader.recording.model import NS, Recording
+
+# Who looks at the goal comes nearer by most of what it drives.
+_ASTRAY_RAD = math.radians(45.0)
+_GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
+
+
+class Reaches(Parameters):
+    """Parameters of motion.reaches."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    position: PositiveLength = Field(description="How far from the goal it may end.")
+    heading: Angle | None = Field(
+        None, description="How far off its heading may be; by default it does not count."
+    )
+
+
+@check("motion.reaches", Subject.RECORDING, Reaches)
+def reaches(recording: Recording, parameters: Reaches) -> Finding:
+    """The robot reaches the goal and stays there.
+
+    Judged by the true pose at the end of the run: at rest, near the position, and with the
+    heading (a full turn more or less is the same heading).
+
+    Explains a robot that never moved or touched something, a process that ended, commands that
+    are not finite, a goal with x and y swapped or a sign changed or counted from the start, one
+    that was passed or circled, a yaw that was read wrongly, degrees instead of radians, a heading
+    that was never turned to or turned past, oscillation, and a robot that is too slow.
+    """
+    run = approach(recording, parameters.goal)
+    heading = parameters.heading
+    if isinstance(run, Cause):
+        return run.finding(f"at rest within {metres(parameters.position)} of the goal")
+    expected = (
+        f"at rest within {metres(parameters.position)} of {point(run.goal.x_m, run.goal.y_m)}"
+    )
+    if heading is not None:
+        expected += f" and {degrees(heading)} of the heading {degrees(run.goal.yaw_rad)}"
+    cause = why_not_there(run, parameters.position)
+    if cause is None and heading is not None:
+        cause = why_not_aligned(run, parameters.position, heading)
+    if cause is None and not is_at_rest(run.truth[-1]):
+        cause = _restless(run)
+    if cause is not None:
+        return cause.finding(expected)
+    last = run.truth[-1]
+    seen = f"{metres(run.distance_m(last))} from it"
+    if heading is not None:
+        seen += f", {degrees(abs(run.heading_error_rad(last)))} off its heading"
+    return Finding.passed(expected, seen, Evidence(plots=(run.distance_plot, run.heading_plot)))
+
+
+def _restless(run: Approach) -> Cause:
+    deeper = why_off_course(run.recording)
+    if deeper is not None:
+        return deeper
+    last = run.truth[-1]
+    return Cause(
+        f"is at the goal, but not at rest when the observation ends: {speed(last.linear_m_s)} and "
+        f"{turn(last.angular_rad_s)}",
+        "Publish a Twist of zeros where both errors are below your tolerances: the last command "
+        "holds until the next.",
+        Evidence(
+            moments=(until_the_end(run.recording, "not at rest when the observation ended"),),
+            plots=(speed_plot(run.recording), run.heading_plot),
+        ),
+    )
+
+
+class Settles(Parameters):
+    """Parameters of motion.settles."""
+
+    within: Duration = Field(
+        description="Simulated time until it comes to rest for good, from the beginning."
+    )
+
+
+@check("motion.settles", Subject.RECORDING, Settles)
+def settles(recording: Recording, parameters: Settles) -> Finding:
+    """The robot comes to rest in time.
+
+    Judged by the true motion: from the beginning of simulated time, which is when the node is
+    first connected, to the moment from which it rests until the end of the run. Where it rests
+    is the matter of motion.reaches.
+
+    Explains a robot that never moved, one that does not come to rest, and a process that ended.
+    """
+    expected = f"comes to rest for good within {format_duration(parameters.within)}"
+    cause = why_not_moved(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    truth = recording.truth
+    rest = final_rest(truth)
+    evidence = Evidence(plots=(speed_plot(recording),))
+    end = truth[-1] if rest is None else truth[rest]
+    took_s = (end.time_ns - truth[0].time_ns) / NS
+    if rest is not None and took_s <= parameters.within:
+        return Finding.passed(expected, f"after {format_duration(took_s)}", evidence)
+    deeper = why_cut_short(recording) or why_touched(recording)
+    if deeper is not None:
+        return deeper.finding(expected)
+    lost_s = taken_s(recording, truth[0].time_ns, end.time_ns)
+    if lost_s > 0.0 and took_s - lost_s <= parameters.within:
+        seen = f"after {format_duration(took_s)}" if rest is not None else "not until the end"
+        return Finding.to_repeat(
+            expected, f"{seen}; the machine took up to {format_duration(lost_s)} from the run"
+        )
+    deeper = why_unsteered(recording)
+    if deeper is not None:
+        return deeper.finding(expected)
+    if rest is None:
+        return Finding.failed(
+            expected,
+            f"still moves after {format_duration(took_s)}, when the observation ends: "
+            f"{speed(end.linear_m_s)} and {turn(end.angular_rad_s)}",
+            "Publish a Twist of zeros where the errors are below your tolerances.",
+            Evidence(
+                moments=(until_the_end(recording, "not at rest when the observation ended"),),
+                plots=evidence.plots,
+            ),
+        )
+    return Finding.failed(
+        expected,
+        f"after {format_duration(took_s)}",
+        "Larger gains are faster, until it overshoots.",
+        Evidence(
+            moments=(Moment("at rest", recording.since_launch_s(end.time_ns)),),
+            plots=evidence.plots,
+        ),
+    )
+
+
+class PathLength(Parameters):
+    """Parameters of motion.path_length."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    most: Ratio = Field(description="How much longer than the straight line the path may be.")
+    position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
+
+
+@check("motion.path_length", Subject.RECORDING, PathLength)
+def path_length(recording: Recording, parameters: PathLength) -> Finding:
+    """The path to the goal is hardly longer than the straight line.
+
+    Judged by the true path of the whole run, against the straight line from its start to the
+    goal.
+
+    Explains why the goal was not reached, and a path with a detour.
+    """
+    run = approach(recording, parameters.goal)
+    path = f"on a path at most {percent(parameters.most)} longer than the straight line"
+    if isinstance(run, Cause):
+        return run.finding(f"within {metres(parameters.position)} of the goal, {path}")
+    near = f"within {metres(parameters.position)} of {point(run.goal.x_m, run.goal.y_m)}"
+    expected = f"{near}, {path}"
+    straight_m = run.distance_m(run.truth[0])
+    if straight_m <= parameters.position:
+        return Finding.error(
+            expected, f"the start is {metres(straight_m)} from the goal: there is no way to judge"
+        )
+    cause = why_not_there(run, parameters.position)
+    if cause is not None:
+        return cause.finding(expected)
+    gone_m = way_m(run.truth)
+    seen = f"{metres(gone_m)} for {metres(straight_m)}, {_longer(gone_m / straight_m)}"
+    evidence = Evidence(plots=(run.distance_plot,))
+    allowed_m = straight_m * (1.0 + parameters.most)
+    if gone_m <= allowed_m:
+        return Finding.passed(expected, seen, evidence)
+    late = _why_far(run, seen, gone_m - allowed_m)
+    if late is not None:
+        return late.finding(expected)
+    astray_m = _astray_m(run, parameters.position)
+    return Finding.failed(
+        expected,
+        f"{seen}; {metres(astray_m)} of it with the goal more than {degrees(_ASTRAY_RAD)} to the "
+        "side",
+        "Look at its heading on the way: does it turn to the goal at once, and by the short way? "
+        "The error atan2(dy, dx) - yaw is wrapped, and its gain is large against that of the "
+        "distance.",
+        Evidence(moments=(_farthest(run),), plots=evidence.plots),
+    )
+
+
+def _astray_m(run: Approach, position_m: float) -> float:
+    """Way that was driven before the arrival while the robot did not look at the goal."""
+    before = run.truth[: run.arrival(position_m)]
+    return sum(
+        math.hypot(b.x_m - a.x_m, b.y_m - a.y_m)
+        for a, b in pairwise(before)
+        if abs(run.bearing_error_rad(a)) > _ASTRAY_RAD
+    )
+
+
+def _why_far(run: Approach, seen: str, more_m: float) -> Cause | None:
+    """The cause if commands that came late by the machine's doing may explain a long path.
+
+    Args:
+        run: The run.
+        seen: What was seen.
+        more_m: How much longer than allowed it is, in m.
+    """
+    lost_s = taken_s(run.recording, run.truth[0].time_ns, run.truth[-1].time_ns)
+    fastest = max(abs(step.linear_m_s) for step in run.truth)
+    # What it drives on without a command, it has to come back.
+    if lost_s <= 0.0 or 2.0 * lost_s * fastest < more_m:
+        return None
+    return Cause.to_repeat(
+        f"{seen}; the machine took up to {format_duration(lost_s)} from the run, which may "
+        "explain it"
+    )
+
+
+def _longer(ratio: float) -> str:
+    return f"{percent(round(ratio - 1.0, 3))} longer" if ratio >= 1.0 else "no longer"
+
+
+class Overshoot(Parameters):
+    """Parameters of motion.overshoot."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    most: PositiveLength | None = Field(
+        None, description="How far it may go away again from where it came nearest."
+    )
+    heading: Angle | None = Field(
+        None, description="How far it may turn beyond the goal's heading after it arrived."
+    )
+    position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
+
+    @model_validator(mode="after")
+    def _something(self) -> Overshoot:
+        if self.most is None and self.heading is None:
+            raise ValueError("say what is limited: most (a length) or heading (an angle)")
+        return self
+
+
+@check("motion.overshoot", Subject.RECORDING, Overshoot)
+def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
+    """The robot does not go past its goal.
+
+    Judged by the true motion. Position: how much the distance from the goal grows again after
+    the robot has come near. Heading: how far it turns beyond the goal's heading after it has
+    stopped driving.
+
+    Explains why the goal was not reached, and how far the robot went past it.
+    """
+    expected = " and ".join(
+        [
+            *([f"at most {metres(parameters.most)} past the goal"] if parameters.most else []),
+            *(
+                [f"at most {degrees(parameters.heading)} beyond its heading"]
+                if parameters.heading is not None
+                else []
+            ),
+        ]
+    )
+    run = approach(recording, parameters.goal)
+    if isinstance(run, Cause):
+        return run.finding(expected)
+    arrival = run.arrival(parameters.position)
+    if arrival is None:
+        cause = why_not_there(run, parameters.position)
+        return (cause or Cause("never near the goal")).finding(expected)
+    past_m = _past_m(run, arrival)
+    beyond_rad = _beyond_rad(run, parameters.position)
+    seen, plots = [], []
+    if parameters.most is not None:
+        seen.append(f"{metres(past_m)} past it")
+        plots.append(run.distance_plot)
+    if parameters.heading is not None:
+        seen.append(f"{degrees(beyond_rad)} beyond its heading")
+        plots.append(run.heading_plot)
+    evidence = Evidence(plots=tuple(plots))
+    good = (parameters.most is None or past_m <= parameters.most) and (
+        parameters.heading is None or beyond_rad <= parameters.heading
+    )
+    if good:
+        return Finding.passed(expected, " and ".join(seen), evidence)
+    deeper = why_off_course(recording)
+    if deeper is not None:
+        return deeper.finding(expected)
+    return Finding.failed(
+        expected,
+        " and ".join(seen),
+        "What is in proportion to the error slows down before the goal, with a gain that is not "
+        "too large: look at the commands of the last second before it.",
+        Evidence(
+            moments=(Moment("at the goal", recording.since_launch_s(run.truth[arrival].time_ns)),),
+            plots=evidence.plots,
+        ),
+    )
+
+
+def _farthest(run: Approach) -> Moment:
+    """Where the robot was farthest from the straight line to the goal."""
+    first, goal = run.truth[0], run.goal
+    dx, dy = goal.x_m - first.x_m, goal.y_m - first.y_m
+    worst = max(
+        run.truth, key=lambda step: abs(dx * (step.y_m - first.y_m) - dy * (step.x_m - first.x_m))
+    )
+    when_s = run.recording.since_launch_s(worst.time_ns)
+    return Moment("farthest from the straight line to the goal", when_s)
+
+
+def _past_m(run: Approach, arrival: int) -> float:
+    """The largest growth of the distance after the arrival."""
+    nearest_m, past_m = math.inf, 0.0
+    for step in run.truth[arrival:]:
+        distance_m = run.distance_m(step)
+        nearest_m = min(nearest_m, distance_m)
+        past_m = max(past_m, distance_m - nearest_m)
+    return past_m
+
+
+def _beyond_rad(run: Approach, position_m: float) -> float:
+    """How far the heading went to the other side of the goal's after driving had ended."""
+    driven = run.driven(position_m)
+    if driven is None:
+        return 0.0
+    errors = [run.heading_error_rad(step) for step in run.truth[driven:]]
+    for index, (before, after) in enumerate(pairwise(errors), start=1):
+        # Through half a turn the sign changes as well.
+        if before * after < 0.0 and abs(before) < math.pi / 2.0:
+            side = math.copysign(1.0, before)
+            return max(-side * error for error in errors[index:])
+    return 0.0

@@ -1,0 +1,221 @@
+"""The check that the turn is commanded in proportion to the heading error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import median
+from typing import Literal
+
+from pydantic import Field
+
+from grader.assignment.quantity import Frequency, PositiveLength, Ratio
+from grader.assignment.unit import format_duration
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.motion.answer import MOST_BEHIND, answers
+from grader.checks.motion.approach import Approach, approach
+from grader.checks.motion.command import command_topic, commands
+from grader.checks.motion.control_law import Law, Sample, Verdict, examine
+from grader.checks.motion.measure import metres
+from grader.checks.motion.steering import LEAST_SAMPLES, at_the_goal, on_the_way
+from grader.checks.reference import GoalPose
+from grader.checks.wording import counted, percent
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.misread_yaw import misread_yaw
+from grader.diagnosis.motion.missed_goal import why_not_there
+from grader.diagnosis.motion.no_motion import why_cut_short
+from grader.diagnosis.motion.off_course import why_off_course
+from grader.diagnosis.no_messages import why_silent
+from grader.recording.model import NS, Recording
+
+_GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
+_MOST_POINTS = 400
+# Odometry comes 30 times in a second, and a timer of 10 Hz is right.
+_RARE_S = 0.2
+_WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
+_FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
+
+
+class Proportional(Parameters):
+    """Parameters of motion.proportional."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    phase: Literal["position", "align"] = Field(
+        description="`position`: on the way, against the direction of the goal. `align`: at the "
+        "goal, against its heading."
+    )
+    position: PositiveLength = Field(
+        0.1,
+        description="How near the goal the first phase no longer counts: there its direction "
+        "changes faster than odometry tells.",
+    )
+    r2: Ratio = Field(0.9, description="Least coefficient of determination R² of the line.")
+    gain_min: Frequency | None = Field(
+        None, description="Least gain, in rad/s for each rad: `0.1 Hz` is 0.1 per second."
+    )
+    gain_max: Frequency | None = Field(None, description="Greatest gain.")
+
+
+@check("motion.proportional", Subject.RECORDING, Proportional)
+def proportional(recording: Recording, parameters: Proportional) -> Finding:
+    """The turn is commanded in proportion to the heading error.
+
+    Judged by every published command, against the error at the newest odometry before it (so
+    that the delay of odometry costs nothing), normalised to [-pi, pi]. A line through the
+    origin is laid through them: its slope is the gain, R² tells how well it fits. Commands at a
+    limit (of the robot, or a clamp of your own) and the pause near zero within your tolerance
+    do not count.
+
+    Explains commands that know only a few values (bang-bang), an error that is not normalised,
+    a wrong sign, a yaw that was read wrongly, commands that have nothing to do with the error, and
+    a gain out of range.
+    """
+    phase = parameters.phase
+    expected = (
+        f"angular.z in proportion to the heading error to {_WHAT[phase]} (R² at least "
+        f"{parameters.r2:.2g}{_range_words(parameters)})"
+    )
+    run = approach(recording, parameters.goal)
+    if isinstance(run, Cause):
+        return run.finding(expected)
+    topic = command_topic(recording)
+    if not recording.on(topic):
+        return why_silent(recording, topic).finding(expected)
+    arrival = run.arrival(parameters.position)
+    if phase == "align" and arrival is None:
+        cause = why_not_there(run, parameters.position)
+        return (cause or Cause("never near the goal")).finding(expected)
+    scene = recording.scene
+    limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
+    tried = [_samples(run, parameters, behind, limit_rad_s) for behind in range(MOST_BEHIND + 1)]
+    verdicts = [examine(samples, limit_rad_s, parameters.r2) for samples in tried]
+    good = [index for index, item in enumerate(verdicts) if _is_good(item, parameters)]
+    index = max(good, key=lambda i: verdicts[i].r2, default=0)
+    verdict, samples = verdicts[index], tried[index]
+    begins = run.truth[arrival if phase == "align" and arrival is not None else 0]
+    moment = Moment("this phase begins", recording.since_launch_s(begins.time_ns))
+    evidence = Evidence(moments=(moment,), plots=(_plot(samples, phase),))
+    if good:
+        return _judge_gain(verdict, parameters, expected, evidence)
+    # One that had hardly an error to correct need not have sent a command for long.
+    idle = verdict.law is Law.NOTHING_TO_DO
+    deeper = why_cut_short(recording) if idle else why_off_course(recording)
+    if deeper is not None and len(samples) < LEAST_SAMPLES:
+        return deeper.finding(expected)
+    if idle:
+        return Finding.passed(
+            expected,
+            f"there was hardly an error to correct, and hardly a turn was commanded "
+            f"({counted(len(samples), 'command')})",
+            evidence,
+        )
+    observed, hint = _words(verdict, parameters, len(samples))
+    apart_s = _apart_s(recording)
+    if verdict.law is Law.PROPORTIONAL and apart_s > _RARE_S:
+        observed += f", one every {format_duration(apart_s)}"
+        hint += (
+            " Publish one with every odometry, or from a timer of 10 Hz or more: a time.sleep() in "
+            "a callback lets odometry grow old."
+        )
+    misread = misread_yaw(run, parameters.position)
+    if misread is not None:
+        return Finding.failed(
+            expected, f"the commands do not follow the error: {misread}", misread.hint, evidence
+        )
+    return Finding.failed(expected, observed, hint, evidence)
+
+
+def _apart_s(recording: Recording) -> float:
+    """Median time between two commands; 0 without two."""
+    times_ns = [item.time_ns for item in commands(recording)]
+    return median((b - a) / NS for a, b in pairwise(times_ns)) if len(times_ns) > 1 else 0.0
+
+
+def _range_words(parameters: Proportional) -> str:
+    low, high = parameters.gain_min, parameters.gain_max
+    if low is not None and high is not None:
+        return f", gain {low:.3g} to {high:.3g} 1/s"
+    if low is not None:
+        return f", gain at least {low:.3g} 1/s"
+    return f", gain at most {high:.3g} 1/s" if high is not None else ""
+
+
+def _is_good(verdict: Verdict, parameters: Proportional) -> bool:
+    return verdict.law is Law.PROPORTIONAL and verdict.r2 >= parameters.r2 and verdict.gain > 0.0
+
+
+def _samples(
+    run: Approach, parameters: Proportional, behind: int, limit_rad_s: float
+) -> list[Sample]:
+    known = answers(run.recording, behind)
+    if parameters.phase == "position":
+        return on_the_way(run, known, parameters.position)
+    return at_the_goal(run, known, parameters.position, limit_rad_s)
+
+
+def _judge_gain(
+    verdict: Verdict, parameters: Proportional, expected: str, evidence: Evidence
+) -> Finding:
+    low, high = parameters.gain_min or 0.0, parameters.gain_max or math.inf
+    seen = f"gain {verdict.gain:.3g} 1/s, R² {verdict.r2:.3f}, {counted(verdict.used, 'command')}"
+    if low <= verdict.gain <= high:
+        return Finding.passed(expected, seen, evidence)
+    size = "small" if verdict.gain < low else "large"
+    hint = "The gain is the factor of the error."
+    return Finding.failed(expected, f"{seen}: the gain is too {size}", hint, evidence)
+
+
+def _words(verdict: Verdict, parameters: Proportional, number: int) -> tuple[str, str]:
+    """What the commands are instead, and what to try."""
+    formula = f"angular.z = gain * error, with the error {_FORMULA[parameters.phase]}"
+    wrap = "normalised by atan2(sin(e), cos(e))"
+    if verdict.law is Law.TOO_FEW:
+        return (
+            f"only {counted(number, 'command')} in this phase to judge, at more than "
+            f"{metres(parameters.position)} from the goal"
+            if parameters.phase == "position"
+            else f"only {counted(number, 'command')} in this phase to judge",
+            f"Publish {formula}, in every callback.",
+        )
+    if verdict.law is Law.ZERO:
+        return (
+            f"all of {counted(number, 'command')} in this phase have angular.z = 0, although there "
+            "is an error",
+            f"Publish {formula}.",
+        )
+    if verdict.law is Law.STEPS:
+        values = ", ".join(f"{value:.3g}" for value in verdict.values)
+        return (
+            f"angular.z has only {counted(len(verdict.values), 'size')} ({values} rad/s) whatever "
+            "the error is: that is on-off control (bang-bang)",
+            f"Publish {formula}.",
+        )
+    if verdict.law is Law.NOT_NORMALISED:
+        return (
+            f"{percent(round(verdict.share, 3))} of the commands fit an error that is a full turn "
+            f"off: it is not normalised to [-pi, pi] (gain {verdict.gain:.3g} 1/s)",
+            f"Publish {formula}, {wrap}.",
+        )
+    if verdict.law is Law.WRONG_SIGN:
+        return (
+            f"it turns away from the error: gain {verdict.gain:.3g} 1/s",
+            f"Publish {formula}; counter-clockwise is positive (REP-103).",
+        )
+    return (
+        f"the commands do not follow the error: gain {verdict.gain:.3g} 1/s, R² {verdict.r2:.2f}, "
+        f"{counted(verdict.used, 'command')}",
+        f"Publish {formula}, {wrap}, from the newest odometry.",
+    )
+
+
+def _plot(samples: Sequence[Sample], phase: str) -> Plot:
+    shown = samples[:: max(1, len(samples) // _MOST_POINTS)]
+    return Plot(
+        "Command over error",
+        f"heading error to {_WHAT[phase]} (rad)",
+        "angular.z (rad/s)",
+        tuple(item.error_rad for item in shown),
+        tuple(item.command_rad_s for item in shown),
+    )

@@ -1,0 +1,187 @@
+"""Checks of how a robot turns on its way to a goal pose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+from pydantic import Field
+
+from grader.assignment.quantity import Angle, PositiveLength, Speed
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.motion.approach import Approach, approach
+from grader.checks.motion.detour import WRAP_HINT, Detour, away
+from grader.checks.motion.measure import degrees, metres, speed
+from grader.checks.motion.track import speed_plot
+from grader.checks.reference import GoalPose
+from grader.checks.wording import counted
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.missed_goal import why_not_there
+from grader.diagnosis.motion.off_course import why_off_course
+from grader.recording.model import NS, Recording, Truth
+
+_GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
+# Way that the delay of odometry may still cost after the position is reached: 2 cm of the slowest
+# robot, and as much as a faster one goes in a tenth of a second.
+_RUN_OUT_M = 0.02
+_RUN_OUT_S = 0.09
+_OFF_RAD = 0.5
+_STRAIGHT_RAD_S = 0.01
+_PAUSE_NS = NS // 5
+
+
+class TwoPhases(Parameters):
+    """Parameters of motion.two_phases."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    position: PositiveLength = Field(description="How near the goal counts as reached.")
+    speed: Speed = Field(0.01, description="Commanded speed that still counts as none.")
+
+
+@check("motion.two_phases", Subject.RECORDING, TwoPhases)
+def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
+    """At the goal's position the robot only turns, it no longer drives.
+
+    Judged by the commands in force and the true way. Within `position` of the goal the robot
+    may drive on towards it, as far as its own tolerance says, and turn on the spot towards it;
+    but while it turns away from the goal's position, or once it has done so without driving, it
+    may not drive any more (for the delay of odometry 2 cm are allowed, or what the robot
+    goes in 0.09 s at its full speed).
+
+    Explains why the position was not reached, a speed in the second phase, and driving and
+    turning by turns.
+    """
+    expected = (
+        f"no linear motion once within {metres(parameters.position)} of the goal, only turning"
+    )
+    run = approach(recording, parameters.goal)
+    if isinstance(run, Cause):
+        return run.finding(expected)
+    arrival = run.arrival(parameters.position)
+    if arrival is None:
+        cause = why_not_there(run, parameters.position)
+        return (cause or Cause("never near the goal")).finding(expected)
+    stray = _stray(run, arrival, parameters.speed)
+    evidence = Evidence(plots=(speed_plot(recording), run.distance_plot))
+    way = sum(_way_m(before, after) for before, after in stray)
+    fastest = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
+    if way <= max(_RUN_OUT_M, _RUN_OUT_S * fastest):
+        return Finding.passed(expected, f"{metres(way)} after it had begun to turn", evidence)
+    deeper = why_off_course(recording)
+    if deeper is not None:
+        return deeper.finding(expected)
+    first = stray[0][1]
+    fastest = max((abs(after.command_m_s) for _, after in stray))
+    when_s = recording.since_launch_s(first.time_ns)
+    return Finding.failed(
+        expected,
+        f"drove {metres(way)} while it turned at the goal, commanded with up to {speed(fastest)} "
+        f"(from {when_s:.2f} s after launch)",
+        "In the second phase linear.x is 0.0. Remember that the position was reached: a flag that "
+        "is set once does not fall back into the first phase.",
+        Evidence(moments=(Moment("drives again", when_s),), plots=evidence.plots),
+    )
+
+
+def _stray(run: Approach, arrival: int, none_m_s: float) -> list[tuple[Truth, Truth]]:
+    """Pairs of steps between which the robot drives where it should only turn."""
+    found = []
+    turning = False
+    still_since: int | None = None
+    for before, after in pairwise(run.truth[arrival:]):
+        if abs(after.command_m_s) <= none_m_s:
+            still_since = still_since or after.time_ns
+            turning |= after.time_ns - still_since >= _PAUSE_NS and _turns_away(run, after)
+            continue
+        still_since = None
+        if turning or _turns_away(run, after):
+            found.append((before, after))
+    return found
+
+
+def _turns_away(run: Approach, step: Truth) -> bool:
+    """Whether it turns away from the goal's position, as no robot on its way there does.
+
+    In the first phase it turns towards the goal, also where it comes in by a curve; one that
+    drives straight past the goal overshoots, but does not align yet.
+    """
+    error_rad, turn_rad_s = run.bearing_error_rad(step), step.command_rad_s
+    return (
+        abs(error_rad) > _OFF_RAD and abs(turn_rad_s) > _STRAIGHT_RAD_S
+        and error_rad * turn_rad_s < 0.0
+    )  # fmt: skip
+
+
+def _way_m(before: Truth, after: Truth) -> float:
+    return math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
+
+
+class ShortWay(Parameters):
+    """Parameters of motion.short_way."""
+
+    goal: GoalPose = Field(description=_GOAL)
+    position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
+    tolerance: Angle = Field(
+        math.radians(30.0),
+        description="How far it may turn the wrong way before it passes half a turn: near half "
+        "a turn both ways are short.",
+    )
+
+
+@check("motion.short_way", Subject.RECORDING, ShortWay)
+def short_way(recording: Recording, parameters: ShortWay) -> Finding:
+    """The robot always turns by the short way.
+
+    Judged by the true heading, in the first phase against the direction of the goal, in the
+    second (once driving has ended near the goal) against the goal's heading. The long way
+    leads away from the error and through half a turn; overshooting by less is no long way.
+
+    Explains where it turned the long way, from which error, and why the robot never moved or
+    never came to the goal.
+    """
+    expected = "turns by the short way, never more than half a turn for an error"
+    run = approach(recording, parameters.goal)
+    if isinstance(run, Cause):
+        return run.finding(expected)
+    detours = list(_detours(run, parameters))
+    evidence = Evidence(plots=(run.heading_plot,))
+    if not detours:
+        # One that drives off has shown nothing of how it turns to this goal.
+        arrived = run.arrival(parameters.position) is not None
+        cause = None if arrived else why_not_there(run, parameters.position)
+        if cause is not None:
+            return cause.finding(expected)
+        return Finding.passed(expected, "no long way", evidence)
+    deeper = why_off_course(recording)
+    if deeper is not None:
+        return deeper.finding(expected)
+    first = detours[0]
+    when_s = recording.since_launch_s(first.step.time_ns)
+    long_rad = math.tau - abs(first.error_rad)
+    more = f", and {counted(len(detours) - 1, 'more time')}" if len(detours) > 1 else ""
+    return Finding.failed(
+        expected,
+        f"turned away from {first.what} through half a turn: {degrees(long_rad)} "
+        f"{_sense(-first.error_rad)} where {degrees(abs(first.error_rad))} "
+        f"{_sense(first.error_rad)} would do ({when_s:.2f} s after launch{more})",
+        WRAP_HINT,
+        Evidence(moments=(Moment("turns the long way", when_s),), plots=evidence.plots),
+    )
+
+
+def _sense(angle_rad: float) -> str:
+    return "counter-clockwise" if angle_rad > 0.0 else "clockwise"
+
+
+def _detours(run: Approach, parameters: ShortWay) -> Iterator[Detour]:
+    truth = run.truth
+    arrival = run.arrival(parameters.position)
+    driven = run.driven(parameters.position)
+    first = truth if arrival is None else truth[:arrival]
+    yield from away(first, run.bearing_error_rad, parameters.tolerance, "the goal")
+    if driven is not None:
+        yield from away(
+            truth[driven:], run.heading_error_rad, parameters.tolerance, "the goal's heading"
+        )

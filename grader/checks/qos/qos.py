@@ -1,0 +1,348 @@
+"""Checks of quality of service: what publishers offer and subscriptions request."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from grader.assignment.model import Durability, Reliability, TopicName
+from grader.assignment.quantity import Duration
+from grader.checks import declarations as testimony
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.first_seen import endpoints_seen, first_seen
+from grader.checks.qos.compatibility import Comparison, comparisons, duration_words
+from grader.checks.wording import code, counted
+from grader.diagnosis.no_endpoint import why_no_endpoint
+from grader.recording.model import NS, Kind, Qos, Recording
+
+# Messages that tell whether a queue was always full.
+_FEWEST = 5
+# DDS carries durations as seconds and a fraction of 2**32.
+_SAME_DURATION = 1e-3
+_ARGUMENTS = {"lease": "liveliness_lease_duration"}
+_POLICIES = {"lease": "liveliness lease"}
+"""Key of the YAML -> name of the policy, where they differ."""
+_WORD_POLICIES = ("reliability", "durability", "liveliness")
+_DURATION_POLICIES = {
+    "deadline": "deadline_s",
+    "lifespan": "lifespan_s",
+    "lease": "liveliness_lease_s",
+}
+"""Key of the YAML -> attribute of the profile."""
+_DECLARED_POLICIES = {"reliability", "durability"}
+"""What a process declares of an endpoint."""
+
+
+class Profile(Parameters):
+    """Parameters of qos.offered and qos.requested."""
+
+    topic: TopicName = Field(description="Fully qualified topic name.")
+    reliability: Reliability | None = Field(None, description="Expected reliability.")
+    durability: Durability | None = Field(None, description="Expected durability.")
+    deadline: Duration | None = Field(None, description="Expected deadline.")
+    lifespan: Duration | None = Field(None, description="Expected lifespan.")
+    liveliness: Literal["automatic", "manual_by_topic"] | None = Field(
+        None, description="Expected liveliness."
+    )
+    lease: Duration | None = Field(None, description="Expected lease duration of the liveliness.")
+
+    @model_validator(mode="after")
+    def _something(self) -> Profile:
+        if not self.policies:
+            raise ValueError(f"name a policy: {', '.join((*_WORD_POLICIES, *_DURATION_POLICIES))}")
+        return self
+
+    @property
+    def policies(self) -> dict[str, Any]:
+        """Policy -> expected value, those that are asked for only."""
+        names = (*_WORD_POLICIES, *_DURATION_POLICIES)
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+    @property
+    def qos(self) -> Qos:
+        """The expected profile, everything else unknown."""
+        return Qos(
+            reliability=self.reliability or "unknown",
+            durability=self.durability or "unknown",
+            liveliness=self.liveliness or "unknown",
+            deadline_s=self.deadline,
+            lifespan_s=self.lifespan,
+            liveliness_lease_s=self.lease,
+        )
+
+
+@dataclass(frozen=True)
+class _Side:
+    """The words and the rule for one end.
+
+    Attributes:
+        kind: Publisher or subscription.
+        has: ``offers`` or ``requests``.
+        did: ``offered`` or ``requested``.
+        partner: The other end, in words.
+        comparisons: (found, expected) -> how a partner with the expected profile fits.
+    """
+
+    kind: Kind
+    has: str
+    did: str
+    partner: str
+    comparisons: Callable[[Qos, Qos], tuple[Comparison, ...]]
+
+
+_PUBLISHER = _Side(
+    Kind.PUBLISHER,
+    "offers",
+    "offered",
+    "subscription that requests",
+    lambda found, expected: comparisons(offered=found, requested=expected),
+)
+_SUBSCRIPTION = _Side(
+    Kind.SUBSCRIPTION,
+    "requests",
+    "requested",
+    "publisher that offers",
+    lambda found, expected: comparisons(offered=expected, requested=found),
+)
+
+
+@check("qos.offered", Subject.RECORDING, Profile)
+def offered(recording: Recording, parameters: Profile) -> Finding:
+    """Publishers on the topic offer the expected QoS.
+
+    Judged by what DDS discovered of every publisher of the student's on the topic; only the
+    policies that are named in the parameters count. Queue depth is judged by qos.depth.
+
+    Explains by the rule "requested against offered" whether a subscription that requests the
+    expected profile would receive anything.
+    """
+    return _judge(recording, parameters, _PUBLISHER)
+
+
+@check("qos.requested", Subject.RECORDING, Profile)
+def requested(recording: Recording, parameters: Profile) -> Finding:
+    """Subscriptions to the topic request the expected QoS.
+
+    Judged by what DDS discovered of every subscription of the student's to the topic; only the
+    policies that are named in the parameters count.
+
+    Explains by the rule "requested against offered" whether it would receive anything from a
+    publisher that offers the expected profile.
+    """
+    return _judge(recording, parameters, _SUBSCRIPTION)
+
+
+def _judge(recording: Recording, parameters: Profile, side: _Side) -> Finding:
+    words = ", ".join(f"{name} {_words(item)}" for name, item in parameters.policies.items())
+    expected = f"the {side.kind.value} on {code(parameters.topic)} {side.has} {words}"
+    cause = why_no_endpoint(recording, side.kind, parameters.topic)
+    if cause is not None:
+        return cause.finding(expected)
+    endpoints = recording.student_endpoints(side.kind, parameters.topic)
+    profiles = [(item.node, item.qos) for item in endpoints]
+    source = ""
+    if not endpoints and set(parameters.policies) <= _DECLARED_POLICIES:
+        # One that published and was destroyed before anybody could look at it.
+        profiles += testimony.profiles(recording, side.kind, parameters.topic)
+        source = ", declared by the process"
+    for node, qos in profiles:
+        wrong = _wrong(qos, parameters)
+        if wrong:
+            at = endpoints_seen(recording, [item for item in endpoints if item.qos is qos])
+            at = at or tuple(
+                Moment("message published", recording.since_launch_s(item.stamp_ns))
+                for item in recording.on(parameters.topic)[:1]
+            )
+            return _mismatch(node, qos, wrong, parameters, expected, side, source, at)
+    hidden = [
+        name
+        for name in parameters.policies
+        if name in _WORD_POLICIES
+        and (not profiles or any(getattr(qos, name) == "unknown" for _, qos in profiles))
+    ]
+    if hidden or not profiles:
+        names = ", ".join(hidden) or "QoS"
+        return Finding.error(expected, f"{names} of the {side.kind.value} was not discovered")
+    return Finding.passed(
+        expected, f"{side.did} by {counted(len(profiles), side.kind.value)}{source}"
+    )
+
+
+def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
+    """Policy -> (expected, found) where they differ and are known."""
+    found: dict[str, tuple[Any, Any]] = {}
+    for name, wanted in parameters.policies.items():
+        if name in _WORD_POLICIES:
+            actual = getattr(qos, name)
+            if actual not in (wanted, "unknown"):
+                found[name] = wanted, actual
+        else:
+            actual_s = getattr(qos, _DURATION_POLICIES[name])
+            if actual_s is None or not math.isclose(actual_s, wanted, rel_tol=_SAME_DURATION):
+                found[name] = wanted, actual_s
+    return found
+
+
+def _mismatch(
+    node: str,
+    qos: Qos,
+    wrong: dict[str, tuple[Any, Any]],
+    parameters: Profile,
+    expected: str,
+    side: _Side,
+    source: str,
+    moments: tuple[Moment, ...],
+) -> Finding:
+    found = side.comparisons(qos, parameters.qos)
+    refused = {item.policy for item in found if item.compatible is False}
+    observed = f"the {side.kind.value} of {code(node)} {side.has} " + ", ".join(
+        f"{name} {_words(actual)} instead of {_words(wanted)}"
+        for name, (wanted, actual) in wrong.items()
+    )
+    observed += source
+    if refused:
+        observed += f": a {side.partner} the expected profile does not match it"
+    else:
+        observed += f"; a {side.partner} the expected profile would still match it"
+    rows = tuple(
+        (
+            name,
+            _words(wanted),
+            _words(actual),
+            "no" if _POLICIES.get(name, name) in refused else "yes",
+        )
+        for name, (wanted, actual) in wrong.items()
+    )
+    header = ("policy", "expected", side.did, "compatible")
+    return Finding.failed(
+        expected,
+        observed,
+        _hint(parameters, side, wrong),
+        Evidence(
+            moments=moments,
+            tables=(Table("Requested against offered", header, rows),),
+        ),
+    )
+
+
+def _hint(parameters: Profile, side: _Side, wrong: Collection[str]) -> str:
+    asked = {name: item for name, item in parameters.policies.items() if name in _WORD_POLICIES}
+    default = {"reliability": "reliable", "durability": "volatile", "liveliness": "automatic"}
+    if len(asked) == len(parameters.policies) and all(
+        default[name] == item for name, item in asked.items()
+    ):
+        hint = "A number as QoS, such as 10, is the default profile: reliable and volatile."
+        if "reliability" in wrong:
+            hint += " qos_profile_sensor_data is best_effort."
+        if "durability" in wrong:
+            hint += " A profile is transient_local only where its durability says so: leave it out."
+        return hint
+    arguments = ", ".join(
+        f"{name}={name.capitalize()}Policy.{item.upper()}"
+        if name in _WORD_POLICIES
+        else f"{_ARGUMENTS.get(name, name)}=Duration(seconds={item:g})"
+        for name, item in parameters.policies.items()
+    )
+    create = "create_publisher" if side.kind is Kind.PUBLISHER else "create_subscription"
+    return f"Give {create} a profile: QoSProfile(depth=10, {arguments}), from rclpy.qos."
+
+
+def _words(value: Any) -> str:
+    return value if isinstance(value, str) else duration_words(value)
+
+
+class Depth(Parameters):
+    """Parameters of qos.depth."""
+
+    topic: TopicName = Field(description="Fully qualified topic name.")
+    depth: int = Field(ge=1, description="Expected queue depth (history keep_last).")
+    kind: Literal["publisher", "subscription"] = Field(
+        "publisher", description="Which end of the student's to judge."
+    )
+
+
+@check("qos.depth", Subject.RECORDING, Depth)
+def depth(recording: Recording, parameters: Depth) -> Finding:
+    """The queue has the expected depth.
+
+    Discovery does not tell history and depth, so this is judged by what the process declared when
+    it created the endpoint. The heartbeats of a reliable publisher tell how many messages it
+    keeps: what they show counts more.
+
+    Explains another depth, a history of keep_all, which has no depth, and an endpoint that the
+    process did not declare.
+    """
+    kind = Kind(parameters.kind)
+    expected = f"queue depth {parameters.depth} of the {kind.value} on {code(parameters.topic)}"
+    cause = why_no_endpoint(recording, kind, parameters.topic)
+    if cause is not None:
+        return cause.finding(expected)
+    declared = testimony.queues(recording, kind, parameters.topic)
+    own = recording.student_endpoints(kind, parameters.topic)
+    seen = endpoints_seen(recording, own) or first_seen(recording, recording.on(parameters.topic))
+    evidence = Evidence(moments=seen)
+    for queue in declared:
+        if queue.history == "keep_all":
+            return Finding.failed(
+                expected,
+                "history keep_all, declared by the process: the depth has no meaning then",
+                _depth_hint(parameters),
+                evidence,
+            )
+        if queue.depth is not None and queue.depth != parameters.depth:
+            return Finding.failed(
+                expected,
+                f"depth {queue.depth}, declared by the process",
+                _depth_hint(parameters),
+                evidence,
+            )
+    shown = _kept(recording, parameters)
+    if shown not in (None, parameters.depth):
+        but = f"depth {parameters.depth} is declared, but " if declared else ""
+        return Finding.failed(
+            expected,
+            f"{but}the heartbeats of the publisher show that it keeps {counted(shown, 'message')}",
+            _depth_hint(parameters),
+            evidence,
+        )
+    if any(queue.depth is None for queue in declared):
+        return Finding.error(expected, "the depth cannot be seen: the process declared no number")
+    if not declared and shown is None:
+        what = f"the {kind.value} on {code(parameters.topic)}"
+        return testimony.why_undeclared(recording, what).finding(expected)
+    source = "declared by the process" if declared else "as the heartbeats of the publisher show"
+    return Finding.passed(expected, f"depth {parameters.depth}, {source}")
+
+
+def _kept(recording: Recording, parameters: Depth) -> int | None:
+    """The depth of the publishers' queues, or as many messages as tell it from the expected one.
+
+    A volatile publisher forgets what every subscription has acknowledged, for which it asks with
+    a heartbeat: every few seconds, and where its queue is full.
+
+    Returns:
+        What the heartbeats show, or None where that is nothing.
+    """
+    times_ns = [item.stamp_ns for item in recording.on(parameters.topic)]
+    often = len(times_ns) > _FEWEST and times_ns[-1] - times_ns[0] < len(times_ns) * NS
+    own = recording.student_endpoints(Kind(parameters.kind), parameters.topic)
+    for item in own:
+        if item.kept is None or item.kept == parameters.depth:
+            continue
+        full = item.heartbeats >= max(_FEWEST, len(times_ns) // 2) and often
+        if item.kept > parameters.depth or (full and 2 * item.kept < parameters.depth):
+            return item.kept
+    return parameters.depth if {item.kept for item in own} == {parameters.depth} else None
+
+
+def _depth_hint(parameters: Depth) -> str:
+    third = "third" if parameters.kind == "publisher" else "fourth"
+    return (
+        f"The {third} argument of create_{parameters.kind} is the depth, or a QoSProfile that has "
+        f"it beside the other policies: QoSProfile(depth={parameters.depth}, ...)."
+    )

@@ -1,0 +1,1 @@
+"""Checks of conversions between ways to write a rotation."""

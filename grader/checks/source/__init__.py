@@ -1,0 +1,1 @@
+"""Checks of Python source as handed in."""

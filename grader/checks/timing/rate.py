@@ -1,0 +1,181 @@
+"""How many messages come in a second."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from pydantic import Field, model_validator
+
+from grader.assignment.name import TopicName
+from grader.assignment.quantity import Duration, Frequency
+from grader.assignment.unit import format_duration
+from grader.checks import declarations as testimony
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.first_seen import first_seen
+from grader.checks.timing.stamps import why_not_believed
+from grader.checks.wording import code, counted
+from grader.diagnosis.no_messages import why_few
+from grader.diagnosis.process.process_exit import why_ended
+from grader.recording.model import NS, Message, Recording
+
+_SEQUENCE_LIMIT = 2**62
+
+
+class Rate(Parameters):
+    """Parameters of timing.rate."""
+
+    topic: TopicName = Field(description="Fully qualified topic name.")
+    at_least: Frequency | None = Field(None, description="Lowest rate.")
+    at_most: Frequency | None = Field(None, description="Highest rate.")
+    messages: int = Field(5, ge=2, description="Messages that are needed to judge.")
+    pause: Duration | None = Field(
+        None,
+        description="Longest time without a message after the first one, until the end of the "
+        "observation; by default any.",
+    )
+
+    @model_validator(mode="after")
+    def _sensible(self) -> Rate:
+        if self.at_least is None and self.at_most is None:
+            raise ValueError("give a bound: at_least, at_most or both")
+        if self.at_least and self.at_most and self.at_least > self.at_most:
+            raise ValueError("at_least is more than at_most")
+        return self
+
+    @property
+    def words(self) -> str:
+        """The bounds, in words."""
+        bounds = []
+        if self.at_least is not None:
+            bounds.append(f"at least {self.at_least:g} Hz")
+        if self.at_most is not None:
+            bounds.append(f"at most {self.at_most:g} Hz")
+        words = f"{' and '.join(bounds)} on {code(self.topic)}"
+        if self.pause is not None:
+            words += f", never longer than {format_duration(self.pause)} without one"
+        return words
+
+
+@check("timing.rate", Subject.RECORDING, Rate)
+def rate(recording: Recording, parameters: Rate) -> Finding:
+    """Messages come at a rate within bounds.
+
+    The rate is the number of messages after the first, divided by the time from the first to the
+    last by source timestamps, as `ros2 topic hz` tells it; how regularly they come does not
+    matter (see timing.period), unless `pause` says how long a pause may be. Messages that the
+    writer numbered but that were lost on their way count. What the machine took from the process
+    is measured, and never costs a point.
+
+    Explains a publisher that is silent or stops, as messages.count does.
+    """
+    expected = parameters.words
+    messages = recording.on(parameters.topic)
+    if len(messages) < parameters.messages:
+        return why_few(recording, parameters.topic, parameters.messages).finding(expected)
+    unbelievable = why_not_believed(recording, messages)
+    if unbelievable is not None:
+        return unbelievable.finding(expected)
+    first, last = messages[0], messages[-1]
+    span_s = (last.stamp_ns - first.stamp_ns) / NS
+    if span_s <= 0.0:
+        return Finding.failed(
+            expected,
+            f"{counted(len(messages), 'message')} with the same time stamp",
+            "Publish from the callback of a timer.",
+            Evidence(moments=first_seen(recording, messages)),
+        )
+    number = _steps(messages)
+    found_hz = number / span_s
+    observed = f"{found_hz:.4g} Hz: {counted(number + 1, 'message')} in {format_duration(span_s)}"
+    evidence = Evidence(
+        moments=(
+            Moment("first message", recording.since_launch_s(first.stamp_ns)),
+            Moment("last message", recording.since_launch_s(last.stamp_ns)),
+        )
+    )
+    low, high = parameters.at_least, parameters.at_most
+    if low is not None and found_hz < low:
+        free_s = span_s - recording.taken_s(first.stamp_ns, last.stamp_ns)
+        if free_s <= 0.0 or number / free_s >= low:
+            return Finding.to_repeat(
+                expected, f"{observed}, but the machine took time from the process"
+            )
+        return Finding.failed(
+            expected,
+            observed,
+            _slow_hint(recording),
+            evidence,
+        )
+    if high is not None and found_hz > high:
+        return Finding.failed(
+            expected,
+            observed,
+            "create_timer takes its period in seconds: the reciprocal of the rate. Look for a "
+            "second timer, and for a publish() in a loop or in a callback that is called often.",
+            evidence,
+        )
+    return _too_long_without(recording, parameters, messages) or Finding.passed(
+        expected, observed, evidence
+    )
+
+
+def _slow_hint(recording: Recording) -> str:
+    if testimony.traced(recording) and not testimony.said(recording, "timer"):
+        return (
+            "Publish in every call of the callback: look for a counter or a condition that leaves "
+            "calls out, and for a time.sleep()."
+        )
+    return (
+        "create_timer takes its period in seconds: the reciprocal of the rate. A callback that "
+        "sleeps or works longer than the period slows the timer down."
+    )
+
+
+def _too_long_without(
+    recording: Recording, parameters: Rate, messages: tuple[Message, ...]
+) -> Finding | None:
+    """The finding of the longest time without a message, if it is too long."""
+    if parameters.pause is None:
+        return None
+    # Where numbers are missing, messages came that were lost.
+    gaps = [
+        (one.stamp_ns, other.stamp_ns)
+        for one, other in pairwise(messages)
+        if other.sequence - one.sequence <= 1
+    ]
+    stop_ns = max(recording.stop_ns, messages[-1].stamp_ns)
+    gaps.append((messages[-1].stamp_ns, stop_ns))
+    begin_ns, end_ns = max(gaps, key=lambda gap: gap[1] - gap[0])
+    gap_s = (end_ns - begin_ns) / NS
+    if gap_s <= parameters.pause:
+        return None
+    begin_s = recording.since_launch_s(begin_ns)
+    until = " until the end" if end_ns == stop_ns else ""
+    observed = (
+        f"no message for {format_duration(gap_s)}{until}, from {begin_s:.2f} s after launch on, "
+        f"after {counted(sum(m.stamp_ns <= begin_ns for m in messages), 'message')}"
+    )
+    ended = why_ended(recording, observed)
+    if ended is not None and until:
+        return ended.finding(parameters.words)
+    if gap_s - recording.taken_s(begin_ns, end_ns) <= parameters.pause:
+        return Finding.to_repeat(
+            parameters.words, f"{observed}, but the machine took time from the process"
+        )
+    return Finding.failed(
+        parameters.words,
+        observed,
+        "Look for an `if` or a `return` before publish(msg), for an `except: pass` that hides an "
+        "error, for a timer that is cancelled, and for a callback that does not return.",
+        Evidence(moments=(Moment("no message from here on", begin_s),)),
+    )
+
+
+def _steps(messages: tuple[Message, ...]) -> int:
+    """Messages after the first, those included that were lost on their way."""
+    first, last = messages[0].sequence, messages[-1].sequence
+    numbered = 0 < first < last < _SEQUENCE_LIMIT and all(
+        one.sequence < other.sequence for one, other in pairwise(messages)
+    )
+    return last - first if numbered else len(messages) - 1

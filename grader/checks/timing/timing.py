@@ -1,0 +1,208 @@
+"""Checks of when messages were published."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from grader.assignment.model import TopicName
+from grader.assignment.quantity import Duration, Ratio
+from grader.assignment.unit import format_duration
+from grader.checks.check import Parameters, Subject, check
+from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.timing.period import (
+    MOST_INTERVALS,
+    Interval,
+    Limits,
+    Verdict,
+    forgiven,
+    intervals,
+    judge,
+)
+from grader.checks.timing.rhythm import explain, is_declared
+from grader.checks.timing.stamps import why_not_believed
+from grader.checks.tolerance import TimeTolerance, Tolerance
+from grader.checks.wording import code, counted
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_messages import ENDED_HINT, why_few
+from grader.diagnosis.process.process_exit import why_ended
+from grader.recording.model import NS, Message, Recording
+
+_MS = 1e3
+# One message may be late or left out; after so many periods they have stopped.
+_ENDED_PERIODS = 3.0
+
+
+class Period(Parameters):
+    """Parameters of timing.period."""
+
+    topic: TopicName = Field(description="Fully qualified topic name.")
+    period: Duration = Field(description="Expected time between two messages.")
+    tolerance: Tolerance = Field(
+        TimeTolerance(0.05, relative=True),
+        description="How far the median of the intervals may be from the period: a share of it "
+        "or a time.",
+    )
+    spread: Tolerance = Field(
+        TimeTolerance(0.10, relative=True),
+        description="How far a single interval may be from the median before it counts as "
+        "irregular: a share of the period or a time.",
+    )
+    outliers: Ratio = Field(
+        0.10,
+        description="Share of the intervals that may be irregular: rounded down, but one at "
+        "least, unless it is 0 %.",
+    )
+    at_least: int = Field(5, ge=1, description="Intervals that are needed to judge.")
+
+    @property
+    def limits(self) -> Limits:
+        """The same in seconds."""
+        return Limits(
+            period_s=self.period,
+            median_s=self.tolerance.of(self.period),
+            spread_s=self.spread.of(self.period),
+            outliers=self.outliers,
+        )
+
+
+@check("timing.period", Subject.RECORDING, Period)
+def period(recording: Recording, parameters: Period) -> Finding:
+    """Messages come at the expected period.
+
+    Judged by source timestamps, which the publisher's process sets in `publish()`, so that a
+    slow grader or network does not count. The median of the intervals must be the period
+    within `tolerance`; an interval that differs from the median by more than `spread` is
+    irregular, and only few may be (`outliers`). One late message makes an interval too long
+    and the next one too short: that counts once; a pause counts for every message that is
+    missing in it. Messages must go on until the end of the
+    observation. What the machine took from the process is
+    measured, and never costs a point.
+
+    Explains a period in milliseconds where seconds are meant (300 or 0.003 instead of 0.3),
+    factors of ten, two timers or two publishers, sleeping instead of a timer (the work is
+    added to each period), callbacks that take longer than the period, messages left out,
+    messages that stop, and a publisher that is silent.
+    """
+    limits = parameters.limits
+    expected = (
+        f"a message on {code(parameters.topic)} every {format_duration(parameters.period)} "
+        f"(median within {parameters.tolerance}, intervals within {parameters.spread})"
+    )
+    messages = recording.on(parameters.topic)[: MOST_INTERVALS + 1]
+    if len(messages) <= parameters.at_least and not _too_slow(messages, limits):
+        cause = why_few(recording, parameters.topic, parameters.at_least + 1)
+        return cause.finding(expected)
+    unbelievable = why_not_believed(recording, messages)
+    if unbelievable is not None:
+        return unbelievable.finding(expected)
+    measured = intervals(messages)
+    if len(measured) < min(parameters.at_least, len(messages) - 1):
+        return Finding.to_repeat(
+            expected,
+            f"of {counted(len(messages), 'message')} so many neighbours were lost on their way to "
+            f"the probe that only {counted(len(measured), 'interval')} can be judged",
+        )
+    verdict = judge([item.seconds for item in measured], limits)
+    if verdict.good:
+        ended = _why_ended(recording, messages, parameters)
+        if ended is not None:
+            return ended.finding(expected)
+        return Finding.passed(
+            expected,
+            _figures(measured, verdict),
+            _evidence(recording, parameters, measured, verdict),
+        )
+    forgivable = not is_declared(recording, verdict, limits)
+    if forgivable and judge(forgiven(recording, measured, limits), limits).good:
+        taken_s = recording.taken_s(measured[0].begin_ns, measured[-1].end_ns)
+        return Finding.to_repeat(
+            expected,
+            f"{_figures(measured, verdict)}; the machine took up to {format_duration(taken_s)} "
+            "from the process meanwhile, which may explain it",
+        )
+    explanation = explain(recording, parameters.topic, measured, verdict, limits)
+    observed = _figures(measured, verdict)
+    if verdict.period_good:
+        observed += (
+            f"; {counted(len(verdict.irregular), 'interval')} of {len(measured)} "
+            f"{'differs' if len(verdict.irregular) == 1 else 'differ'} from the median by more "
+            f"than {format_duration(limits.spread_s)}"
+        )
+    observed += f": {explanation.words}" if explanation.words else ""
+    return Finding.failed(
+        expected, observed, explanation.hint, _evidence(recording, parameters, measured, verdict)
+    )
+
+
+def _why_ended(
+    recording: Recording, messages: tuple[Message, ...], parameters: Period
+) -> Cause | None:
+    """Why nothing was published any more, long before the observation ended."""
+    last_ns = messages[-1].stamp_ns
+    silent_s = (recording.stop_ns - last_ns) / NS
+    # Of a flood only the beginning is looked at.
+    if silent_s <= _ENDED_PERIODS * parameters.period or len(messages) > MOST_INTERVALS:
+        return None
+    seen = (
+        f"{counted(len(messages), 'message')} at the right period, but none in the last "
+        f"{format_duration(silent_s)} of the observation"
+    )
+    taken_s = recording.taken_s(last_ns, recording.stop_ns)
+    if silent_s - taken_s <= _ENDED_PERIODS * parameters.period:
+        return Cause.to_repeat(f"{seen}; the machine took {format_duration(taken_s)} of them")
+    return why_ended(recording, seen) or Cause(
+        seen,
+        ENDED_HINT,
+        Evidence(moments=(Moment("last message", recording.since_launch_s(last_ns)),)),
+    )
+
+
+def _too_slow(messages: tuple[Message, ...], limits: Limits) -> bool:
+    """Whether there are few messages because their period is too long."""
+    measured = intervals(messages)
+    if not measured:
+        return False
+    verdict = judge([item.seconds for item in measured], limits)
+    return not verdict.period_good and verdict.median_s > limits.period_s
+
+
+def _figures(measured: tuple[Interval, ...], verdict: Verdict) -> str:
+    worst_s = max(abs(item.seconds - verdict.median_s) for item in measured)
+    return (
+        f"median {format_duration(verdict.median_s)}, largest deviation from it "
+        f"{format_duration(worst_s)}, over {counted(len(measured), 'interval')}"
+    )
+
+
+def _evidence(
+    recording: Recording, parameters: Period, measured: tuple[Interval, ...], verdict: Verdict
+) -> Evidence:
+    limits = parameters.limits
+    # Shown is the band that decided: that of the median, or that of the single intervals.
+    if verdict.period_good:
+        middle_s, within_s = verdict.median_s, limits.spread_s
+    else:
+        middle_s, within_s = limits.period_s, limits.median_s
+    worst = max(measured, key=lambda item: abs(item.seconds - limits.period_s))
+    return Evidence(
+        moments=(
+            Moment(
+                f"worst interval: {format_duration(worst.seconds)}",
+                recording.since_launch_s(worst.end_ns),
+            ),
+        ),
+        plots=(
+            Plot(
+                title=f"Time between messages on {parameters.topic}",
+                x_label="time since launch (s)",
+                y_label="time between messages (ms)",
+                x=tuple(recording.since_launch_s(item.end_ns) for item in measured),
+                y=tuple(item.seconds * _MS for item in measured),
+                band=(
+                    (middle_s - within_s) * _MS,
+                    (middle_s + within_s) * _MS,
+                ),
+                histogram=True,
+            ),
+        ),
+    )

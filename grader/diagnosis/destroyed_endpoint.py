@@ -1,0 +1,80 @@
+"""Endpoints that the student's code destroyed although its process ran on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from grader.checks import declarations as testimony
+from grader.checks.finding import Evidence, Moment
+from grader.checks.wording import code
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.process.process_exit import dead, ended_early
+from grader.recording.interaction import Service
+from grader.recording.model import Endpoint, Kind, Recording
+
+_HINT = (
+    "Keep it, and its node, until rclpy.spin() returns: look for destroy_publisher(), "
+    "destroy_subscription(), destroy_service(), destroy() and destroy_node(), and for a node that "
+    "only a local variable keeps."
+)
+
+
+def why_unsubscribed(
+    recording: Recording, topic: str, seen: str, sent_ns: int | None = None
+) -> Cause | None:
+    """The cause if the student's code destroyed its subscriptions to a topic, or None.
+
+    Args:
+        recording: The run.
+        topic: Fully qualified topic name.
+        seen: What came of it, in words.
+        sent_ns: When something was sent that they did not get; by default any time will do.
+    """
+    subscriptions = recording.student_endpoints(Kind.SUBSCRIPTION, topic)
+    if sent_ns is not None and any((item.vanished_ns or 0) > sent_ns for item in subscriptions):
+        return None
+    return why_destroyed(recording, seen, f"the subscription to {code(topic)}", subscriptions)
+
+
+def why_unpublished(recording: Recording, topic: str, seen: str) -> Cause | None:
+    """The same of its publishers on a topic."""
+    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
+    return why_destroyed(recording, seen, f"the publisher on {code(topic)}", publishers)
+
+
+def why_destroyed(
+    recording: Recording, seen: str, what: str, items: Iterable[Endpoint | Service]
+) -> Cause | None:
+    """The cause if the student's code destroyed all of some endpoints, services or actions.
+
+    What vanished with its process, or because the scenario ended that, was not destroyed.
+
+    Args:
+        recording: The run.
+        seen: What came of it, in words.
+        what: They, in words, such as ``the service `/add```.
+        items: They.
+    """
+    found = tuple(items)
+    ends = [item.vanished_ns for item in found if item.vanished_ns is not None]
+    if not found or len(ends) < len(found):
+        return None
+    last_ns = max(ends)
+    for item in found:
+        process = testimony.process_of(recording, item.node)
+        if ended_early(recording, process) if process is not None else dead(recording):
+            return None
+        if any(
+            done.time_ns <= last_ns and (process is None or process.name == done.process)
+            for done in recording.interventions
+        ):
+            return None
+    when_s = recording.since_launch_s(last_ns)
+    nodes = {item.node for item in found}
+    gone = {node.name for node in recording.student_nodes if node.vanished_ns is not None}
+    own = " with its node" if nodes <= gone else ""
+    return Cause(
+        f"{seen}: {what} was destroyed{own} {when_s:.2f} s after launch, while the process ran on",
+        _HINT,
+        Evidence(moments=(Moment(f"{what.replace('`', '')} was destroyed", when_s),)),
+    )

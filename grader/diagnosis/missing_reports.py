@@ -1,0 +1,127 @@
+"""Why callbacks that should report on a topic cannot be judged: nobody reports, or otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydantic import Field
+
+from grader.assignment.model import TopicName
+from grader.assignment.unit import format_duration
+from grader.checks.callbacks.callback_run import Reports, spans
+from grader.checks.check import Parameters
+from grader.checks.finding import Evidence, Moment
+from grader.checks.wording import code, codes, counted, value_text
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.process.process_exit import why_ended
+from grader.nearest import nearest
+from grader.recording.model import NS, Recording
+
+_FORMAT_HINT = (
+    "Publish a String with the name of the callback, a space and `start` as the first thing in "
+    "the callback, and the same with `end` as the last, such as `timer_1 start`."
+)
+SECONDS_HINT = "time.sleep and create_timer take seconds: 0.4 is 400 ms."
+
+
+class Reported(Parameters):
+    """Parameters of every check of reported callbacks."""
+
+    topic: TopicName = Field(
+        description="Topic of std_msgs/msg/String on which callbacks report `<callback> start` "
+        "and `<callback> end`."
+    )
+    callbacks: tuple[str, ...] = Field(min_length=1, description="Names of the callbacks.")
+
+
+def why_unreported(
+    recording: Recording,
+    topic: str,
+    callbacks: Sequence[str],
+    reports: Reports,
+    at_least: int = 1,
+) -> Cause | None:
+    """Why a callback did not report enough complete runs, or None if all did.
+
+    Args:
+        recording: The run.
+        topic: Where they should report.
+        callbacks: Their names.
+        reports: What was reported there.
+        at_least: How many complete runs each must have.
+    """
+    messages = recording.on(topic)
+    if not messages:
+        return why_silent(recording, topic)
+    missing = [name for name in callbacks if len(reports.ended([name])) < at_least]
+    if not missing:
+        return None
+    evidence = Evidence(
+        moments=(Moment("first message", recording.since_launch_s(messages[0].stamp_ns)),),
+        spans=spans(recording, reports),
+        log=tuple(str(message.value.get("data")) for message in messages[:5]),
+    )
+    name = missing[0]
+    if reports.strange and not reports.runs:
+        return Cause(
+            f"no message on {code(topic)} is a report of a callback: there is "
+            f"{value_text(reports.strange[0])}, for example",
+            _FORMAT_HINT,
+            evidence,
+        )
+    strangers = [item for item in reports.callbacks if item not in callbacks]
+    # Something may have been put before or after the name, such as that of the node.
+    other = nearest(name, strangers) or next((item for item in strangers if name in item), None)
+    if other is not None and not reports.of(name):
+        return Cause(
+            f"no report of {code(name)}, but reports of {code(other)}",
+            f"A report is {code(f'{name} start')} or {code(f'{name} end')}, exactly so, with "
+            "nothing before it or after it.",
+            evidence,
+        )
+    return why_ended(recording, f"no complete run of {code(name)}") or _incomplete(
+        recording, reports, name, at_least, evidence
+    )
+
+
+def _incomplete(
+    recording: Recording, reports: Reports, name: str, at_least: int, evidence: Evidence
+) -> Cause:
+    begun, ended = len(reports.of(name)), len(reports.ended([name]))
+    begin_ns = recording.matched_ns or recording.launched_ns
+    watched_s = (recording.stop_ns - begin_ns) / NS
+    taken_s = recording.taken_s(begin_ns, recording.stop_ns)
+    # With the time that was taken from it, the node may have come to as many as are needed.
+    if taken_s > 0.0 and ended * watched_s >= at_least * (watched_s - taken_s):
+        return Cause.to_repeat(
+            f"{code(name)} ran {counted(ended, 'time')}, but the machine took "
+            f"{format_duration(taken_s)} of {format_duration(watched_s)} from the process"
+        )
+    if begun > ended:
+        return Cause(
+            f"{code(name)} reported {counted(begun, 'start')}, but {ended or 'no'} "
+            f"{'end' if ended == 1 else 'ends'}",
+            "Publish the end as the last thing in the callback; it must return. Look for a loop, "
+            "a long time.sleep (it takes seconds), an exception, and rate.sleep(), which waits for "
+            "ever in a callback of the only thread.",
+            evidence,
+        )
+    if name in reports.orphans:
+        return Cause(f"{code(name)} reported its end, but never its start", _FORMAT_HINT, evidence)
+    if not begun:
+        others = [item for item in reports.callbacks if item != name]
+        seen = f"; reports came of {codes(others)}" if others else ""
+        return Cause(
+            f"{code(name)} never ran{seen}",
+            "Is its timer or its subscription created in the constructor, with the period in "
+            "seconds, and does it report under this name? A callback that does not return keeps "
+            "the others of its group from running.",
+            evidence,
+        )
+    return Cause(
+        f"{code(name)} ran only {counted(ended, 'time')} in {format_duration(watched_s)}, of "
+        f"{at_least} that are needed",
+        f"{SECONDS_HINT} A callback that works for long lets the others of its group wait.",
+        evidence,
+    )

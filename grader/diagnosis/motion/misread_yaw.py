@@ -1,0 +1,149 @@
+"""A yaw that was read wrongly, found by which one the commands of a controller are right for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from grader.checks.motion.answer import MOST_BEHIND, Answer, answers
+from grader.checks.motion.approach import Approach
+from grader.checks.motion.control_law import Sample, fit
+from grader.checks.motion.steering import before_arrival
+from sim.motion import wrap_angle
+
+# Chance does not come near it: nothing is read from fewer commands, or a worse fit.
+_LEAST_COMMANDS = 20
+_GOOD_R2 = 0.97
+_RIGHT_R2 = 0.9
+# Readings differ by less where the robot hardly turns.
+_TURNED_RAD = 0.5
+_NEARLY_OPPOSITE_DEG = 170
+_FORMULA = "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z))"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A way to read yaw.
+
+    Attributes:
+        words: What comes out.
+        hint: What to do about it.
+        of: From the true yaw, in rad.
+    """
+
+    words: str
+    hint: str
+    of: Callable[[float], float]
+
+    def __str__(self) -> str:
+        """What was seen, to be put behind a colon."""
+        return f"it turns as if yaw were {self.words}"
+
+
+_READINGS = (
+    Reading(
+        "always 0",
+        "A quaternion in ROS is x, y, z, w: read as w, x, y, z, no turn on the ground is left of "
+        "it. Nor is one in roll or pitch: of as_euler('xyz') and euler_from_quaternion(), yaw is "
+        f"the last. {_FORMULA}, anew in each callback: at the start it may have been 0.",
+        lambda _: 0.0,
+    ),
+    Reading(
+        "in degrees",
+        "Angles in ROS are radians (REP-103), and so are those of atan2: convert none of them.",
+        math.degrees,
+    ),
+    Reading(
+        "half of what it is",
+        f"A quaternion holds half of the angle: {_FORMULA}, or 2 * atan2(z, w) on flat ground.",
+        lambda yaw_rad: yaw_rad / 2.0,
+    ),
+    Reading(
+        "z of the quaternion",
+        f"z alone is the sine of half the angle: {_FORMULA}.",
+        lambda yaw_rad: math.sin(yaw_rad / 2.0),
+    ),
+    Reading(
+        "what it is with its sign changed",
+        "Counter-clockwise is positive (REP-103), and 2 * asin(z) has the wrong sign where w is "
+        f"negative: {_FORMULA}.",
+        lambda yaw_rad: -yaw_rad,
+    ),
+    Reading(
+        "never beyond -90° and 90°",
+        f"asin and atan know only half of the circle: {_FORMULA}, with atan2.",
+        lambda yaw_rad: math.asin(math.sin(yaw_rad)),
+    ),
+    Reading(
+        "never negative",
+        f"acos loses the sign, and asin does where w is negative: {_FORMULA}.",
+        abs,
+    ),
+)
+
+
+def _shifted(offset_deg: int) -> Reading:
+    """Yaw with something added to it."""
+    words = f"about {abs(offset_deg)}° {'more' if offset_deg > 0 else 'less'} than it is"
+    opposite = abs(offset_deg) > _NEARLY_OPPOSITE_DEG
+    return Reading(
+        f"{words}, or as if so much were taken from the direction of the goal",
+        "The direction is atan2(dy, dx) with dx = goal_x - x, and not atan(dy / dx), which is the "
+        "opposite one where dx is negative. An error is wrapped by 2 * pi, not by pi."
+        if opposite
+        else f"Neither yaw nor math.atan2(dy, dx) needs an offset: {_FORMULA}.",
+        lambda yaw_rad: yaw_rad + math.radians(offset_deg),
+    )
+
+
+_OFFSETS = tuple(_shifted(degrees) for degrees in range(-175, 181, 5) if degrees)
+
+
+def misread_yaw(run: Approach, position_m: float) -> Reading | None:
+    """How yaw was read wrongly, if that alone explains the turns on the way to a goal.
+
+    The commands then are in proportion to the direction of the goal less that yaw, and not in
+    proportion to the direction less the true one.
+
+    Args:
+        run: The run.
+        position_m: How near the goal the way to it ends.
+    """
+    scene = run.recording.scene
+    limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf
+    ways = [
+        before_arrival(run, answers(run.recording, behind), position_m)
+        for behind in range(MOST_BEHIND + 1)
+    ]
+    for way in ways:
+        yaws = [answer.pose.yaw_rad for answer in way]
+        if len(way) < _LEAST_COMMANDS or max(yaws) - min(yaws) < _TURNED_RAD:
+            return None
+        if _r2(run, way, lambda yaw_rad: yaw_rad, limit_rad_s) > _RIGHT_R2:
+            return None
+    for readings in (_READINGS, _OFFSETS):
+        fits = [(_r2(run, way, one.of, limit_rad_s), one) for way in ways for one in readings]
+        best = max(fits, key=lambda item: item[0])
+        if best[0] >= _GOOD_R2:
+            return best[1]
+    return None
+
+
+def _r2(
+    run: Approach, way: Sequence[Answer], read: Callable[[float], float], limit_rad_s: float
+) -> float:
+    """How well the commands are in proportion to the error, wrapped or not; at most 1."""
+    found = -math.inf
+    for wrap in (wrap_angle, lambda error_rad: error_rad):
+        samples = [
+            Sample(
+                wrap(run.direction_rad(item.pose) - read(item.pose.yaw_rad)),
+                item.command.twist.angular_rad_s,
+            )
+            for item in way
+        ]
+        line = fit(samples, limit_rad_s)
+        if line.gain > 0.0 and line.used >= _LEAST_COMMANDS:
+            found = max(found, line.r2)
+    return found

@@ -1,0 +1,194 @@
+"""Why a simulated robot did not move, or was cut short: one cause, the deepest."""
+
+from __future__ import annotations
+
+from grader.assignment.unit import format_duration
+from grader.checks.finding import Evidence, Moment
+from grader.checks.first_seen import endpoints_seen, first_seen
+from grader.checks.motion.command import Command, command_topic, commands, is_zero
+from grader.checks.motion.ground import ahead, nearest
+from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.measure import metres, speed
+from grader.checks.motion.scan import misreading
+from grader.checks.motion.track import has_moved, index_at, is_at_rest
+from grader.checks.qos.compatibility import compatibility_table, refusals
+from grader.checks.wording import code, codes, counted
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.common_mistakes import was_integer, what_was_put
+from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_node import why_no_node
+from grader.diagnosis.process.process_exit import cause_of_death, dead, why_ended
+from grader.recording.model import NS, Incident, Kind, Owner, Recording
+
+_STILL = "the robot never moved"
+_NAN_HINT = (
+    "A command must be finite: look for a division by zero, for inf from a range that sees "
+    "nothing, and for sqrt or acos of a number out of range."
+)
+
+
+def why_not_judged(recording: Recording) -> Cause | None:
+    """Why there is no motion to judge at all, moving or not; None if there is."""
+    if recording.truth and recording.scene is not None:
+        return None
+    missing = why_no_node(recording)
+    if missing is not None:
+        return missing
+    if recording.matched_ns is None:
+        return why_silent(recording, command_topic(recording))
+    return Cause("there is no simulated robot in this scenario: it needs a `world`", ours=True)
+
+
+def why_not_moved(recording: Recording) -> Cause | None:
+    """Why the robot never moved; None if it did."""
+    cause = why_not_judged(recording)
+    if cause is not None or has_moved(recording.truth):
+        return cause
+    cause = why_ended(recording, _STILL)
+    if cause is not None:
+        return cause
+    sent = commands(recording)
+    if not sent:
+        topic = command_topic(recording)
+        cause = _unreadable(recording) if recording.on(topic) else why_silent(recording, topic)
+        return cause.after(_STILL)
+    return (
+        why_rejected(recording)
+        or _unheard(recording)
+        or _asks_nothing(recording, sent)
+        or _in_vain(recording, sent)
+    )
+
+
+def why_cut_short(recording: Recording) -> Cause | None:
+    """What deeper cause stands behind a motion that went wrong; None if there is none.
+
+    A process that ended while the robot was on its way, or commands that are not numbers.
+    """
+    ended = dead(recording)
+    if ended:
+        exited_ns = ended[0].exited_ns or recording.stop_ns
+        truth = recording.truth
+        rested = bool(truth) and is_at_rest(truth[index_at(truth, exited_ns)])
+        if not rested or ended[0].exit_code != 0:
+            return cause_of_death(recording, ended[0])
+    return why_rejected(recording)
+
+
+def why_rejected(recording: Recording) -> Cause | None:
+    """Commands that the robot refused, for they were NaN or infinite; None without any."""
+    refused = [item for item in recording.incidents if item.kind == "command_rejected"]
+    if not refused:
+        return None
+    first = refused[0]
+    were = "was" if len(refused) == 1 else "were"
+    return Cause(
+        f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
+        f"(first: {first.text}); the robot stops instead",
+        _NAN_HINT,
+        Evidence(moments=(_moment(recording, "command rejected", first),)),
+    )
+
+
+def _moment(recording: Recording, label: str, incident: Incident) -> Moment:
+    return Moment(label, recording.since_launch_s(incident.time_ns))
+
+
+def _unreadable(recording: Recording) -> Cause:
+    topic = command_topic(recording)
+    found = sorted({message.type for message in recording.on(topic)})
+    return Cause(
+        f"what was published on {code(topic)} is no velocity command but {codes(found)}",
+        "Publish geometry_msgs/msg/Twist.",
+        Evidence(moments=first_seen(recording, recording.on(topic))),
+    )
+
+
+def _unheard(recording: Recording) -> Cause | None:
+    """The probe heard the commands, but the robot's own subscription does not match."""
+    if any(step.command_m_s or step.command_rad_s for step in recording.truth):
+        return None
+    topic = command_topic(recording)
+    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
+    readers = [
+        item
+        for item in recording.endpoints
+        if item.owner is Owner.PROBE and item.kind is Kind.SUBSCRIPTION and item.topic == topic
+    ]
+    for publisher in publishers:
+        for reader in readers:
+            reasons = refusals(offered=publisher.qos, requested=reader.qos)
+            if reasons:
+                return Cause(
+                    f"{_STILL}: the QoS of the publisher on {code(topic)} does not match that of "
+                    f"the robot ({', '.join(reasons)})",
+                    "The robot's subscription is reliable: publish reliably, as "
+                    "create_publisher(Twist, 'cmd_vel', 10) does.",
+                    Evidence(
+                        moments=endpoints_seen(recording, (publisher,)),
+                        tables=(compatibility_table(publisher.qos, reader.qos),),
+                    ),
+                )
+    return None
+
+
+def _asks_nothing(recording: Recording, sent: tuple[Command, ...]) -> Cause | None:
+    if not all(is_zero(item.twist) for item in sent):
+        return None
+    evidence = Evidence(
+        moments=(Moment("first command", recording.since_launch_s(sent[0].time_ns)),)
+    )
+    stray = sorted({field for item in sent for field in item.stray})
+    if stray:
+        return Cause(
+            f"{_STILL}: the commands set {codes(stray)}, which a differential drive cannot do",
+            "The speed ahead is linear.x, the turn is angular.z.",
+            evidence,
+        )
+    topic = code(command_topic(recording))
+    seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
+    last = recording.truth[-1]
+    around = None if recording.scene is None else nearest(recording.scene, last)
+    misread = misreading(recording, last.time_ns, around)
+    if misread is not None:
+        return Cause(f"{seen}; {misread.words}", misread.hint, evidence)
+    sight = None if recording.scene is None else ahead(recording.scene, last)
+    where = f"; {code(sight.name)} is {metres(sight.distance_m)} straight ahead" if sight else ""
+    hint = "Which branch of the callback publishes? Log what it compares."
+    return Cause(f"{seen}{where}", hint, evidence)
+
+
+def _in_vain(recording: Recording, sent: tuple[Command, ...]) -> Cause:
+    first = next(item for item in sent if not is_zero(item.twist))
+    left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
+    evidence = Evidence(
+        moments=(Moment("first command to move", recording.since_launch_s(first.time_ns)),)
+    )
+    touched = next((step.contact for step in recording.truth if step.contact), None)
+    if touched:
+        return Cause(
+            f"{_STILL}: it stood against {code(touched)} and was told to drive into it",
+            "Look at what is straight ahead before you drive.",
+            evidence,
+        )
+    fields = {"linear.x": first.twist.linear_m_s, "angular.z": first.twist.angular_rad_s}
+    for field, number in fields.items():
+        if was_integer(number):
+            return Cause(
+                f"{_STILL}: {what_was_put(number)} was put into {code(field)}, a float field, "
+                "which ROS misreads",
+                "A number in a message must be a float: write 1.0 instead of 1, or float(value).",
+                evidence,
+            )
+    begin_ns = recording.truth[0].time_ns
+    lost_s = taken_s(recording, begin_ns, recording.truth[-1].time_ns)
+    if left_s < 0.2 and lost_s > 0.0:
+        return Cause.to_repeat(
+            f"{_STILL} until the end, but the machine took {format_duration(lost_s)} from the run"
+        )
+    return Cause(
+        f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "
+        f"{format_duration(max(left_s, 0.0))} before the end",
+        "A speed below 1 mm/s, or one that holds for a moment only, does not move the robot.",
+        evidence,
+    )

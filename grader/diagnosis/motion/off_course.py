@@ -1,0 +1,50 @@
+"""Why a robot left its course, before anything is said of how it is steered."""
+
+from __future__ import annotations
+
+from grader.assignment.unit import format_duration
+from grader.checks.finding import Evidence, Moment
+from grader.checks.motion.command import commands, is_zero
+from grader.checks.motion.contact import why_touched
+from grader.checks.motion.track import speed_plot
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.no_motion import why_cut_short
+from grader.recording.model import NS, Recording
+
+# No controller that steers by odometry, or by a timer, waits for so long.
+_UNSTEERED_S = 2.0
+
+
+def why_off_course(recording: Recording) -> Cause | None:
+    """What lies deeper than a way that is wrong; None where nothing does.
+
+    A process that ended, commands that are not finite, contact, or no command for long.
+    """
+    return why_cut_short(recording) or why_touched(recording) or why_unsteered(recording)
+
+
+def why_unsteered(recording: Recording) -> Cause | None:
+    """The longest time without a command in which the robot moved on; None if it is short."""
+    end_ns = recording.truth[-1].time_ns
+    sent = commands(recording)
+    ends_ns = [*(item.time_ns for item in sent[1:]), end_ns]
+    moving = [
+        (item.time_ns, next_ns)
+        for item, next_ns in zip(sent, ends_ns, strict=bool(sent))
+        if not is_zero(item.twist)
+    ]
+    begin_ns, next_ns = max(moving, key=lambda span: span[1] - span[0], default=(0, 0))
+    long_s = (next_ns - begin_ns) / NS
+    if long_s - recording.taken_s(begin_ns, next_ns) < _UNSTEERED_S:
+        return None
+    when_s = recording.since_launch_s(begin_ns)
+    until = " until the observation ended" if next_ns == end_ns else ""
+    return Cause(
+        f"no command came for {format_duration(long_s)}{until}, from {when_s:.2f} s after launch "
+        "on, and the robot moved on as it had been told before",
+        "Each odometry takes a command of its own: look for time.sleep() and for a loop in a "
+        "callback, which keep the next one waiting, and for a condition before publish().",
+        Evidence(
+            moments=(Moment("no command from here on", when_s),), plots=(speed_plot(recording),)
+        ),
+    )

@@ -1,0 +1,296 @@
+"""Why a package is not there, or was not built: shared by all checks of packages."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+from grader.checks.finding import Evidence
+from grader.checks.wording import code, codes
+from grader.diagnosis.cause import Cause
+from grader.nearest import nearest
+from grader.submission.buildlog import modules_not_found, not_found
+from grader.submission.paths import is_within
+from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
+from grader.submission.toolchain import TOOLS
+
+_LOG_LINES = 15
+_SIDE_BY_SIDE = " A package that lies inside another one is not found: put them side by side."
+# Of a culprit's message, which may join several lines of the log.
+_COMPARED = 60
+_ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+# What colcon says of its own doings around the tool's output.
+_CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
+# What setuptools says of data_files, as `ros2 pkg create` writes them.
+_NO_MARKER = re.compile(r"can't copy 'resource/([\w-]+)': doesn't exist")
+_CMAKE = ("ament_cmake", "cmake")
+# What the build adds at the end when it ended colcon itself.
+_OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
+
+
+def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
+    """Why the submission has no package of a name, or None if it has one."""
+    if submission.problem is not None:
+        return Cause(
+            submission.problem,
+            "Hand in the packages that are asked for, each of them once; colcon leaves out a "
+            "folder with a file COLCON_IGNORE in it."
+            if submission.packages
+            else "Hand in the workspace, its src folder or the package itself: a folder with a "
+            "package.xml must be in it.",
+        )
+    if submission.package(name) is not None:
+        return None
+    names = [item.name for item in submission.packages]
+    if not names:
+        return Cause("no package.xml was found", "A ROS package is a folder with a package.xml.")
+    match = nearest(name, names)
+    errors = [item.manifest_error for item in submission.packages if item.manifest_error]
+    if errors and match is None:
+        return _unusable(
+            f"no package {code(name)} was found, and a package.xml cannot be used: {errors[0]}",
+            errors,
+        )
+    found = f"found package {code(match)}" if match else f"found {codes(names)} only"
+    places = tuple(
+        SourceError(item.file("package.xml"), None, f"the package {code(item.name)}")
+        for item in submission.packages
+        if match in (None, item.name)
+    )
+    is_cmake = match is not None and existing_package(submission, match).build_type in _CMAKE
+    others = (
+        "in project(...) of CMakeLists.txt"
+        if is_cmake
+        else "in setup.py, setup.cfg, resource/ and the folder of the Python module"
+    )
+    return Cause(
+        found,
+        f"Write <name>{name}</name> in package.xml, and the same name {others}."
+        + ("" if match else _SIDE_BY_SIDE),
+        Evidence(places=places[:10]),
+    )
+
+
+def why_no_manifest(submission: SubmissionRecord, name: str) -> Cause | None:
+    """Why the submission has no package of a name with a package.xml that can be used."""
+    cause = why_no_package(submission, name)
+    if cause is not None:
+        return cause
+    error = existing_package(submission, name).manifest_error
+    return _unusable(f"package.xml cannot be used: {error}", [error]) if error else None
+
+
+def _unusable(seen: str, errors: list[SourceError]) -> Cause:
+    return Cause(
+        seen, "Mend package.xml at the line that is named here.", Evidence(places=tuple(errors))
+    )
+
+
+def existing_package(submission: SubmissionRecord, name: str) -> PackageRecord:
+    """The package of a name for which :func:`why_no_package` had nothing to say.
+
+    Raises:
+        LookupError: There is none, after all.
+    """
+    package = submission.package(name)
+    if package is None:
+        raise LookupError(f"no package {name!r}")
+    return package
+
+
+def why_too_new(package: PackageRecord) -> Cause | None:
+    """Code that the Python of ROS 2 Jazzy can read, but not the one that grades."""
+    if not package.newer_syntax:
+        return None
+    return Cause(
+        f"the Python here cannot read {package.newer_syntax[0]}",
+        "It is right in ROS 2 Jazzy, which has Python 3.12, and no point is lost by it. Tell "
+        "whoever runs the grader: it needs Python 3.12. Or do without this syntax.",
+        ours=True,
+    )
+
+
+def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
+    """Why a package was not built, or None if it was."""
+    cause = why_no_package(submission, name)
+    if cause is not None:
+        return cause
+    newer = why_too_new(existing_package(submission, name))
+    if newer is not None:
+        return newer
+    build = submission.build
+    if build is None:
+        return Cause("nothing was built, so this cannot be judged", ours=True)
+    if build.succeeded:
+        return None
+    # A package that is not among those that failed was built, whatever became of the others.
+    if build.failed_packages and name not in build.failed_packages:
+        return None
+    if build.timed_out:
+        return Cause(
+            "`colcon build` did not finish within its time limit and was ended",
+            "Look for input(), an endless loop or a long computation in setup.py or "
+            "CMakeLists.txt.",
+            _evidence(build, name),
+        )
+    if _failed_itself(build, name):
+        lacking = _lacking(submission, build, name)
+        return _not_here(lacking) if lacking else _failed(_own(submission, build, name), name)
+    return _never_begun(submission, build, name)
+
+
+def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
+    """What this machine lacks for a package, or for what the package rests on; else None."""
+    for one in (name, *_rests_on(submission, name)):
+        cause = why_not_built(submission, one)
+        if cause is not None and cause.ours:
+            return cause
+    return None
+
+
+def _never_begun(submission: SubmissionRecord, build: BuildRecord, name: str) -> Cause:
+    """Why colcon did not begin a package: it rests on others that failed."""
+    failed = [one for one in build.failed_packages if one != name and _failed_itself(build, one)]
+    blamed = [one for one in _rests_on(submission, name) if one in failed] or failed
+    if not blamed:
+        return _failed(build, name)
+    broken = [one for one in blamed if not _lacking(submission, build, one)]
+    if broken:
+        why = f": {build.culprit}" if build.culprit and broken == blamed else ""
+        return Cause(
+            f"it was not built, because {codes(broken)} failed to build{why}",
+            f"Mend {codes(broken)} first: `colcon build --packages-select {broken[0]}`.",
+            _evidence(build, broken[0]),
+        )
+    lacking = sorted({what for one in blamed for what in _lacking(submission, build, one)})
+    return _not_here(lacking).after(f"it was not built, because it rests on {codes(blamed)}")
+
+
+def _not_here(lacking: list[str]) -> Cause:
+    return Cause(
+        f"it needs {codes(lacking)} to build, which ROS 2 Jazzy has, but which is not installed "
+        "where this is graded",
+        "No point is lost by it. Tell whoever runs the grader: a full ROS 2 Jazzy builds it.",
+        ours=True,
+    )
+
+
+def _failed_itself(build: BuildRecord, name: str) -> bool:
+    """Whether colcon began to build a package that failed, and did not abort it for another."""
+    ends = rf"<<< {re.escape(name)}(?: |$)"
+    if re.search(f"^Aborted +{ends}", _clean(build), re.MULTILINE):
+        return False
+    begins = rf"^(?:Starting >>> {re.escape(name)}$|Failed +{ends})"
+    return re.search(begins, _clean(build), re.MULTILINE) is not None
+
+
+def _rests_on(submission: SubmissionRecord, name: str) -> list[str]:
+    """Other packages of the submission that a package names or imports, and those that they do."""
+    found: list[str] = []
+    ahead = [name]
+    while ahead:
+        package = submission.package(ahead.pop())
+        if package is None:
+            continue
+        named = {item.name for item in package.dependencies}
+        named |= {item.module for item in package.imports}
+        for one in sorted(named & {item.name for item in submission.packages}):
+            if one != name and one not in found:
+                found.append(one)
+                ahead.append(one)
+    return found
+
+
+def _own(submission: SubmissionRecord, build: BuildRecord, name: str) -> BuildRecord:
+    """The build without the culprit, if that only kept another package from being built."""
+    folder = existing_package(submission, name).path
+    if build.culprit is None or is_within(build.culprit.file, folder):
+        return build
+    was_started = f"Starting >>> {name}" in _clean(build).splitlines()
+    return replace(build, culprit=None) if was_started else build
+
+
+def _failed(build: BuildRecord, name: str) -> Cause:
+    ended = _OURS.search(build.log)
+    why = str(build.culprit) if build.culprit else ended[1] if ended else ""
+    marker = _NO_MARKER.search(why)
+    return Cause(
+        f"`colcon build` failed: {why}" if why else "`colcon build` failed",
+        _mend_marker(marker[1], name)
+        if marker
+        else f"Run `colcon build --packages-select {name}` in the workspace and mend the first "
+        "error that it prints.",
+        _evidence(build, name),
+    )
+
+
+def _mend_marker(named: str, name: str) -> str:
+    """What to do about a file in resource/ that setup.py installs and that is not there."""
+    if named == name:
+        return (
+            f"Create resource/{name}: an empty file with the name of the package, by which ROS "
+            "finds it."
+        )
+    return (
+        f"setup.py calls the package {code(named)} and package.xml {code(name)}: write one name in "
+        "both, in setup.cfg, for the file in resource/ and for the folder of the Python module."
+    )
+
+
+def _lacking(submission: SubmissionRecord, build: BuildRecord, name: str) -> list[str]:
+    """What the build of a package did not find because this machine does not have it.
+
+    Only CMake looks for packages; what a setup.py prints may be put in the same words.
+    """
+    missing: set[str] = set()
+    ahead, seen = [name], {name}
+    while ahead:
+        one = ahead.pop()
+        written = "\n".join(_written(build, one))
+        found = modules_not_found(written)
+        if not _is_pure_python(submission, one):
+            found |= not_found(written) | set(TOOLS.values())
+        missing |= found
+        # Another package of the submission is not there, which lacks something itself.
+        ahead += found & set(build.failed_packages) - seen
+        seen |= found
+    return sorted(missing & set(build.lacking))
+
+
+def _is_pure_python(submission: SubmissionRecord, name: str) -> bool:
+    package = submission.package(name)
+    return package is not None and package.build_type == "ament_python"
+
+
+def _evidence(build: BuildRecord, name: str) -> Evidence:
+    return Evidence(places=(build.culprit,) if build.culprit else (), log=_relevant(build, name))
+
+
+def _clean(build: BuildRecord) -> str:
+    return _ANSI.sub("", build.log)
+
+
+def _relevant(build: BuildRecord, name: str) -> tuple[str, ...]:
+    """What the build of the package wrote, up to what the culprit is blamed for, or its end."""
+    kept = [line for line in _written(build, name) if line.strip() and not _CHATTER.match(line)]
+    if build.culprit is not None:
+        message = build.culprit.message[:_COMPARED]
+        blamed = next((i for i, line in enumerate(kept) if message and message in line), None)
+        # What follows is the complaint of the tools that called the student's file.
+        kept = kept[: blamed + 1] if blamed is not None else kept
+    return tuple(kept[-_LOG_LINES:])
+
+
+def _written(build: BuildRecord, name: str) -> list[str]:
+    """What the build of the package wrote; all of the log where it was never begun."""
+    lines = _clean(build).splitlines()
+    begin = _last(lines, f"Starting >>> {name}")
+    if begin is None:
+        return lines
+    lines = lines[begin:]
+    return lines[: _last(lines, f"Failed   <<< {name}", f"Aborted  <<< {name}")]
+
+
+def _last(lines: list[str], *beginnings: str) -> int | None:
+    found = [i for i, line in enumerate(lines) if line.startswith(beginnings)]
+    return found[-1] if found else None

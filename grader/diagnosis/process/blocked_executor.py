@@ -1,0 +1,213 @@
+"""Whether something keeps an executor from coming round, as the node's own services tell."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+from grader.assignment.unit import format_duration
+from grader.checks import declarations as testimony
+from grader.checks.finding import Evidence, Moment
+from grader.checks.first_seen import until_the_end
+from grader.checks.wording import codes
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.process.raised import interrupted_callback, interrupted_place
+from grader.recording.model import NS, Call, Process, Recording
+from grader.submission.record import SourceError
+
+# What had less time for an answer than this may be unanswered for that reason.
+_ANSWER_S = 1.0
+# A node whose callbacks return at once answers a call to its parameter services sooner.
+_SLOW_S = 0.5
+
+HINT = (
+    "A callback must return soon. Look for `while True`, time.sleep() or input() in a callback, in "
+    "the constructor or in main(), for rclpy.spin() or rate.sleep() in a callback, and for a node "
+    "that is not given to rclpy.spin()."
+)
+
+
+def first_unanswered(recording: Recording, nodes: Collection[str], since_ns: int) -> Call | None:
+    """The first call that a blocked node left unanswered; None if it answered one in time.
+
+    A node's parameter services answer only while its executor spins. What the machine took from
+    the node is no time for an answer, and so a node that only gets no CPU is never blocked.
+
+    Args:
+        recording: The run.
+        nodes: Fully qualified names of the nodes in question.
+        since_ns: An answer before this says nothing.
+    """
+    calls = [
+        call
+        for call in recording.calls
+        if call.service.rpartition("/")[0] in nodes
+        and not call.error
+        and left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
+    ]
+    unanswered = [call for call in calls if call.answered_ns is None]
+    if not unanswered or any((call.answered_ns or 0) >= since_ns for call in calls):
+        return None
+    return unanswered[0]
+
+
+def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float] | None:
+    """The call that the nodes let wait the longest but one, and for how long (seconds).
+
+    A single one may have been lost on its way. What the machine took from the nodes meanwhile
+    does not count.
+
+    Args:
+        recording: The run.
+        nodes: Fully qualified names of the nodes in question.
+    """
+    waits = []
+    for call in recording.calls:
+        if call.service.rpartition("/")[0] in nodes and not call.error:
+            end_ns = call.answered_ns or recording.stop_ns
+            waits.append((call, left_s(recording, call.requested_ns, end_ns)))
+    waits.sort(key=lambda item: item[1])
+    return waits[-2] if len(waits) > 1 else None
+
+
+def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
+    """Time without what the machine took of it."""
+    return (end_ns - begin_ns) / NS - recording.taken_s(begin_ns, end_ns)
+
+
+def stuck_callback(recording: Recording) -> SourceError | None:
+    """Where a callback was that did not return until it was interrupted; None without one."""
+    places = (interrupted_callback(recording, item.name) for item in recording.processes)
+    return next((place for place in places if place is not None), None)
+
+
+def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
+    """The cause if callbacks are not called, or late; None where nothing tells of it.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Fully qualified names of those whose callbacks should run.
+    """
+    return (
+        why_never_spun(recording, seen, nodes)
+        or why_blocked(recording, seen, nodes, recording.launched_ns)
+        or why_slow(recording, seen, nodes)
+    )
+
+
+def why_blocked(
+    recording: Recording, seen: str, nodes: Collection[str], since_ns: int
+) -> Cause | None:
+    """The cause if an executor never comes round, as unanswered calls to its node tell.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Fully qualified names of those whose callbacks should run.
+        since_ns: An answer before this says nothing.
+    """
+    call = first_unanswered(recording, nodes, since_ns)
+    if call is None:
+        return None
+    where, evidence = where_blocked(recording, min(nodes), call)
+    since_s = recording.since_launch_s(call.requested_ns)
+    return Cause(
+        f"{seen}: something keeps the executor from coming round{where}; from {since_s:.2f} s "
+        "after launch on the node's parameter service answers no call either",
+        HINT,
+        evidence,
+    )
+
+
+def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
+    """The cause if callbacks keep each other waiting for long, as late answers to calls tell.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Fully qualified names of those whose callbacks should run.
+    """
+    waited = long_wait(recording, nodes)
+    if waited is None or waited[1] <= _SLOW_S:
+        return None
+    call, wait_s = waited
+    moment = Moment("call that waited", recording.since_launch_s(call.requested_ns))
+    return Cause(
+        f"{seen}: the callbacks keep each other waiting, and calls to the node's parameter "
+        f"service waited {format_duration(wait_s)} and more",
+        HINT,
+        Evidence(moments=(moment,)),
+    )
+
+
+def where_blocked(recording: Recording, node: str, call: Call) -> tuple[str, Evidence]:
+    """The place at which the node's process was when it was interrupted, if it told.
+
+    Returns:
+        The place in words, with a space before it, or an empty text; and the evidence.
+    """
+    process = testimony.process_of(recording, node)
+    place = interrupted_place(recording, process.name) if process is not None else None
+    moment = Moment("first call that was not answered", recording.since_launch_s(call.requested_ns))
+    return (
+        f" ({place.file}:{place.line})" if place else "",
+        Evidence(moments=(moment,), places=(place,) if place else ()),
+    )
+
+
+def why_never_spun(
+    recording: Recording,
+    seen: str,
+    nodes: Iterable[str] = (),
+    processes: Iterable[Process] | None = None,
+    moments: tuple[Moment, ...] = (),
+) -> Cause | None:
+    """The cause if nothing spins a node, by the word of its process's tracer.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Fully qualified names of those whose callbacks should run.
+        processes: Which may be the one that never spun; by default all.
+        moments: Evidence besides the place at which it was interrupted.
+    """
+    candidates = recording.processes if processes is None else processes
+    process = next(
+        (item for item in candidates if testimony.never_spun(recording, item.name)), None
+    )
+    if process is None:
+        return why_not_given(recording, seen, nodes, moments)
+    place = interrupted_place(recording, process.name)
+    where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
+    return Cause(
+        f"{seen}: rclpy.spin() was never called, so no callback runs{where}",
+        "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
+        Evidence(
+            moments or (until_the_end(recording, "rclpy.spin() was still not called"),),
+            (place,) if place else (),
+        ),
+    )
+
+
+def why_not_given(
+    recording: Recording, seen: str, nodes: Iterable[str], moments: tuple[Moment, ...] = ()
+) -> Cause | None:
+    """The cause if nodes were given to no executor, though their process has one that spins.
+
+    Args:
+        recording: The run.
+        seen: What was seen of it.
+        nodes: Their fully qualified names.
+        moments: Evidence.
+    """
+    names = sorted(set(nodes))
+    if not names or not all(testimony.in_no_executor(recording, name) for name in names):
+        return None
+    named = codes(names)
+    return Cause(
+        f"{seen}: an executor spins, but {named} was not given to it, so none of its callbacks "
+        "runs",
+        "Give the node to the executor that spins, executor.add_node(node), or call "
+        "rclpy.spin(node).",
+        Evidence(moments or (until_the_end(recording, "no executor had the node"),)),
+    )

@@ -1,0 +1,404 @@
+"""Why a process ended before it was asked to: exit code, signal, exception, place."""
+
+from __future__ import annotations
+
+import re
+import signal
+from collections.abc import Sequence
+
+from grader.checks import declarations as testimony
+from grader.checks.finding import Evidence, Moment
+from grader.checks.wording import code
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.process.api_mistakes import slip_hint
+from grader.diagnosis.process.missing_import import import_hint
+from grader.diagnosis.process.missing_library import lacking_package, library_hint
+from grader.diagnosis.process.newer_names import newer_name
+from grader.diagnosis.process.raised import Failure, fatal_failure, student_place, submission_path
+from grader.recording.model import Ending, Process, Recording
+
+_LOG_LINES = 15
+
+_SIGNALS = {
+    signal.SIGSEGV: "segmentation fault",
+    signal.SIGABRT: "abort",
+    signal.SIGBUS: "bus error",
+    signal.SIGILL: "illegal instruction",
+    signal.SIGFPE: "arithmetic error in native code",
+    signal.SIGKILL: "killed: by itself, or for too much memory",
+    signal.SIGSTOP: "stopped: it waited for SIGCONT",
+    signal.SIGXCPU: "too much CPU time",
+    signal.SIGXFSZ: "wrote a larger file than is allowed",
+    signal.SIGSYS: "a system call that no node needs",
+    signal.SIGTERM: "asked to end by another process",
+    signal.SIGPIPE: "wrote to a closed pipe",
+}
+_SIGNAL_HINTS = {
+    signal.SIGSEGV: "Native code crashed: look at the last call before it, such as one on a node "
+    "or publisher that was destroyed already.",
+    signal.SIGABRT: "A C++ exception or an assertion ended it: the last lines of output name it.",
+    signal.SIGKILL: "Look for os.kill or os.killpg, or for a list or an image that grows without "
+    "end.",
+    signal.SIGSTOP: "Look for os.kill, os.killpg and signal.raise_signal with SIGSTOP.",
+    signal.SIGTERM: "Look for os.kill, os.killpg or subprocess calls that end their own group.",
+}
+
+_BREACH_HINTS = {
+    "memory": "Look for a list, a queue or an image that grows without end.",
+    "cpu time": "Look for a loop without a pause: a node waits in rclpy.spin() and costs nothing "
+    "while nothing happens.",
+    "open files": "Look for files, sockets or processes that a loop opens and nothing closes.",
+    "descriptors in flight": "Receive at once what socket.send_fds() or multiprocessing sends.",
+    "escaped processes": "Write to no process but your own.",
+    "sessions": "Look for a loop that starts processes with start_new_session=True or setsid.",
+    "output": "Look for a print() or a log call in a loop that nothing slows down.",
+    "forbidden call": "Look for os.kill(os.getppid(), ...), and for whatever else is aimed at the "
+    "system, or at processes that are not your own.",
+    "forbidden packets": "The UDP ports from 7400 on belong to the middleware: choose another one "
+    "for a socket of your own.",
+    "forbidden name": "Let rclpy make your nodes and topics, and let it say which names it takes: "
+    "letters, digits and `_`, and `/` between the parts of a topic or a namespace.",
+    "forged report": "Write to no file descriptor that you did not open.",
+}
+
+_HINTS = {
+    "ModuleNotFoundError": "Python does not find this module: check its spelling, that it lies in "
+    "the package's folder, that setup.py installs it (packages=[...]), and that package.xml "
+    "declares the package it belongs to.",
+    "ImportError": "The module is there, but not that name in it: check the spelling and the "
+    "module, as in `from geometry_msgs.msg import Twist`.",
+    "SyntaxError": "Python cannot read this line or the one before it.",
+    "IndentationError": "Indent the lines of a block by the same four spaces.",
+    "TabError": "Indent with spaces only.",
+    "NameError": "The name is used before it is defined, misspelt, or not imported.",
+    "UnboundLocalError": "A name that a function assigns anywhere is its own, and empty until "
+    "then, even where the module has one of the same name. What shall last from call to call "
+    "belongs to the node: self.count.",
+    "NotInitializedException": "Call rclpy.init() before you create the node.",
+    "ParameterNotDeclaredException": "Call self.declare_parameter(name, default) before "
+    "self.get_parameter(name).",
+    "InvalidParameterTypeException": "A parameter has the type of its default: 1.0 takes floats, 1 "
+    "takes integers, 'a' takes texts. Give declare_parameter() a default of the type that is "
+    "asked for.",
+    "InvalidTopicNameException": "A topic name has letters, digits, `_` and `/` only. No part of "
+    "it begins with a digit, and it does not end with `/`.",
+    "InvalidNodeNameException": "A node name has letters, digits and `_` only.",
+    "EOFError": "A launched node has no keyboard, so input() cannot read: take a value from a ROS "
+    "parameter, and keep the node alive with rclpy.spin(node).",
+    "RecursionError": "A function calls itself without end.",
+    "MemoryError": "Look for a list or an image that grows without end.",
+}
+
+
+_EMPTY_HINT = (
+    "The list is empty. After a filter, test `if values:`. A slice such as ranges[-10:10] holds "
+    "nothing, for -10 counts from the end: ranges[-10:] + ranges[:10] is what is around the first."
+)
+
+# What the system says where a limit of the sandbox is in the way, whatever raises it.
+_LIMIT_HINTS = {
+    "[Errno 27]": "The size of a file is limited here: write less, or to several files.",
+    "[Errno 28]": "The space in home, /tmp and /dev/shm is limited here: write less, and remove "
+    "what is not needed any more.",
+    "can't start new thread": "The number of processes and threads is limited here: start fewer, "
+    "and not one for each message.",
+}
+
+# What Python says of slips that its own words do not explain to a beginner.
+_MESSAGE_HINTS = {
+    "min() arg is an empty": _EMPTY_HINT,  # Python 3.11 and before
+    "max() arg is an empty": _EMPTY_HINT,
+    "min() iterable argument is empty": _EMPTY_HINT,
+    "max() iterable argument is empty": _EMPTY_HINT,
+    "zero-size array to reduction": _EMPTY_HINT,
+    "cannot convert float infinity to integer": "inf says that a beam met nothing, and is no "
+    "index and no number of steps: test math.isfinite(value) before int(value).",
+    "cannot convert float NaN to integer": "nan says that there is no value: test "
+    "math.isfinite(value) before int(value).",
+    "Subscription.__init__(): callback should be": "A subscription's callback takes the message: "
+    "def message_callback(self, msg).",
+    "from __future__ imports must occur": "Move this line to the top of the file: nothing but "
+    "comments and the docstring comes before it.",
+    "math domain error": "math.acos and math.asin take -1 to 1, math.sqrt takes 0 or more: limit "
+    "the value first, max(-1.0, min(1.0, value)), for rounding makes 1.0000000000000002 of 1.",
+}
+
+_OTHER_ARGUMENTS = re.compile(
+    r"\(\) (takes \d+ positional arguments? but \d+|missing \d+ required positional argument)"
+)
+# A converter of rclpy met an object of another class; the name is that of the wanted one.
+_OTHER_CLASS = re.compile(r'convert_from_py: Assertion .strncmp\("[\w.]*\.(\w+)"')
+
+# A converter of rclpy met something else in a field of a message.
+_OTHER_FIELD = re.compile(r"Assertion .Py(Long|Float|Unicode|Bool)_Check\(")
+_FIELD_HINTS = {
+    "Long": "A field of integers in a message was given something else, such as a float or a text: "
+    "write int(value), and look for a parameter whose default is 1.0 or '1' in place of 1, or of "
+    "which .value is missing: get_parameter('name').value.",
+    "Float": "A field of floats in a message was given something else, such as a text or a whole "
+    "vector: write float(value).",
+    "Unicode": "A text field of a message was given something else: write str(value).",
+    "Bool": "A field that is True or False in a message was given something else: write "
+    "bool(value).",
+}
+
+
+def ended_early(recording: Recording, process: Process) -> bool:
+    """Whether a process ended by itself before the end of the observation.
+
+    One that was already on its way out when SIGINT came did, too: how long that takes is a
+    matter of the machine.
+    """
+    if process.exited_ns is None:
+        return False
+    if process.stopped_by != "itself":
+        return process.exited_ns >= recording.stop_ns and _was_leaving(recording, process)
+    return recording.ending is Ending.EXITED or process.exited_ns < recording.stop_ns
+
+
+def _was_leaving(recording: Recording, process: Process) -> bool:
+    """Whether it said that it ends before it was asked to."""
+    exiting_ns = testimony.exiting_ns(recording, process.name)
+    return exiting_ns is not None and exiting_ns < recording.stop_ns
+
+
+def dead(recording: Recording) -> tuple[Process, ...]:
+    """Processes that ended early; those that failed before those that just returned."""
+    ended = [process for process in recording.processes if ended_early(recording, process)]
+    return tuple(sorted(ended, key=lambda process: process.exit_code == 0))
+
+
+def exit_words(exit_code: int | None) -> str:
+    """Say how a process ended: ``exit code 1`` or ``SIGSEGV (segmentation fault)``."""
+    if exit_code is None:
+        return "an unknown exit code"
+    number = signal_of(exit_code)
+    if number is None:
+        return f"exit code {exit_code}"
+    words = f" ({_SIGNALS[number]})" if number in _SIGNALS else ""
+    through_shell = f", reported as exit code {exit_code}" if exit_code > 0 else ""
+    return f"{number.name}{words}{through_shell}"
+
+
+def signal_of(exit_code: int) -> signal.Signals | None:
+    """The signal that ended a process, also where a shell between reported 128 + signal."""
+    number = -exit_code if exit_code < 0 else exit_code - 128
+    try:
+        found = signal.Signals(number)
+    except ValueError:
+        return None
+    return found if exit_code < 0 or found in _SIGNALS else None
+
+
+def why_ended(recording: Recording, seen: str = "") -> Cause | None:
+    """The cause if a process ended early, after what was seen of it; None if none did."""
+    ended = dead(recording)
+    cause = cause_of_death(recording, ended[0]) if ended else None
+    return cause.after(seen) if cause is not None and seen else cause
+
+
+def cause_of_death(recording: Recording, process: Process) -> Cause:
+    """Why a process ended early, with its exception and the student's line if there is one.
+
+    Args:
+        recording: Where it ran.
+        process: One that :func:`ended_early`.
+    """
+    left = process.stopped_by != "itself"
+    exited_ns = testimony.exiting_ns(recording, process.name) if left else process.exited_ns
+    when_s = recording.since_launch_s(exited_ns or recording.stop_ns)
+    ended = f"the process {code(process.name)} ended {when_s:.2f} s after launch"
+    evidence = Evidence(
+        moments=(Moment(f"{process.name} ended", when_s),), log=_last_lines(recording, process)
+    )
+    if process.exit_code == 0 or (left and fatal_failure(recording, process.name) is None):
+        return _returned(recording, process, ended, evidence)
+    killed = process.exit_code is not None and signal_of(process.exit_code)
+    breach = next((item for item in recording.breaches if item.ended), None)
+    if killed is signal.SIGKILL and breach is not None:
+        return Cause(f"{ended}: {breach}", _BREACH_HINTS[breach.what], evidence)
+    failure = None if killed else fatal_failure(recording, process.name)
+    if failure is None:
+        hint = ""
+        if killed is signal.SIGABRT:
+            hint = _wrong_class(evidence.log) or _wrong_field(evidence.log)
+        hint = hint or (_SIGNAL_HINTS.get(killed, "") if killed else "")
+        hint = hint or "Run it by hand with `ros2 run` and look at its last lines of output."
+        return Cause(f"{ended} with {exit_words(process.exit_code)}", hint, evidence)
+    if failure.type == "TypeError" and failure.frames[-1].where == "send_response":
+        # The deepest line of the student's is that of spin(), which is right.
+        return Cause(
+            f"{ended} with {failure}: a service's callback did not return a response",
+            "A service's callback ends with `return response`, the object that it was called with.",
+            evidence,
+        )
+    place = student_place(failure, recording.submission)
+    where = f" ({place.file}:{place.line})" if place else ""
+    if failure.type == "ModuleNotFoundError":
+        installed = recording.environment.get("ros_imports", "").split()
+        lacking = lacking_package(failure.message, recording.submission, installed)
+        if lacking is not None:
+            apt_name = f"ros-jazzy-{lacking.replace('_', '-')}"
+            return Cause(
+                f"{ended}: it imports {code(lacking)}{where}, a ROS 2 package that is not "
+                "installed where this is graded",
+                f"No point is lost by it. Tell whoever runs the grader: `sudo apt install "
+                f"{apt_name}`.",
+                evidence,
+                ours=True,
+            )
+    newer = newer_name(failure, recording)
+    if newer is not None:
+        return Cause(
+            f"{ended}: it uses {code(newer.name)}{where}, which is not there where this is graded",
+            f"It is right in ROS 2 Jazzy, which has {newer.home}, and no point is lost by it. Tell "
+            f"whoever runs the grader: it needs {newer.home}. Or do without this name.",
+            evidence,
+            ours=True,
+        )
+    return Cause(
+        observed=f"{ended} with {failure}{where}",
+        hint=_exception_hint(failure, recording),
+        evidence=Evidence(
+            moments=evidence.moments, places=(place,) if place else (), log=evidence.log
+        ),
+    )
+
+
+def offence(recording: Recording) -> Cause | None:
+    """What the processes did that is never allowed, also where they ended before it was seen."""
+    for breach in recording.breaches:
+        if not breach.allowed:
+            when_s = recording.since_launch_s(breach.time_ns)
+            moment = Moment(breach.what, when_s)
+            return Cause(str(breach), _BREACH_HINTS[breach.what], Evidence(moments=(moment,)))
+    return None
+
+
+def _returned(recording: Recording, process: Process, ended: str, evidence: Evidence) -> Cause:
+    if testimony.broke_off(recording, process.name):
+        return Cause(
+            f"{ended} with exit code 0, but main() did not return: Python was broken off, as "
+            "os._exit() does",
+            "Look for os._exit() or os.exec...(): they end the program wherever it is. A node "
+            "runs until rclpy.spin(node) returns, at Ctrl-C.",
+            evidence,
+        )
+    if testimony.traced(recording, process.name) and not testimony.said(
+        recording, "node", process.name
+    ):
+        return Cause(
+            f"{ended} with exit code 0: main() returned before a node was created",
+            "The function that setup.py names in console_scripts must call rclpy.init(), create "
+            "the node and call rclpy.spin(node).",
+            evidence,
+        )
+    if testimony.never_spun(recording, process.name):
+        return Cause(
+            f"{ended} with exit code 0: main() returned without rclpy.spin()",
+            "rclpy.spin(node) keeps a node alive and runs its callbacks until Ctrl-C: call it in "
+            "main() after the node was created.",
+            evidence,
+        )
+    return Cause(
+        f"{ended} with exit code 0: main() returned, or something called sys.exit()",
+        "rclpy.spin(node) keeps a node alive until Ctrl-C. Look for what ends it: spin_once() "
+        "handles one round only, a daemon thread ends with main(), rclpy.shutdown() and sys.exit() "
+        "end everything.",
+        evidence,
+    )
+
+
+def _exception_hint(failure: Failure, recording: Recording) -> str:
+    if failure.type == "ModuleNotFoundError":
+        hint = library_hint(failure.message, recording)
+        if hint is not None:
+            return hint
+    for said, hint in _LIMIT_HINTS.items():
+        if failure.message.startswith(said):
+            return hint
+    for said, hint in _MESSAGE_HINTS.items():
+        if failure.message.startswith(said):
+            return hint
+    if failure.type == "TypeError" and "CallbackGroup.add_entity()" in failure.message:
+        return (
+            "A callback group is an object, not its class: write ReentrantCallbackGroup() and "
+            "MutuallyExclusiveCallbackGroup(), with brackets."
+        )
+    slip = import_hint(failure.message) if failure.type == "NameError" else slip_hint(failure)
+    if slip is not None:
+        return slip
+    if _enters_init(failure):
+        return (
+            "In Jazzy rclpy.init() returns nothing that `with` could enter; it does so in later "
+            "releases of ROS, whose tutorial this is from. Write rclpy.init(args=args) on a line "
+            "of its own, without `with`."
+        )
+    if failure.type in _HINTS:
+        return _HINTS[failure.type]
+    if failure.type == "AttributeError" and "'str' has no attribute '_TYPE_SUPPORT'" in (
+        failure.message
+    ):
+        return "Give the class of the message, imported from geometry_msgs.msg, not its name."
+    if failure.type == "AttributeError" and "'_default_callback_group'" in failure.message:
+        return "Call super().__init__('node_name') first in the node's constructor."
+    if failure.type == "AttributeError" and failure.message.startswith("module "):
+        # Where Python itself loads the entry point, the last frame is its own.
+        if submission_path(failure.frames[-1].file, recording.submission):
+            return (
+                "The module has no such name: check its spelling. A module inside of another one "
+                "must be imported itself, as in `from rclpy.node import Node`."
+            )
+        return "setup.py's console_scripts names a function that the module does not have."
+    if failure.type == "TypeError" and "'qos_profile'" in failure.message:
+        return "The third argument is the queue depth: self.create_publisher(Twist, 'cmd_vel', 10)."
+    if failure.type == "TypeError" and _called_by_rclpy(failure):
+        return (
+            "rclpy calls the callback of a timer without arguments and that of a subscription "
+            "with the message: def timer_callback(self), def message_callback(self, msg)."
+        )
+    if student_place(failure, recording.submission):
+        return "Mend the line that is named here."
+    return "Read the traceback from its last line upwards."
+
+
+def _called_by_rclpy(failure: Failure) -> bool:
+    """Whether rclpy called something with arguments that it does not take."""
+    inside = any("/rclpy/" in frame.file for frame in failure.frames[-1:])
+    return inside and _OTHER_ARGUMENTS.search(failure.message) is not None
+
+
+def _enters_init(failure: Failure) -> bool:
+    """Whether it is `with rclpy.init():`; Python 3.10 only names the method that None lacks."""
+    refused = "context manager protocol" in failure.message or failure.message == "__enter__"
+    return refused and any("rclpy.init(" in frame.source for frame in failure.frames[-1:])
+
+
+def _wrong_class(lines: Sequence[str]) -> str:
+    """What to try where ROS was given an object of another class, or nothing."""
+    found = next((match for line in lines if (match := _OTHER_CLASS.search(line))), None)
+    if found is None:
+        return ""
+    # A part of a service or an action: Fibonacci_Result is Fibonacci.Result in Python.
+    name = re.sub(r"_(?=(Request|Response|Goal|Result|Feedback)$)", ".", found[1])
+    return (
+        f"ROS was given something that is no {code(name)}: return or publish one. A callback "
+        "without `return` returns None."
+    )
+
+
+def _wrong_field(lines: Sequence[str]) -> str:
+    """What to try where a field of a message held what it cannot."""
+    found = next((match for line in lines if (match := _OTHER_FIELD.search(line))), None)
+    return _FIELD_HINTS[found[1]] if found else ""
+
+
+def _last_lines(recording: Recording, process: Process) -> tuple[str, ...]:
+    lines = [
+        line.text
+        for line in recording.log
+        if line.process == process.name and line.stream in ("stdout", "stderr")
+    ]
+    # Where colcon's script loads the entry point, Python does not leave its own frames out.
+    lines = [line for line in lines if '"<frozen importlib' not in line]
+    return tuple(lines[-_LOG_LINES:])
