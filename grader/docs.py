@@ -21,13 +21,13 @@ from pydantic import BaseModel
 
 from grader import resources
 from grader.assignment import asking, limits, model, mutant, stimulus
-from grader.assignment.unit import UNITS, Dimension, format_duration
 from grader.checks import finding
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance
 from grader.recording import interaction
 from grader.recording import model as recording
+from grader.spec.unit import UNITS, Dimension, format_duration
 from sim import description, world_model
 from sim.motion import Pose
 
@@ -91,7 +91,7 @@ _OWN_CHECKS = """\
 `python: checks.py:drives_straight` names a function in a file beside assignment.yaml:
 
 ```python
-from grader.assignment.quantity import Angle
+from grader.spec.quantity import Angle
 from grader.checks.finding import Finding
 from grader.recording.model import Recording
 

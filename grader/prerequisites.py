@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from importlib import metadata
 
 from grader import ros
-from grader.assignment.unit import format_duration
 from grader.errors import GraderFault
 from grader.run.load import cpu_count
+from grader.spec.unit import format_duration
 
 
 @dataclass(frozen=True)

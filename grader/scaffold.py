@@ -9,10 +9,10 @@ from pathlib import Path
 from grader.assignment.load import ASSIGNMENT_FILE
 from grader.assignment.model import Package
 from grader.assignment.mutation import MUTANTS_FILE, REFERENCE_FOLDER
-from grader.assignment.name import check_id
 from grader.errors import UsageError
 from grader.report.files import write_folders
 from grader.report.handout import HANDOUT_FILE
+from grader.spec.name import check_id
 from grader.starter import package_files, programs, rendered
 from grader.submission.rosdistro import PACKAGES
 

@@ -14,8 +14,8 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from grader.assignment.quantity import refusal, written_as_read
-from grader.assignment.unit import Dimension, parse_quantity
+from grader.spec.quantity import refusal, written_as_read
+from grader.spec.unit import Dimension, parse_quantity
 from sim.motion import Pose
 
 MAX_COORDINATE_M = 10_000.0

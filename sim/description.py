@@ -20,8 +20,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from grader.assignment.name import topic_name
-from grader.assignment.quantity import (
+from grader.spec.name import topic_name
+from grader.spec.quantity import (
     Angle,
     AngularSpeed,
     Duration,
@@ -31,8 +31,8 @@ from grader.assignment.quantity import (
     Ratio,
     Speed,
 )
-from grader.assignment.source import Model, read_source
-from grader.assignment.unit import Dimension
+from grader.spec.source import Model, read_source
+from grader.spec.unit import Dimension
 from sim.coordinates import Metres, PoseInPlane, PositiveMetres
 from sim.motion import ORIGIN, Pose
 

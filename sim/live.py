@@ -15,7 +15,7 @@ from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
 
 from grader.errors import UsageError
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
 from sim.coordinates import PoseInPlane
 from sim.description import SimulatorOptions, read_options
 from sim.motion import NS, Pose

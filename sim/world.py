@@ -29,10 +29,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from grader.assignment.document import Place
-from grader.assignment.source import Source, parse_source, read_source
 from grader.errors import AssignmentError, Problem
-from grader.nearest import did_you_mean
+from grader.spec.document import Place
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.source import Source, parse_source, read_source
 from sim.coordinates import MIN_SIZE_M
 from sim.motion import ORIGIN, Pose
 from sim.script import MovingObstacle

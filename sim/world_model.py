@@ -6,8 +6,8 @@ import math
 
 from pydantic import Field, model_validator
 
-from grader.assignment.quantity import Angle, DurationOrZero
-from grader.assignment.source import Model
+from grader.spec.quantity import Angle, DurationOrZero
+from grader.spec.source import Model
 from sim.coordinates import Ends, Point, PoseInPlane, PoseOrPoint, PositiveMetres, Rectangle, Size
 from sim.motion import NS, ORIGIN, wrap_angle
 from sim.script import MAX_SPEED_M_S, MovingObstacle, Waypoint

@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from grader.assignment.name import InterfaceName, TopicName
-from grader.assignment.quantity import Duration, DurationOrZero
-from grader.assignment.source import Model
 from grader.checks.node.node_name import node_name
+from grader.spec.name import InterfaceName, TopicName
+from grader.spec.quantity import Duration, DurationOrZero
+from grader.spec.source import Model
 
 MOST_CALLS = 1000
 

@@ -11,10 +11,8 @@ from typing import Any
 
 from grader.assignment.asking import CallService, ReadParameters, SendGoal, SetParameters
 from grader.assignment.binding import BoundCheck
-from grader.assignment.document import Place
 from grader.assignment.draft import Draft
 from grader.assignment.model import Scenario
-from grader.assignment.unit import format_duration
 from grader.checks.action.action import OfGoals, Result
 from grader.checks.action.action_end import Cancels, Preempts
 from grader.checks.lifecycle.lifecycle import State
@@ -22,7 +20,9 @@ from grader.checks.parameter.parameter import Declared, OfParameter, same_value
 from grader.checks.service.service import Concurrent, Responds
 from grader.checks.source.source import Ruff
 from grader.errors import GraderFault, Problem
-from grader.nearest import did_you_mean
+from grader.spec.document import Place
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.unit import format_duration
 from grader.submission.lint import find_ruff, known_rules
 
 _GET_STATE = "/get_state"

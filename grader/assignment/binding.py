@@ -8,10 +8,10 @@ from pathlib import Path
 
 from grader.assignment.model import CheckSpec
 from grader.assignment.own_check import load_own_check
-from grader.assignment.source import Source
 from grader.checks.check import Check, Parameters
 from grader.errors import Problem
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.source import Source
 
 
 @dataclass(frozen=True)

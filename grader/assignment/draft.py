@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.assignment.model import CheckSpec, Package, Scenario
-from grader.assignment.source import Source
+from grader.spec.source import Source
 
 
 @dataclass(frozen=True)

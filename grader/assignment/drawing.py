@@ -6,9 +6,9 @@ import random
 from typing import Any
 
 from grader.assignment.model import Scenario
-from grader.assignment.unit import parse_any
 from grader.errors import UsageError
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.unit import parse_any
 
 _DECIMALS = 3
 

@@ -15,13 +15,13 @@ from grader.assignment.interfaces import Interfaces
 from grader.assignment.message import Find
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.requests import SEPARATOR
-from grader.assignment.source import Source
 from grader.assignment.stimulus import Publish
 from grader.checks.check import NamedFields
 from grader.checks.field import value_at
 from grader.checks.value import NoSuchField, expected_leaves, tolerance_of, unreachable
 from grader.errors import Problem
 from grader.recording.interface import FLOATS, TEXTS, fields_of
+from grader.spec.source import Source
 
 _INDEX = re.compile(r"\[\d+\]")
 _ZERO = {"bool": False, **dict.fromkeys(FLOATS, 0.0)}

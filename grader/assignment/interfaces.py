@@ -10,13 +10,13 @@ from pathlib import Path
 
 from grader import resources, ros
 from grader.assignment.binding import BoundCheck
-from grader.assignment.document import Place
 from grader.assignment.model import Assignment
-from grader.assignment.name import INTERFACE
-from grader.assignment.source import Source
 from grader.errors import GraderFault, Problem
-from grader.nearest import did_you_mean
 from grader.recording.interface import DefinitionError, sections_of
+from grader.spec.document import Place
+from grader.spec.name import INTERFACE
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.source import Source
 from grader.submission.rosdistro import PACKAGES
 
 FOLDER = "interfaces"

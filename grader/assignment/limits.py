@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from grader.assignment.quantity import Duration, Size
-from grader.assignment.source import Model
 from grader.sandbox.limits import BUILD, BUILD_OUTPUT_BYTES, Limits
+from grader.spec.quantity import Duration, Size
+from grader.spec.source import Model
 
 _DEFAULTS = Limits()
 

@@ -13,12 +13,12 @@ from grader.assignment import expected, interfaces, rules, simulation, stimulati
 from grader.assignment.binding import BoundCheck, bind, tell_apart
 from grader.assignment.draft import Draft
 from grader.assignment.model import Assignment, Scenario
-from grader.assignment.source import Source, read_source
 from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, Problem, UsageError
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.source import Source, read_source
 
 __all__ = [
     "ASSIGNMENT_FILE",

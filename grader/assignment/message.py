@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from grader.assignment.document import Place, path
-from grader.assignment.unit import parse_any
-from grader.nearest import did_you_mean
 from grader.recording.interface import FLOATS, INTEGERS, TEXTS, Field, fields_of
+from grader.spec.document import Place, path
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.unit import parse_any
 
 NOW = "now"
 """Stands for the time at which a message is published, in a field of that type."""

@@ -12,7 +12,8 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, model_validator
 
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
-from grader.assignment.name import (
+from grader.assignment.stimulus import Stimulus
+from grader.spec.name import (
     Durability,
     Id,
     InterfaceName,
@@ -23,10 +24,9 @@ from grader.assignment.name import (
     Reliability,
     TopicName,
 )
-from grader.assignment.quantity import Duration, DurationOrZero, PositiveLength
-from grader.assignment.source import Model
-from grader.assignment.stimulus import Stimulus
-from grader.assignment.unit import parse_any
+from grader.spec.quantity import Duration, DurationOrZero, PositiveLength
+from grader.spec.source import Model
+from grader.spec.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
 
 __all__ = [

@@ -14,10 +14,10 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from grader.assignment.document import Place
 from grader.assignment.model import Assignment, Id
-from grader.assignment.source import Model
 from grader.checks.finding import Status
+from grader.spec.document import Place
+from grader.spec.source import Model
 
 
 def _inside(text: str) -> str:

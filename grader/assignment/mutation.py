@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader import resources
-from grader.assignment.document import Place
 from grader.assignment.model import Assignment
 from grader.assignment.mutant import Change, Mutant, MutantFile, Variant, mutate, required_by
-from grader.assignment.source import Source, read_source
 from grader.errors import AssignmentError, Problem, UsageError
-from grader.nearest import did_you_mean
+from grader.spec.document import Place
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.source import Source, read_source
 
 MUTANTS_FILE = "mutants.yaml"
 REFERENCE_FOLDER = "reference"

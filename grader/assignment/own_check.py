@@ -28,7 +28,7 @@ from pydantic.errors import PydanticUserError
 
 from grader.checks.check import Check, Parameters, Subject
 from grader.checks.finding import Finding
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
 
 # Expressions that are never a finding; `early or Finding.passed(...)` may well be one.
 _NO_FINDING = (ast.Constant, ast.Compare, ast.UnaryOp, ast.JoinedStr, ast.List, ast.Tuple, ast.Dict)

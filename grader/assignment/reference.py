@@ -8,9 +8,9 @@ from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.mutation import reference_of
-from grader.assignment.source import read_source
 from grader.errors import Problem, UsageError
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.source import read_source
 from grader.submission.entrypoints import read_setup
 from grader.submission.manifest import MANIFEST, read_manifest
 

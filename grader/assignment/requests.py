@@ -7,11 +7,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from grader.assignment.asking import Asking, CallService, SendGoal, SetParameters
-from grader.assignment.document import Place
 from grader.assignment.drawing import fill_in
 from grader.assignment.message import Find, MessageError, read_message
 from grader.assignment.messages import StimulusError
 from grader.errors import UsageError
+from grader.spec.document import Place
 
 SEPARATOR = re.compile(r"^---\s*$", re.MULTILINE)
 _SCALARS = (bool, int, float, str)

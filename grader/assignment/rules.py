@@ -6,15 +6,15 @@ from collections.abc import Iterator, Sequence
 
 from grader.assignment.asking_rules import asking_problems
 from grader.assignment.binding import BoundCheck
-from grader.assignment.document import Place
 from grader.assignment.draft import Draft
 from grader.assignment.model import Launch, Package, Scenario
 from grader.assignment.stimulus import Join, Publish
-from grader.assignment.unit import format_duration
 from grader.assignment.withheld import SHOWN_FROM
 from grader.checks.check import Subject
 from grader.errors import Problem
-from grader.nearest import did_you_mean
+from grader.spec.document import Place
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.unit import format_duration
 
 _MESSAGE_FAMILIES = ("messages", "timing", "callbacks", "rotation", "parameter")
 """Families that judge received messages: what is not recorded looks like silence to them."""

@@ -14,9 +14,9 @@ from pydantic.json_schema import models_json_schema
 
 from grader.assignment.model import Assignment, CheckSpec
 from grader.assignment.mutant import MutantFile
-from grader.assignment.source import Model
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check
+from grader.spec.source import Model
 
 _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -10,7 +10,7 @@ from grader.assignment.model import Scenario, Visibility
 from grader.assignment.withheld import Withheld
 from grader.checks.check import Subject
 from grader.errors import UsageError
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
 
 
 def select(

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from grader.assignment.document import Place
 from grader.assignment.drawing import draw_values, fill_in, world_values
 from grader.assignment.model import Assignment, Scenario
-from grader.assignment.source import Source, read_source
 from grader.errors import AssignmentError, Problem, UsageError
+from grader.spec.document import Place
+from grader.spec.source import Source, read_source
 from sim.world import World, read_world
 
 _TRIED_SEEDS = range(20)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.assignment.asking import Asking
-from grader.assignment.document import Place
 from grader.assignment.drawing import draw_values
 from grader.assignment.interfaces import Interfaces
 from grader.assignment.message import Find
 from grader.assignment.messages import StimulusError, messages_of
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.requests import mistakes
-from grader.assignment.source import Source
 from grader.assignment.stimulus import Join, Kill, Publish, Restart
-from grader.assignment.unit import format_duration
 from grader.errors import Problem
-from grader.nearest import did_you_mean
+from grader.spec.document import Place
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.source import Source
+from grader.spec.unit import format_duration
 
 
 def problems(source: Source, assignment: Assignment, known: Interfaces) -> Iterator[Problem]:

@@ -17,7 +17,7 @@ from grader.assignment.asking import (
     SendGoal,
     SetParameters,
 )
-from grader.assignment.name import (
+from grader.spec.name import (
     Durability,
     Id,
     InterfaceName,
@@ -25,9 +25,9 @@ from grader.assignment.name import (
     Reliability,
     TopicName,
 )
-from grader.assignment.quantity import Duration, DurationOrZero
-from grader.assignment.source import Model
-from grader.nearest import nearest
+from grader.spec.nearest_name import nearest
+from grader.spec.quantity import Duration, DurationOrZero
+from grader.spec.source import Model
 
 MCAP_SUFFIX = ".mcap"
 MOST_MESSAGES = 10_000

@@ -18,12 +18,12 @@ from grader.batch.intake import HandedIn
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
-from grader.nearest import did_you_mean
 from grader.recording.fact import to_json
 from grader.report.facts import Clock
 from grader.report.files import write_whole
 from grader.report.grade_part import grade_json
 from grader.report.result_model import Result
+from grader.spec.nearest_name import did_you_mean
 from grader.submission.locate import NO_FILES
 from grader.submission.paths import shown
 from grader.submission.prepare import fingerprint

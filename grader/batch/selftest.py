@@ -24,7 +24,6 @@ from grader.assignment.mutant import (
     verdict,
 )
 from grader.assignment.mutation import apply, load_mutants
-from grader.assignment.unit import format_duration
 from grader.batch.grading import Graded, Grading
 from grader.checks.finding import Status
 from grader.grade.model import Grade
@@ -33,6 +32,7 @@ from grader.report.grade_part import grade_json
 from grader.report.result import make_result
 from grader.report.words import counted_points, number
 from grader.scratch import Scratch
+from grader.spec.unit import format_duration
 from grader.starter import write_starter
 
 REFERENCE = "reference"

@@ -14,7 +14,7 @@ from types import MappingProxyType, ModuleType
 
 from grader import checks
 from grader.checks.check import Check
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
 
 
 def gather(modules: Iterable[ModuleType]) -> Mapping[str, Check]:

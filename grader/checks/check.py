@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from grader.assignment.source import Model
 from grader.checks.finding import Finding
 from grader.checks.value import EXACT, Tolerance
+from grader.spec.source import Model
 
 
 class Subject(str, Enum):

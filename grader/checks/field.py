@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator
 
 from grader.checks.value import NoSuchField
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
 
 _NAME = r"[A-Za-z][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*"
 _PATH = re.compile(rf"{_NAME}(?:\.{_NAME})*")

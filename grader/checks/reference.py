@@ -10,10 +10,10 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from grader.assignment.name import ID
-from grader.assignment.quantity import refusal, written_as_read
-from grader.assignment.unit import Dimension, parse_quantity, write_quantity
-from grader.nearest import did_you_mean
+from grader.spec.name import ID
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.quantity import refusal, written_as_read
+from grader.spec.unit import Dimension, parse_quantity, write_quantity
 from sim.coordinates import metres
 from sim.motion import Pose, wrap_angle
 

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from grader.assignment.quantity import refusal
-from grader.assignment.unit import UNITS, Dimension, format_duration, parse_quantity
 from grader.checks.wording import percent
+from grader.spec.quantity import refusal
+from grader.spec.unit import UNITS, Dimension, format_duration, parse_quantity
 
 
 @dataclass(frozen=True)

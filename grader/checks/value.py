@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
 
 EXACT = 1e-9
 """Largest difference of two numbers that are meant to be the same."""

@@ -30,7 +30,7 @@ def validate(
 
     Tells of every mistake its file, its line, and what is allowed.
     """
-    from grader.assignment.doubts import doubts
+    from grader.assignment.lint_warnings import doubts
     from grader.assignment.load import load_assignment
     from grader.assignment.mutation import MUTANTS_FILE, load_mutants
     from grader.assignment.reference import reference_problems
@@ -88,7 +88,7 @@ def checks(
     from grader.checks.catalogue import CATALOGUE
     from grader.docs import check_markdown
     from grader.errors import UsageError
-    from grader.nearest import did_you_mean
+    from grader.spec.nearest_name import did_you_mean
 
     console = output_console()
     if name is None:

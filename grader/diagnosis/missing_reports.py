@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pydantic import Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.unit import format_duration
 from grader.checks.callbacks.callback_run import Reports, spans
 from grader.checks.check import Parameters
 from grader.checks.finding import Evidence, Moment
@@ -15,8 +14,9 @@ from grader.checks.wording import code, codes, counted, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
-from grader.nearest import nearest
 from grader.recording.model import NS, Recording
+from grader.spec.nearest_name import nearest
+from grader.spec.unit import format_duration
 
 _FORMAT_HINT = (
     "Publish a String with the name of the callback, a space and `start` as the first thing in "

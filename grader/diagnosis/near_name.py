@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from grader.checks.finding import Evidence
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
-from grader.nearest import nearest
+from grader.spec.nearest_name import nearest
 
 
 @dataclass(frozen=True)

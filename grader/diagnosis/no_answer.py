@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
@@ -18,6 +17,7 @@ from grader.diagnosis.process.process_exit import cause_of_death, dead, ended_ea
 from grader.diagnosis.process.raised import interrupted_place, parse_failures, student_place
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
+from grader.spec.unit import format_duration
 
 _MULTI = "MultiThreadedExecutor"
 _LOG_LINES = 10

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from grader.assignment.unit import format_duration
 from grader.checks.field import number_at
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.first_seen import first_seen
@@ -19,6 +18,7 @@ from grader.diagnosis.misread_log import explain
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Kind, LogLine, Recording
+from grader.spec.unit import format_duration
 
 _LOG_LINES = 5
 # Who may log less often than a message comes needs lines for no more than this share of them.

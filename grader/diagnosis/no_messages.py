@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Moment
@@ -21,6 +20,7 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.raised import interrupted_place
 from grader.diagnosis.sim_time import why_time_stands_still
 from grader.recording.model import NS, Endpoint, Kind, Owner, Recording
+from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
 _LOG_LINES = 5

@@ -11,8 +11,8 @@ from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.process_exit import cause_of_death, dead, why_ended
 from grader.diagnosis.process.raised import interrupted_place
-from grader.nearest import nearest
 from grader.recording.model import Ending, Process, Recording
+from grader.spec.nearest_name import nearest
 
 _LOG_LINES = 10
 # How the cell calls the wait for a process that it could not start.

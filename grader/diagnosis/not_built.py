@@ -8,7 +8,7 @@ from dataclasses import replace
 from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
-from grader.nearest import nearest
+from grader.spec.nearest_name import nearest
 from grader.submission.buildlog import modules_not_found, not_found
 from grader.submission.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord

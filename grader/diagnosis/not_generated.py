@@ -12,8 +12,8 @@ from grader.checks.interface.definition import InterfaceName
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
-from grader.nearest import nearest
 from grader.recording.interface import PRIMITIVES, DefinitionError, sections_of
+from grader.spec.nearest_name import nearest
 from grader.submission.cmake import Command, read_commands
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.finding import Evidence
 from grader.checks.first_seen import endpoints_seen
 from grader.checks.wording import code, listing
 from grader.diagnosis.cause import Cause
 from grader.recording.model import Kind, Recording
+from grader.spec.unit import format_duration
 
 _CLOCK = "/clock"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from grader.checks.wording import code
-from grader.nearest import nearest
+from grader.spec.nearest_name import nearest
 
 # Types that are fields of others, and so are taken for the whole.
 _PARTS = {

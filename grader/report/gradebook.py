@@ -16,11 +16,11 @@ from dataclasses import dataclass
 
 from grader.checks.finding import Status
 from grader.errors import UsageError
-from grader.nearest import did_you_mean
 from grader.report import words
 from grader.report.class_row import ClassRow, RowStatus
 from grader.report.clean import one_line
 from grader.report.result_model import Result
+from grader.spec.nearest_name import did_you_mean
 
 # Some spreadsheets take the wide forms of East Asian keyboards for the same.
 _FORMULA = ("=", "+", "-", "@", "\uff1d", "\uff0b", "\uff0d", "\uff20")

@@ -8,9 +8,9 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from grader.assignment.model import Assignment, CheckSpec, Visibility
-from grader.assignment.quantity import PositiveLength
 from grader.checks.reference import Goal, GoalPose, UnknownValue
 from grader.report.path import Target
+from grader.spec.quantity import PositiveLength
 
 _GOAL: TypeAdapter[Goal] = TypeAdapter(GoalPose)
 _LENGTH: TypeAdapter[float] = TypeAdapter(PositiveLength)

@@ -24,7 +24,7 @@ from importlib import metadata
 from pathlib import Path
 
 from grader.errors import GraderFault
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
 from grader.tree import listing
 
 VERSION = 2

@@ -10,7 +10,7 @@ import ast
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
-from grader.nearest import did_you_mean, nearest
+from grader.spec.nearest_name import did_you_mean, nearest
 from grader.submission.entrypoints import EntryPoint
 from grader.submission.paths import shown
 from grader.submission.record import SourceError

@@ -9,11 +9,11 @@ from typing import Literal
 import pytest
 
 from grader.assignment.model import InterfaceName, TopicName
-from grader.assignment.quantity import Duration
 from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.checks.finding import Finding
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
+from grader.spec.quantity import Duration
 from tests.assignment.lessons import GOOD
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.doubts import doubts
+from grader.assignment.lint_warnings import doubts
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import Mutant
 from grader.errors import AssignmentError

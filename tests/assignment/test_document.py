@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.assignment.document import path
-from grader.assignment.source import MAX_BYTES, parse_source, read_source
 from grader.errors import AssignmentError, UsageError
+from grader.spec.document import path
+from grader.spec.source import MAX_BYTES, parse_source, read_source
 
 FILE = Path("assignment.yaml")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.doubts import doubts
+from grader.assignment.lint_warnings import doubts
 from grader.assignment.load import list_assignments, load_assignment
 from tests.assignment.lessons import HEAD
 

@@ -8,8 +8,8 @@ import pytest
 
 from grader.assignment.model import Assignment
 from grader.assignment.mutation import apply, load_mutants, reference_of
-from grader.assignment.source import parse_source
 from grader.errors import AssignmentError, UsageError
+from grader.spec.source import parse_source
 from tests.assignment.lessons import HEAD
 
 LESSON = parse_source(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.assignment.name import (
+from grader.spec.name import (
     check_id,
     interface_name,
     library_name,

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.assignment.quantity import Duration
+from grader.spec.quantity import Duration
 from grader.checks.finding import Finding
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.assignment.unit import UNITS, Dimension, format_duration, parse_quantity
+from grader.spec.unit import UNITS, Dimension, format_duration, parse_quantity
 
 
 @pytest.mark.parametrize(

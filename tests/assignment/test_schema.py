@@ -13,10 +13,10 @@ from grader import resources
 from grader.assignment.load import load_assignment
 from grader.assignment.mutation import MUTANTS_FILE
 from grader.assignment.schema import assignment_schema, mutants_schema
-from grader.assignment.source import parse_source, read_source
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check
 from grader.errors import AssignmentError
+from grader.spec.source import parse_source, read_source
 from tests.assignment.lessons import GOOD, HEAD
 from tests.assignment.validator import valid
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.doubts import doubts
+from grader.assignment.lint_warnings import doubts
 from grader.assignment.load import load_assignment
 from grader.assignment.selection import select, visible_part
 from grader.assignment.withheld import Withheld

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from pydantic import Field
 
 from grader.assignment.model import Assignment, Until
-from grader.assignment.quantity import Duration
-from grader.assignment.source import Model, parse_source
 from grader.errors import AssignmentError
+from grader.spec.quantity import Duration
+from grader.spec.source import Model, parse_source
 from tests.assignment.lessons import GOOD, HEAD
 
 FILE = Path("assignment.yaml")

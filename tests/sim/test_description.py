@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.source import parse_source
 from grader.errors import AssignmentError
+from grader.spec.source import parse_source
 from sim.description import Layout, NoReturn, SimulatorOptions, read_options
 from sim.motion import Pose
 

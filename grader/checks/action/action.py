@@ -8,8 +8,6 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from grader.assignment.model import InterfaceName, TopicName
-from grader.assignment.quantity import Duration, Frequency, Ratio
-from grader.assignment.unit import format_duration
 from grader.checks.action.goals import (
     evidence,
     judged_goals,
@@ -34,6 +32,8 @@ from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_server import ACTION, is_offered
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import Duration, Frequency, Ratio
+from grader.spec.unit import format_duration
 
 
 class Exists(Parameters):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks.action.action import OfGoals, cannot, type_of
 from grader.checks.action.goals import (
     evidence,
@@ -23,6 +21,8 @@ from grader.diagnosis.no_server import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 # Share of the time from the request to cancel until the end of the goal.
 _AT_THE_END = 0.8

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from grader.assignment.unit import format_duration
 from grader.checks.fields import has_fields
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Moment, Table
@@ -17,6 +16,7 @@ from grader.diagnosis.no_server import ACTION, offered, why_not_met, why_not_off
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
+from grader.spec.unit import format_duration
 
 _MOST_ROWS = 50
 ANSWER_S = 1.0

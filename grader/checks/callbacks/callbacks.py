@@ -10,8 +10,6 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.callbacks.callback_run import Reports, read_reports, spans
 from grader.checks.check import Subject, check
@@ -24,6 +22,8 @@ from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.missing_reports import SECONDS_HINT, Reported, why_unreported
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 # Between two callbacks of a busy executor.
 _PAUSE_S = 0.1

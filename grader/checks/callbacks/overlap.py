@@ -6,8 +6,6 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks.callbacks import concurrency
 from grader.checks.callbacks.callback_run import (
     Overlap,
@@ -23,6 +21,8 @@ from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.missing_reports import Reported, why_unreported
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 
 class NeverOverlap(Reported):

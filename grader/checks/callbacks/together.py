@@ -7,8 +7,6 @@ from functools import reduce
 
 from pydantic import Field
 
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks.callbacks import concurrency
 from grader.checks.callbacks.callback_run import Reports, Run, read_reports, spans
 from grader.checks.check import Subject, check
@@ -16,6 +14,8 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.missing_reports import Reported, why_unreported
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 # From and until when, in nanoseconds.
 _Stretch = tuple[int, int]

@@ -8,8 +8,6 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, field_validator
 
-from grader.assignment.quantity import Duration, Ratio
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.doubt import was_held_up
@@ -25,6 +23,8 @@ from grader.diagnosis.process.process_exit import cause_of_death, ended_early, w
 from grader.diagnosis.process.raised import interrupted_place
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Process, Recording
+from grader.spec.quantity import Duration, Ratio
+from grader.spec.unit import format_duration
 
 _FORGIVING_FROM = 3
 _MOST_MOMENTS = 5

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.assignment.name import TopicName
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
@@ -13,6 +11,8 @@ from grader.checks.first_seen import first_seen
 from grader.checks.wording import code, counted
 from grader.diagnosis.no_messages import why_silent
 from grader.recording.model import Recording
+from grader.spec.name import TopicName
+from grader.spec.unit import format_duration
 
 # How the tracer names a callback that is None: create_rate() makes a timer that calls nothing.
 _NOTHING = "NoneType"

@@ -9,7 +9,7 @@ from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package
-from grader.nearest import nearest
+from grader.spec.nearest_name import nearest
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from grader.checks.wording import code, listing
-from grader.nearest import nearest
 from grader.recording.interface import Field, Section
+from grader.spec.nearest_name import nearest
 
 # rosidl_adapter makes uint8 of char (MSG_TYPE_TO_IDL).
 _SYNONYMS = {"char": "uint8"}

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator
 from pydantic import Field as Parameter
 from pydantic import model_validator
 
-from grader.assignment.name import InterfaceName as Interface
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Comparison, Evidence, Finding, Table
 from grader.checks.interface.definition import InterfaceName, find_definition
@@ -26,6 +25,7 @@ from grader.diagnosis.not_generated import (
     why_not_generated,
 )
 from grader.recording.interface import DefinitionError, Section, sections_of
+from grader.spec.name import InterfaceName as Interface
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 
 _BUILD_KINDS = frozenset({"buildtool_depend", "build_depend", "depend"})

@@ -9,8 +9,6 @@ from typing import Literal
 from pydantic import Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
@@ -23,6 +21,8 @@ from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.process.blocked_executor import why_slow
 from grader.recording.model import NS, Kind, Message, Recording
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 _BACKLOG_NS = NS
 """What the machine holds up so long before keeps later messages waiting."""

@@ -8,8 +8,6 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from grader.assignment.quantity import Frequency, Ratio
-from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
@@ -21,8 +19,10 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import why_not_called
 from grader.diagnosis.process.process_exit import why_ended
-from grader.nearest import nearest
 from grader.recording.model import NS, Recording
+from grader.spec.nearest_name import nearest
+from grader.spec.quantity import Frequency, Ratio
+from grader.spec.unit import format_duration
 
 Level = Literal["DEBUG", "INFO", "WARN", "ERROR", "FATAL"]
 

@@ -7,9 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from pydantic import Field
 
-from grader.assignment.name import TopicName
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
@@ -20,6 +17,9 @@ from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.no_messages import why_few, why_silent
 from grader.recording.model import NS, Kind, Recording
+from grader.spec.name import TopicName
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 # What varies by fewer tolerances cannot tell one value from another.
 _TELLING = 4.0

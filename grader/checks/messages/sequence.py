@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from grader.assignment.name import TopicName
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment, Table
@@ -16,6 +15,7 @@ from grader.checks.value import NoSuchField, same
 from grader.checks.wording import code, counted, value_text
 from grader.diagnosis.no_messages import why_few, why_silent
 from grader.recording.model import Message, Recording
+from grader.spec.name import TopicName
 
 _SEQUENCE_LIMIT = 2**62
 _SHOWN = 12

@@ -8,8 +8,6 @@ from statistics import median
 
 from pydantic import Field
 
-from grader.assignment.quantity import PositiveLength, Ratio, Speed
-from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
@@ -32,6 +30,8 @@ from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
 from grader.recording.model import NS, Recording, Scene, Truth
+from grader.spec.quantity import PositiveLength, Ratio, Speed
+from grader.spec.unit import format_duration
 
 _LEAST_SHARE = 0.9
 _LEAST_STEPS = 30

@@ -7,8 +7,6 @@ from itertools import pairwise
 
 from pydantic import Field, model_validator
 
-from grader.assignment.quantity import Angle, Duration, PositiveLength, Ratio
-from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
@@ -24,6 +22,8 @@ from grader.diagnosis.motion.missed_goal import why_not_aligned, why_not_there
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
 from grader.diagnosis.motion.off_course import why_off_course, why_unsteered
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import Angle, Duration, PositiveLength, Ratio
+from grader.spec.unit import format_duration
 
 # Who looks at the goal comes nearer by most of what it drives.
 _ASTRAY_RAD = math.radians(45.0)

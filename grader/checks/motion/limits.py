@@ -6,7 +6,6 @@ import math
 
 from pydantic import Field
 
-from grader.assignment.quantity import Ratio
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.motion.command import Command, command_topic, commands
@@ -16,6 +15,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_judged, why_rejected
 from grader.diagnosis.no_messages import why_silent
 from grader.recording.model import Recording, Scene
+from grader.spec.quantity import Ratio
 
 # Limits are written down with three digits.
 _ROUNDING = 1.001

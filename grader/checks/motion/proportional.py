@@ -10,8 +10,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.assignment.quantity import Frequency, PositiveLength, Ratio
-from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.motion.answer import MOST_BEHIND, answers
@@ -29,6 +27,8 @@ from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.diagnosis.no_messages import why_silent
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import Frequency, PositiveLength, Ratio
+from grader.spec.unit import format_duration
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 _MOST_POINTS = 400

@@ -7,7 +7,6 @@ from collections.abc import Collection
 
 from pydantic import Field
 
-from grader.assignment.quantity import Ratio
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.first_seen import first_seen
@@ -18,6 +17,7 @@ from grader.checks.wording import code, counted, percent
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
 from grader.diagnosis.no_messages import why_silent
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import Ratio
 
 # The last one alone may be of a callback that was late.
 _LAST = 5

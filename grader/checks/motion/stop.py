@@ -7,8 +7,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.assignment.quantity import Length, PositiveLength, Speed
-from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.first_seen import until_the_end
@@ -25,6 +23,8 @@ from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import cause_of_death, dead
 from grader.recording.model import NS, Recording, Scene, Truth
+from grader.spec.quantity import Length, PositiveLength, Speed
+from grader.spec.unit import format_duration
 
 _EARLY_HINT = "Which range made it stop? Log the value that the callback compares."
 _LATE_HINT = (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.assignment.quantity import Angle, AngularSpeed
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.motion.measure import degrees, turn
@@ -12,6 +11,7 @@ from grader.checks.motion.track import headings, over_time
 from grader.checks.wording import percent
 from grader.diagnosis.motion.no_motion import why_not_moved
 from grader.recording.model import Recording
+from grader.spec.quantity import Angle, AngularSpeed
 
 
 class Straight(Parameters):

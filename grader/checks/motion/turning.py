@@ -8,7 +8,6 @@ from itertools import pairwise
 
 from pydantic import Field
 
-from grader.assignment.quantity import Angle, PositiveLength, Speed
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.motion.approach import Approach, approach
@@ -21,6 +20,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.recording.model import NS, Recording, Truth
+from grader.spec.quantity import Angle, PositiveLength, Speed
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 # Way that the delay of odometry may still cost after the position is reached: 2 cm of the slowest

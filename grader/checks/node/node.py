@@ -7,8 +7,6 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.check import NoParameters, Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
@@ -26,6 +24,8 @@ from grader.diagnosis.process.process_exit import (
     why_ended,
 )
 from grader.recording.model import NS, Kind, Node, Process, Recording
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 NodeName = Annotated[str, AfterValidator(node_name)]
 

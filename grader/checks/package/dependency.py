@@ -9,7 +9,7 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Table
 from grader.checks.wording import code, codes
 from grader.diagnosis.not_built import existing_package, why_no_manifest, why_too_new
-from grader.nearest import nearest
+from grader.spec.nearest_name import nearest
 from grader.submission.dependencies import meant
 from grader.submission.record import (
     Dependency,

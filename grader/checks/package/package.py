@@ -14,7 +14,7 @@ from grader.checks.finding import Evidence, Finding
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_manifest, why_not_built
-from grader.nearest import nearest
+from grader.spec.nearest_name import nearest
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 
 

@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.node.node_name import node_name
@@ -29,8 +28,9 @@ from grader.diagnosis.no_answer import why_taken, why_unanswered
 from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.no_server import SERVICE, offered
 from grader.diagnosis.process.process_exit import why_ended
-from grader.nearest import nearest
 from grader.recording.model import NS, Call, Recording
+from grader.spec.nearest_name import nearest
+from grader.spec.unit import format_duration
 
 _ANSWER_S = 1.0
 _TOLERANCE = 1e-9

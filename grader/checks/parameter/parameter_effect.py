@@ -10,8 +10,6 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration, Ratio
-from grader.assignment.unit import format_duration
 from grader.checks.check import NamedFields, Subject, check
 from grader.checks.fields import (
     FieldTolerance,
@@ -37,6 +35,8 @@ from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Message, Recording
+from grader.spec.quantity import Duration, Ratio
+from grader.spec.unit import format_duration
 
 _LEAST_PERIODS = 3
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.assignment.unit import format_duration
 from grader.checks.finding import Table
 from grader.recording.model import Qos
+from grader.spec.unit import format_duration
 
 # Weaker first: an offer must not be weaker than the request.
 STRENGTH = {

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
-from grader.assignment.name import Id, TopicName
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
@@ -20,6 +18,8 @@ from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Join, Kind, Message, Recording
+from grader.spec.name import Id, TopicName
+from grader.spec.unit import format_duration
 
 _SHOWN = 50
 _ONE_PUBLISHER_HINT = (

@@ -6,8 +6,6 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from grader.assignment.name import Durability, Id, Reliability, TopicName
-from grader.assignment.quantity import Duration
 from grader.checks import declarations as testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
@@ -17,6 +15,8 @@ from grader.checks.wording import code
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.recording.model import Endpoint, Kind, Qos, Recording
+from grader.spec.name import Durability, Id, Reliability, TopicName
+from grader.spec.quantity import Duration
 
 _DEFAULT = Qos(reliability="reliable", durability="volatile", liveliness="automatic")
 

@@ -11,8 +11,6 @@ import numpy as np
 from pydantic import Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import QuantityOf
-from grader.assignment.unit import Dimension
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
@@ -36,6 +34,8 @@ from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording
+from grader.spec.quantity import QuantityOf
+from grader.spec.unit import Dimension
 
 # An answer takes a callback of some microseconds; a question that was sent later than this
 # before the end may be unanswered.

@@ -9,8 +9,6 @@ from typing import Any, Literal
 from pydantic import Field
 
 from grader.assignment.model import InterfaceName, TopicName
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.fields import (
     FieldTolerance,
@@ -31,6 +29,8 @@ from grader.diagnosis.no_answer import why_one_cpu, why_taken, why_unanswered
 from grader.diagnosis.no_server import SERVICE, is_offered, why_not_met, why_not_offered
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Call, Recording
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 # Of the time that one call takes: two answers so close came from calls that ran side by side,
 # and two so far apart from calls of which one waited for the other.

@@ -13,14 +13,14 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, field_validator
 
 from grader.assignment.model import PackageName
-from grader.assignment.quantity import Ratio
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.source.inheritance import NODE, Family, Found, Kinship
 from grader.checks.wording import code, codes, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
-from grader.nearest import nearest
+from grader.spec.nearest_name import nearest
+from grader.spec.quantity import Ratio
 from grader.submission.code_facts import LintFinding, SourceFile, SourceFunction
 from grader.submission.lint import EXCLUDED
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord

@@ -9,9 +9,6 @@ from statistics import median
 
 from pydantic import Field, model_validator
 
-from grader.assignment.name import TopicName
-from grader.assignment.quantity import Duration
-from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.wording import code, counted
@@ -19,6 +16,9 @@ from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_messages import why_silent
 from grader.recording.model import NS, Message, Recording
+from grader.spec.name import TopicName
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
 
 _MS = 1e3
 

@@ -6,9 +6,6 @@ from itertools import pairwise
 
 from pydantic import Field, model_validator
 
-from grader.assignment.name import TopicName
-from grader.assignment.quantity import Duration, Frequency
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
@@ -18,6 +15,9 @@ from grader.checks.wording import code, counted
 from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Message, Recording
+from grader.spec.name import TopicName
+from grader.spec.quantity import Duration, Frequency
+from grader.spec.unit import format_duration
 
 _SEQUENCE_LIMIT = 2**62
 

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from statistics import mean
 
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.timing.period import Interval, Limits, Verdict, judge
 from grader.diagnosis.process.blocked_executor import long_wait
 from grader.recording.model import Kind, Recording
+from grader.spec.unit import format_duration
 
 _TENS = (10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
 _TENS_TOLERANCE = 0.1

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
-from grader.assignment.unit import format_duration
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.recording.model import NS, Message, Recording
+from grader.spec.unit import format_duration
 
 _RELATIVE = 0.20
 _ABSOLUTE_S = 0.020

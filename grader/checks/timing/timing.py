@@ -5,8 +5,6 @@ from __future__ import annotations
 from pydantic import Field
 
 from grader.assignment.model import TopicName
-from grader.assignment.quantity import Duration, Ratio
-from grader.assignment.unit import format_duration
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.timing.period import (
@@ -26,6 +24,8 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import ENDED_HINT, why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Message, Recording
+from grader.spec.quantity import Duration, Ratio
+from grader.spec.unit import format_duration
 
 _MS = 1e3
 # One message may be late or left out; after so many periods they have stopped.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from grader.assignment.unit import format_duration
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.approach import NO_SPEED_M_S, Approach
@@ -20,6 +19,7 @@ from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.diagnosis.motion.off_course import why_off_course, why_unsteered
 from grader.diagnosis.process.blocked_executor import stuck_callback
 from grader.recording.model import NS, Ending, Truth
+from grader.spec.unit import format_duration
 from sim.motion import wrap_angle
 
 _WEAVES = 4

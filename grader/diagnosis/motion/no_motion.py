@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from grader.assignment.unit import format_duration
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import endpoints_seen, first_seen
 from grader.checks.motion.command import Command, command_topic, commands, is_zero
@@ -19,6 +18,7 @@ from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import cause_of_death, dead, why_ended
 from grader.recording.model import NS, Incident, Kind, Owner, Recording
+from grader.spec.unit import format_duration
 
 _STILL = "the robot never moved"
 _NAN_HINT = (

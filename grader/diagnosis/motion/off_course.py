@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from grader.assignment.unit import format_duration
 from grader.checks.finding import Evidence, Moment
 from grader.checks.motion.command import commands, is_zero
 from grader.checks.motion.contact import why_touched
@@ -10,6 +9,7 @@ from grader.checks.motion.track import speed_plot
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.recording.model import NS, Recording
+from grader.spec.unit import format_duration
 
 # No controller that steers by odometry, or by a timer, waits for so long.
 _UNSTEERED_S = 2.0

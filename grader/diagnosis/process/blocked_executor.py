@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from grader.assignment.unit import format_duration
 from grader.checks import declarations as testimony
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import until_the_end
@@ -12,6 +11,7 @@ from grader.checks.wording import codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.process.raised import interrupted_callback, interrupted_place
 from grader.recording.model import NS, Call, Process, Recording
+from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
 # What had less time for an answer than this may be unanswered for that reason.

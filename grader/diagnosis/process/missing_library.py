@@ -6,8 +6,8 @@ import re
 from collections.abc import Collection
 
 from grader.checks.wording import code, codes
-from grader.nearest import nearest
 from grader.recording.model import Recording
+from grader.spec.nearest_name import nearest
 from grader.submission.record import SubmissionRecord
 from grader.submission.rosdistro import PACKAGES, PYTHON_MODULES
 

@@ -8,8 +8,8 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from grader.assignment.document import Place
-from grader.nearest import did_you_mean, nearest
+from grader.spec.document import Place
+from grader.spec.nearest_name import did_you_mean, nearest
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from grader.assignment.document import Place, parse_yaml, path
-from grader.assignment.mistake import Mistake, mistakes
 from grader.errors import AssignmentError, Problem, UsageError
+from grader.spec.document import Place, parse_yaml, path
+from grader.spec.mistake import Mistake, mistakes
 
 M = TypeVar("M", bound=BaseModel)
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from grader.assignment.unit import (
+from grader.spec.unit import (
     UNITS,
     Dimension,
     parse_quantity,

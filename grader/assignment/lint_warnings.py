@@ -9,15 +9,15 @@ from pydantic import BaseModel
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, Scenario, Visibility
 from grader.assignment.mutant import Mutant
-from grader.assignment.quantity import QuantityOf
 from grader.assignment.stimulus import Join, Publish
-from grader.assignment.unit import Dimension, format_duration
 from grader.checks.messages.messages import Count
 from grader.checks.motion.drive import Drives
 from grader.checks.timing.timing import Period
 from grader.checks.tolerance import TimeTolerance
 from grader.checks.wording import percent
-from grader.nearest import did_you_mean
+from grader.spec.nearest_name import did_you_mean
+from grader.spec.quantity import QuantityOf
+from grader.spec.unit import Dimension, format_duration
 from grader.submission.dependencies import is_known, meant
 
 
