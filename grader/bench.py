@@ -34,19 +34,19 @@ from grader.batch.rendering import render_all
 from grader.grade import grade
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import NS, Recording
-from grader.report.class_row import ClassRow
-from grader.report.facts import Clock, RunFacts
 from grader.report.files import write_whole
-from grader.report.html import render_report
-from grader.report.overview import render_overview
-from grader.report.result import make_result
+from grader.report.html.overview import render_overview
+from grader.report.html.report import render_report
+from grader.report.model.class_row import ClassRow
+from grader.report.model.facts import Clock, RunFacts
+from grader.report.model.result import make_result
 from grader.run.admission import Admission
 from grader.run.domain import lock_domain
 from grader.run.load import cpu_count
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
-from grader.submission.build_cache import BUILDS
+from grader.submission.build.build_cache import BUILDS
 from grader.submission.prepare import Prepared, prepare
 
 ASSIGNMENT = "timed_publisher"

@@ -91,7 +91,7 @@ def _program(name: str, command: str, purpose: str, package: str) -> Part:
 
 
 def _headers() -> Part:
-    from grader.submission.toolchain import has_headers, headers_package
+    from grader.submission.build.toolchain import has_headers, headers_package
 
     include = sysconfig.get_path("include")
     remedy = f"sudo apt install {headers_package()} (for packages with own interfaces)"

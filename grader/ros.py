@@ -30,7 +30,7 @@ class RosInstallation:
         prefixes: ament prefixes, the first wins.
         inherited: Variables that a sourced installation needs, taken from the environment.
         underlays: Install spaces of ours (merged layout) with packages that it lacks; see
-            :mod:`grader.submission.underlay`.
+            :mod:`grader.submission.build.underlay`.
     """
 
     source: str

@@ -11,10 +11,10 @@ from grader.assignment.model import Package
 from grader.assignment.mutation import MUTANTS_FILE, REFERENCE_FOLDER
 from grader.errors import UsageError
 from grader.report.files import write_folders
-from grader.report.handout import HANDOUT_FILE
+from grader.report.html.handout import HANDOUT_FILE
 from grader.spec.name import check_id
 from grader.starter import package_files, programs, rendered
-from grader.submission.rosdistro import PACKAGES
+from grader.submission.read.rosdistro import PACKAGES
 
 
 def write_assignment(name: str, folder: Path) -> Path:

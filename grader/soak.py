@@ -1,7 +1,7 @@
 """``make soak``: grade the same submissions again and again on a loaded machine.
 
 Without ``N``, a class of 200, references and mutants in random order, while processes load
-every CPU in bursts: each grade (see :mod:`grader.report.grade_part`) is compared with the one
+every CPU in bursts: each grade (see :mod:`grader.report.model.grade_part`) is compared with the one
 that the same submission got alone on the machine before. With ``N``, both publisher references
 and five mutants ``N`` times each while every CPU is busy all the time: each verdict is compared
 with the one that the submission must get.
@@ -27,7 +27,7 @@ from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.assignment.mutation import reference_of
 from grader.batch.grading import Grading
 from grader.batch.selftest import REFERENCE, Role, Trial, TrialResult, run_trial, trials
-from grader.report.grade_part import differences
+from grader.report.model.grade_part import differences
 from grader.resources import cache_folder
 from grader.run.admission import Admission
 from grader.run.load import cpu_count

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 
 from grader.errors import GraderFault
-from grader.submission.toolchain import check_toolchain, has_headers, headers_package
+from grader.submission.build.toolchain import check_toolchain, has_headers, headers_package
 
 # How long an example takes says something about the machine, not about the code.
 # The same examples in every run: a test that fails now and then says nothing of a change. To look

@@ -23,7 +23,7 @@ from grader.errors import GraderFault, Problem
 from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.unit import format_duration
-from grader.submission.lint import find_ruff, known_rules
+from grader.submission.read.lint import find_ruff, known_rules
 
 _GET_STATE = "/get_state"
 

@@ -17,7 +17,7 @@ from grader.spec.document import Place
 from grader.spec.name import INTERFACE
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.source import Source
-from grader.submission.rosdistro import PACKAGES
+from grader.submission.read.rosdistro import PACKAGES
 
 FOLDER = "interfaces"
 """Beside ``assignment.yaml``: our copy of the interface packages that the student writes."""

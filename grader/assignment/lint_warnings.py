@@ -18,7 +18,7 @@ from grader.checks.wording import percent
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.quantity import QuantityOf
 from grader.spec.unit import Dimension, format_duration
-from grader.submission.dependencies import is_known, meant
+from grader.submission.read.dependencies import is_known, meant
 
 
 def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterator[str]:

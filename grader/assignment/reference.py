@@ -11,8 +11,8 @@ from grader.assignment.mutation import reference_of
 from grader.errors import Problem, UsageError
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.source import read_source
-from grader.submission.entrypoints import read_setup
-from grader.submission.manifest import MANIFEST, read_manifest
+from grader.submission.read.entrypoints import read_setup
+from grader.submission.read.manifest import MANIFEST, read_manifest
 
 
 def reference_problems(loaded: LoadedAssignment) -> Iterator[Problem]:

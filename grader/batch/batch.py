@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
-from grader.batch.crew import Crew, CrewLost
+from grader.batch.executor import Crew, CrewLost
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.intake import HandedIn
@@ -19,13 +19,13 @@ from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
 from grader.recording.fact import to_json
-from grader.report.facts import Clock
 from grader.report.files import write_whole
-from grader.report.grade_part import grade_json
-from grader.report.result_model import Result
+from grader.report.model.facts import Clock
+from grader.report.model.grade_part import grade_json
+from grader.report.model.result_model import Result
 from grader.spec.nearest_name import did_you_mean
-from grader.submission.locate import NO_FILES
-from grader.submission.paths import shown
+from grader.submission.intake.locate import NO_FILES
+from grader.submission.intake.paths import shown
 from grader.submission.prepare import fingerprint
 
 FAULTS_FILE = "faults.log"

@@ -12,12 +12,12 @@ from grader.batch.files import REPORT_FILE
 from grader.batch.ledger import Entry, Ledger
 from grader.checks.finding import Status
 from grader.checks.wording import listing
-from grader.report.class_row import ClassRow
-from grader.report.clean import one_line
 from grader.report.files import write_whole
-from grader.report.gradebook import grades_csv
-from grader.report.overview import render_overview
-from grader.report.result_model import Result
+from grader.report.formats.gradebook import grades_csv
+from grader.report.html.overview import render_overview
+from grader.report.model.class_row import ClassRow
+from grader.report.model.result_model import Result
+from grader.report.text.clean import one_line
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"

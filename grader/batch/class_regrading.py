@@ -13,8 +13,8 @@ from grader.batch.files import RESULT_FILE, write_graded
 from grader.batch.ledger import Entry, Ledger, keep_earlier
 from grader.batch.regrading import compare, find, refuse_other, regrade
 from grader.errors import RosgradeError
-from grader.report.facts import Clock
-from grader.report.result_model import Result
+from grader.report.model.facts import Clock
+from grader.report.model.result_model import Result
 
 
 @dataclass(frozen=True)

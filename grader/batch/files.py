@@ -10,13 +10,13 @@ from pathlib import Path
 from grader import __version__
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.errors import UsageError
-from grader.report.facts import Clock, RunFacts
 from grader.report.files import write_whole
-from grader.report.foxglove import LAYOUT_FILE, render_layout
-from grader.report.html import render_report
-from grader.report.result import write_result
-from grader.report.result_model import Result
-from grader.report.student import grade_for_student
+from grader.report.formats.foxglove import LAYOUT_FILE, render_layout
+from grader.report.html.report import render_report
+from grader.report.model.facts import Clock, RunFacts
+from grader.report.model.result import write_result
+from grader.report.model.result_model import Result
+from grader.report.model.student import grade_for_student
 
 REPORT_FILE = "report.html"
 STUDENT_FILE = "student-report.html"

@@ -21,12 +21,12 @@ from grader.recording.fact import to_json
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
 from grader.report.files import write_whole
-from grader.report.replay import Replay
+from grader.report.html.replay import Replay
 from grader.run.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
-from grader.submission.bounded import OutputLimits
-from grader.submission.build_limits import BuildLimits
+from grader.submission.build.bounded import OutputLimits
+from grader.submission.build.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
 from grader.tree import listing
 

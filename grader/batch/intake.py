@@ -18,10 +18,10 @@ import yaml
 from grader.batch.roster import Roster, Student, name_forms, resemblance, written
 from grader.checks.wording import listing
 from grader.errors import GraderFault, RosgradeError, SubmissionError, UsageError
-from grader.submission.archive import SUFFIXES, unpack
-from grader.submission.manifest import MANIFEST
-from grader.submission.members import MIB, ArchiveLimits
-from grader.submission.paths import shown
+from grader.submission.intake.archive import SUFFIXES, unpack
+from grader.submission.intake.members import MIB, ArchiveLimits
+from grader.submission.intake.paths import shown
+from grader.submission.read.manifest import MANIFEST
 
 GRADESCOPE_METADATA = "submission_metadata.yml"
 # How Canvas names what it lets a teacher download: name, perhaps LATE, user, attachment, file.

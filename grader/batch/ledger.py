@@ -21,8 +21,8 @@ from urllib.parse import quote
 from grader.batch.files import RESULT_FILE
 from grader.errors import RosgradeError, UsageError, machine_fault
 from grader.report.files import check_folder, write_whole
-from grader.report.result import read_result
-from grader.report.result_model import Result
+from grader.report.model.result import read_result
+from grader.report.model.result_model import Result
 
 BATCH_FILE = "batch.json"
 SUBMISSIONS = "submissions"

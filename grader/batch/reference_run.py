@@ -24,7 +24,7 @@ from grader.errors import AssignmentError, Problem, UsageError
 from grader.grade import Grade
 from grader.recording.model import Recording
 from grader.report.files import write_whole
-from grader.report.replay import Replay, make_replay
+from grader.report.html.replay import Replay, make_replay
 
 REFERENCE_FILE = "reference.json.gz"
 SCHEMA = 1

@@ -18,8 +18,8 @@ from grader.errors import UsageError
 from grader.grade import Grade, grade
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
-from grader.report.result import read_result
-from grader.report.result_model import Result
+from grader.report.model.result import read_result
+from grader.report.model.result_model import Result
 from grader.submission.prepare import Prepared
 from grader.submission.record import SubmissionRecord
 from grader.submission.record_json import read_record

@@ -17,10 +17,10 @@ from grader.batch.ledger import BATCH_FILE, Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command, stored_assignment
 from grader.errors import UsageError
 from grader.grade import Grade
-from grader.report.class_row import ClassRow
-from grader.report.facts import RunFacts
-from grader.report.result import read_result
-from grader.report.result_model import Result
+from grader.report.model.class_row import ClassRow
+from grader.report.model.facts import RunFacts
+from grader.report.model.result import read_result
+from grader.report.model.result_model import Result
 from grader.run.load import cpu_count
 
 _MANY = 8

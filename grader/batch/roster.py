@@ -13,7 +13,7 @@ from pathlib import Path
 
 from grader.checks.wording import listing
 from grader.errors import UsageError
-from grader.submission.paths import shown
+from grader.submission.intake.paths import shown
 
 _MOST_BYTES = 16 * 2**20
 # Column headers, as Canvas, Gradescope, GitHub Classroom and people write them.

@@ -27,10 +27,10 @@ from grader.assignment.mutation import apply, load_mutants
 from grader.batch.grading import Graded, Grading
 from grader.checks.finding import Status
 from grader.grade.model import Grade
-from grader.report.facts import RunFacts
-from grader.report.grade_part import grade_json
-from grader.report.result import make_result
-from grader.report.words import counted_points, number
+from grader.report.model.facts import RunFacts
+from grader.report.model.grade_part import grade_json
+from grader.report.model.result import make_result
+from grader.report.text.words import counted_points, number
 from grader.scratch import Scratch
 from grader.spec.unit import format_duration
 from grader.starter import write_starter
@@ -77,7 +77,7 @@ class TrialResult:
         lost: Ids of the checks that failed.
         graded: Whether all could be judged.
         repeated: Whether a scenario was run more than once.
-        grade: As :func:`grader.report.grade_part.grade_json` writes it.
+        grade: As :func:`grader.report.model.grade_part.grade_json` writes it.
         told: What the checks said that ended otherwise than they must.
     """
 

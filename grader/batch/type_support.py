@@ -10,8 +10,8 @@ from pathlib import Path
 from grader.assignment.interfaces import FOLDER
 from grader.assignment.load import LoadedAssignment
 from grader.ros import RosInstallation
-from grader.submission.build_cache import BuildCache
-from grader.submission.underlay import completed, install_prefix
+from grader.submission.build.build_cache import BuildCache
+from grader.submission.build.underlay import completed, install_prefix
 from grader.tree import listing
 
 _WORD = re.compile(r"\w+")

@@ -14,7 +14,7 @@ from watchfiles import Change, watch
 from grader.assignment.load import folder_sha256
 from grader.batch.grading import Graded
 from grader.errors import GraderFault, RosgradeError
-from grader.submission.leftovers import is_left_out
+from grader.submission.intake.leftovers import is_left_out
 from grader.submission.prepare import fingerprint
 
 _SETTLED_MS = 50

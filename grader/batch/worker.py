@@ -16,7 +16,7 @@ from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, Graded, Grading
 from grader.errors import GraderFault, SubmissionError
-from grader.report.facts import Clock
+from grader.report.model.facts import Clock
 from grader.resources import cache_folder
 from grader.run.admission import Admission
 from grader.run.runner import Runner
@@ -24,7 +24,7 @@ from grader.sandbox.choice import Choice
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import choose
 from grader.scratch import Scratch
-from grader.submission.locate import opened
+from grader.submission.intake.locate import opened
 from grader.submission.prepare import Prepared, refused
 
 

@@ -32,10 +32,10 @@ def while_it_starts(narrate: Narrate) -> Narrate:
 
 
 def _get_ready() -> None:
-    for module in ("grader.batch.files", "grader.report.terminal"):
+    for module in ("grader.batch.files", "grader.report.text.terminal"):
         import_module(module)
     from grader.recording import mcap_reader
-    from grader.report import html
+    from grader.report.html import report as html
 
     mcap_reader.get_ready()
     html.environment()

@@ -44,7 +44,7 @@ def show(
     from grader.assignment.load import load_assignment
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs, write_whole
-    from grader.report.handout import Handout, make_handout, render_handout
+    from grader.report.html.handout import Handout, make_handout, render_handout
 
     if out is not None and not html:
         raise UsageError("--out is for the page: add --html")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from grader.batch.batch import Done
-    from grader.batch.crew import Crew
+    from grader.batch.executor import Crew
     from grader.batch.intake import HandedIn
     from grader.batch.roster import Roster
 
@@ -69,7 +69,7 @@ def batch(
     from grader.assignment.load import load_assignment, refuse_swapped
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
-    from grader.batch.crew import CrewLost, DaskCrew, LocalCrew
+    from grader.batch.executor import CrewLost, DaskCrew, LocalCrew
     from grader.batch.ledger import Ledger
     from grader.batch.worker import Order, make_grading
     from grader.report.files import check_folder, refuse_inputs, refuse_part
@@ -228,7 +228,7 @@ def _said(done: Done) -> str:
 def _summary(done: Sequence[Done], wall_s: float) -> str:
     """The class in one line."""
     from grader.batch.class_files import class_rows, copies
-    from grader.report.class_row import RowStatus
+    from grader.report.model.class_row import RowStatus
 
     rows = class_rows(done)
     scores = [row.score for row in rows if row.score is not None]

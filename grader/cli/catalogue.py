@@ -68,7 +68,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of a file, for editors."""
     from grader.assignment.schema import assignment_schema, mutants_schema
-    from grader.report.result import result_schema
+    from grader.report.model.result import result_schema
 
     make = {
         Document.ASSIGNMENT: assignment_schema,

@@ -74,8 +74,8 @@ def check(
     Ends with 0 for full points, 1 if points were lost, 3 if it could not be graded.
     """
     from grader import ros
-    from grader.report.facts import Clock
     from grader.report.files import refuse_inputs
+    from grader.report.model.facts import Clock
     from grader.run.runner import Runner
 
     clock = Clock()
@@ -103,7 +103,7 @@ def check(
             from grader.batch.files import refuse_foreign
             from grader.batch.grading import RECORDINGS_FOLDER, Grading
             from grader.report.files import check_folder
-            from grader.submission.locate import check_path
+            from grader.submission.intake.locate import check_path
 
             refuse_swapped(assignment, submission)
             whole = load_assignment(assignment)
@@ -121,7 +121,7 @@ def check(
                     on_output=partial(progress.output, "build"),
                 )
             from grader.batch.files import keep_install, write_graded
-            from grader.report.terminal import print_grade
+            from grader.report.text.terminal import print_grade
 
         except KeyboardInterrupt:
             progress.say("interrupted: what still runs is ended, and no report is written")

@@ -12,7 +12,7 @@ from grader.cli.console import output_console, print_error, print_warning
 from grader.cli.options import AssignmentName
 
 if TYPE_CHECKING:
-    from grader.report.class_row import RowStatus
+    from grader.report.model.class_row import RowStatus
 
 Assignment = AssignmentName
 Folder = Annotated[Path, typer.Option("--out", help="Where to.")]
@@ -86,7 +86,7 @@ def csv(out: Results, output: File = Path("grades.csv"), zero: ZeroFor = None) -
     """
     from grader.batch.rendering import read_class
     from grader.report.files import refuse_inputs, write_whole
-    from grader.report.gradebook import grades_csv
+    from grader.report.formats.gradebook import grades_csv
 
     refuse_inputs([output], _read_of(out))
     rows = read_class(out)
@@ -115,7 +115,7 @@ def canvas(
     from grader.batch.rendering import read_class
     from grader.errors import UsageError
     from grader.report.files import refuse_inputs, write_whole
-    from grader.report.gradebook import canvas_csv, read_canvas
+    from grader.report.formats.gradebook import canvas_csv, read_canvas
 
     refuse_inputs([output], [canvas, *_read_of(out)])
     try:
@@ -146,7 +146,7 @@ def _read_of(out: Path) -> list[Path]:
 
 
 def _statuses(zero: list[Zero] | None) -> set[RowStatus]:
-    from grader.report.class_row import RowStatus
+    from grader.report.model.class_row import RowStatus
 
     return {RowStatus(one.value) for one in zero or ()}
 

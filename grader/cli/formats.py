@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from grader.report.result_model import Result
+    from grader.report.model.result_model import Result
 
 
 class JunitFamily(str, Enum):
@@ -89,18 +89,18 @@ class Formats:
         """
         # Each is imported only where it is asked for: together they take 0.2 s.
         if self.classroom50:
-            from grader.report import classroom50
+            from grader.report.formats import classroom50
 
             classroom50.identity(os.environ)
         if self.gradescope is not None:
-            from grader.report import gradescope
             from grader.report.files import write_whole
+            from grader.report.formats import gradescope
 
             write_whole(self.gradescope, gradescope.unfinished())
         if not self.github:
             yield
             return
-        from grader.report import github
+        from grader.report.formats import github
 
         token = secrets.token_hex(16)
         print(github.stop_commands(token), flush=True)
@@ -122,17 +122,17 @@ class Formats:
         from grader.report.files import write_whole
 
         if self.junit is not None:
-            from grader.report.junit import render_junit
+            from grader.report.formats.junit import render_junit
 
             xunit1 = self.junit_family is JunitFamily.XUNIT1
             write_whole(self.junit, render_junit(result, xunit1=xunit1))
         if self.markdown is not None:
-            from grader.report.markdown import COMMENT_BYTES, render_markdown
-            from grader.report.student import for_student
+            from grader.report.formats.markdown import COMMENT_BYTES, render_markdown
+            from grader.report.model.student import for_student
 
             write_whole(self.markdown, render_markdown(for_student(result), COMMENT_BYTES))
         if self.gradescope is not None:
-            from grader.report.gradescope import render_gradescope
+            from grader.report.formats.gradescope import render_gradescope
 
             metadata = _metadata(self.gradescope_metadata)
             write_whole(self.gradescope, render_gradescope(result, metadata))
@@ -143,13 +143,13 @@ class Formats:
 
 
 def _metadata(file: Path | None) -> Mapping[str, Any] | None:
-    from grader.report.gradescope import read_metadata
+    from grader.report.formats.gradescope import read_metadata
 
     return read_metadata(file) if file is not None else None
 
 
 def _tell_github(result: Result, submission: Path | None, environment: Mapping[str, str]) -> None:
-    from grader.report import github
+    from grader.report.formats import github
 
     prefix = _prefix(submission, Path(environment.get("GITHUB_WORKSPACE") or "."))
     for line in github.annotation_lines(result, prefix):
@@ -184,8 +184,8 @@ def _append(file: Path, text: str) -> None:
 
 
 def _write_classroom50(result: Result, folder: Path) -> None:
-    from grader.report import classroom50
     from grader.report.files import write_whole
+    from grader.report.formats import classroom50
 
     who = classroom50.identity(os.environ)
     text = classroom50.render_result(result, who, _committed(folder))

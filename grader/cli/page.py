@@ -167,8 +167,8 @@ class _Handler(BaseHTTPRequestHandler):
 def _outer_page() -> bytes:
     from markupsafe import Markup
 
-    from grader.report.html import asset, environment
-    from grader.report.policy import content_security_policy
+    from grader.report.html.policy import content_security_policy
+    from grader.report.html.report import asset, environment
 
     style, script = asset("watch.css"), asset("watch.js")
     policy = content_security_policy(style, script)

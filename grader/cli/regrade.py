@@ -55,8 +55,8 @@ def _one(path: Path, assignment: str | None) -> None:
     from grader.batch.ledger import Ledger
     from grader.batch.regrading import compare, find, refuse_other, stored_assignment
     from grader.batch.regrading import regrade as judge_again
-    from grader.report.facts import Clock
-    from grader.report.terminal import print_grade
+    from grader.report.model.facts import Clock
+    from grader.report.text.terminal import print_grade
 
     found = find(path)
     batch = Ledger.around(found.folder) if found.result is not None else None

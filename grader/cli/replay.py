@@ -40,7 +40,7 @@ def replay(
     from grader.grade.unrun import why_not_run
     from grader.recording.mcap_reader import read_recording
     from grader.run.replay import make_order, play
-    from grader.submission.locate import check_path
+    from grader.submission.intake.locate import check_path
     from grader.submission.prepare import prepare
 
     recorded = read_recording(recording)

@@ -77,7 +77,7 @@ def watch(
     from grader.errors import UsageError
     from grader.report.files import check_folder, refuse_inputs
     from grader.run.runner import Runner
-    from grader.submission.locate import check_path
+    from grader.submission.intake.locate import check_path
 
     def load() -> LoadedAssignment:
         whole = load_assignment(assignment)
@@ -167,9 +167,9 @@ class _Work:
 def _follow(work: _Work, page: ReportPage, console: Console) -> None:
     from grader.batch.files import write_graded
     from grader.batch.watching import Began, Cancelled, Watching
-    from grader.report.facts import Clock
-    from grader.report.terminal import print_changes, print_grade
-    from grader.report.words import number
+    from grader.report.model.facts import Clock
+    from grader.report.text.terminal import print_changes, print_grade
+    from grader.report.text.words import number
 
     before: Grade | None = None
     clock = Clock()

@@ -9,10 +9,10 @@ from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.spec.nearest_name import nearest
-from grader.submission.buildlog import modules_not_found, not_found
-from grader.submission.paths import is_within
+from grader.submission.build.build_log import modules_not_found, not_found
+from grader.submission.build.toolchain import TOOLS
+from grader.submission.intake.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
-from grader.submission.toolchain import TOOLS
 
 _LOG_LINES = 15
 _SIDE_BY_SIDE = " A package that lies inside another one is not found: put them side by side."

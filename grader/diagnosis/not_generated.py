@@ -14,7 +14,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
 from grader.recording.interface import PRIMITIVES, DefinitionError, sections_of
 from grader.spec.nearest_name import nearest
-from grader.submission.cmake import Command, read_commands
+from grader.submission.read.cmake import Command, read_commands
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 
 CMAKE = "CMakeLists.txt"

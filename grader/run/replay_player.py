@@ -29,7 +29,7 @@ from grader.recording.inputs import read_inputs
 from grader.recording.mcap_reader import read_recording
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import NS
-from grader.report.clean import clean, one_line
+from grader.report.text.clean import clean, one_line
 from grader.run.descendants import become_subreaper, kill_descendants
 from grader.run.domain import lock_domain
 from grader.run.probe import import_interface, qos_profile

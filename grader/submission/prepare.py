@@ -13,21 +13,21 @@ from typing import TYPE_CHECKING
 
 from grader.errors import SubmissionError
 from grader.ros import RosInstallation
-from grader.submission import source
-from grader.submission.apart import built_apart
-from grader.submission.archive import SUFFIXES
-from grader.submission.build import build, once_more
-from grader.submission.build_cache import BuildCache, CacheLimits
-from grader.submission.build_limits import BuildLimits
-from grader.submission.culprit import Sources
-from grader.submission.installed import inspect
-from grader.submission.locate import Located, check_path, opened, submission_id
-from grader.submission.manifest import MANIFEST
-from grader.submission.members import MIB, ArchiveLimits
-from grader.submission.package import Package, read_package, record_packages
-from grader.submission.paths import join, shown
+from grader.submission.build.build import build, once_more
+from grader.submission.build.build_cache import BuildCache, CacheLimits
+from grader.submission.build.build_error_location import Sources
+from grader.submission.build.build_limits import BuildLimits
+from grader.submission.build.installed import inspect
+from grader.submission.build.standalone_build import built_apart
+from grader.submission.build.underlay import completed
+from grader.submission.intake.archive import SUFFIXES
+from grader.submission.intake.locate import Located, check_path, opened, submission_id
+from grader.submission.intake.members import MIB, ArchiveLimits
+from grader.submission.intake.paths import join, shown
+from grader.submission.read import source
+from grader.submission.read.manifest import MANIFEST
+from grader.submission.read.package import Package, read_package, record_packages
 from grader.submission.record import SubmissionRecord
-from grader.submission.underlay import completed
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.submission.code_facts import Lint, SourceFile
+from grader.submission.read.code_facts import Lint, SourceFile
 
 
 @dataclass(frozen=True)

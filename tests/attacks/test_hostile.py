@@ -18,15 +18,15 @@ import pytest
 from grader import ros
 from grader.assignment.load import load_assignment
 from grader.batch.batch import Batch, Done
-from grader.batch.crew import LocalCrew
+from grader.batch.executor import LocalCrew
 from grader.batch.files import REPORT_FILE
 from grader.batch.grading import Grading
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
 from grader.checks.finding import Status
-from grader.report.grade_part import grade_json
-from grader.report.result import result_json
-from grader.report.result_model import Result
+from grader.report.model.grade_part import grade_json
+from grader.report.model.result import result_json
+from grader.report.model.result_model import Result
 from grader.run.descendants import descendants
 from grader.run.runner import Runner
 from grader.sandbox.sandbox import Sandbox

@@ -21,7 +21,7 @@ from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import NOT_YET, Batch, Done
 from grader.batch.class_files import class_rows, copies, notes
-from grader.batch.crew import Crew, CrewLost, LocalCrew
+from grader.batch.executor import Crew, CrewLost, LocalCrew
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.intake import HandedIn, take_in
@@ -30,7 +30,7 @@ from grader.batch.rendering import find_reports
 from grader.batch.roster import parse_roster
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
-from grader.report.result import make_result
+from grader.report.model.result import make_result
 from grader.run.runner import Runner
 from tests.report.sample import not_graded
 

@@ -16,12 +16,12 @@ import pytest
 from grader import resources
 from grader.assignment.load import load_assignment
 from grader.batch.batch import Batch, Done
-from grader.batch.crew import Crew, CrewLost, DaskCrew, LocalCrew
+from grader.batch.executor import Crew, CrewLost, DaskCrew, LocalCrew
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
 from grader.batch.worker import Order, make_grading
 from grader.errors import UsageError
-from grader.report.grade_part import grade_json
+from grader.report.model.grade_part import grade_json
 from grader.sandbox.choice import Choice
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow]
@@ -147,8 +147,8 @@ def judged(done: Done) -> tuple[str, str, str | None]:
 def test_what_is_no_scheduler_is_not_waited_for(
     words: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("grader.batch.crew._CONNECT_S", 1)
-    monkeypatch.setattr("grader.batch.crew._ANSWER_S", 2.0)
+    monkeypatch.setattr("grader.batch.executor._CONNECT_S", 1)
+    monkeypatch.setattr("grader.batch.executor._ANSWER_S", 2.0)
     over = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as server:
 

@@ -28,9 +28,9 @@ from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
 from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Disturbance, Ending, Endpoint, Kind, Node, Owner, Qos, Recording
-from grader.report.facts import Clock
+from grader.report.model.facts import Clock
 from grader.run.runner import Runner
-from grader.submission.build_limits import BuildLimits
+from grader.submission.build.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 

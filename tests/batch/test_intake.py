@@ -13,7 +13,7 @@ import pytest
 from grader.batch.intake import take_in, take_in_roster
 from grader.batch.roster import Roster, Student, parse_roster, read_roster
 from grader.errors import UsageError
-from grader.submission.manifest import MANIFEST
+from grader.submission.read.manifest import MANIFEST
 
 
 def folder(path: Path) -> Path:

@@ -13,7 +13,7 @@ import pytest
 
 from grader.batch.worker import Parcel, pack, unpack
 from grader.errors import GraderFault
-from grader.submission.locate import opened
+from grader.submission.intake.locate import opened
 from grader.submission.prepare import fingerprint
 
 

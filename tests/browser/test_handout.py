@@ -10,8 +10,8 @@ from playwright.sync_api import Browser, expect
 
 from grader.assignment.load import load_assignment
 from grader.cli.page import ReportPage
-from grader.report.handout import make_handout, render_handout
-from grader.report.html import render_report
+from grader.report.html.handout import make_handout, render_handout
+from grader.report.html.report import render_report
 from tests.report.sample import full_points, lost_points
 
 pytestmark = pytest.mark.slow

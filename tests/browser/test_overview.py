@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.report.overview import render_overview
+from grader.report.html.overview import render_overview
 from tests.browser.test_report import violations
 from tests.report.classroom import classroom
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from grader.report.html import render_report
+from grader.report.html.report import render_report
 from tests.report.gallery import gallery, reference
 from tests.report.sample import everywhere, lost_points, not_built, not_graded
 

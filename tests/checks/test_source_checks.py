@@ -5,8 +5,8 @@ import ast
 import pytest
 
 from grader.checks.finding import Status
-from grader.submission.code_facts import Lint, LintFinding
-from grader.submission.outline import outline
+from grader.submission.read.code_facts import Lint, LintFinding
+from grader.submission.read.outline import outline
 from grader.submission.record import SourceError
 from tests.checks.builder import failing, judge, package, submission
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from mcap.reader import make_reader
 
-from grader.report.result import make_result, result_json
+from grader.report.model.result import make_result, result_json
 from tests.cli.conftest import ROOT, Rosgrade
 from tests.report.sample import full_points, lost_points, not_graded
 

@@ -18,7 +18,7 @@ from grader.batch.ledger import Entry, Ledger
 from grader.grade import grade
 from grader.recording.fact import to_json
 from grader.recording.mcap_writer import write_recording
-from grader.report.facts import Clock
+from grader.report.model.facts import Clock
 from grader.submission.prepare import Prepared
 from grader.submission.record import SubmissionRecord
 from tests.batch.test_grading import recording

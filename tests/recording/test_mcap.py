@@ -36,7 +36,7 @@ from grader.recording.model import (
     Truth,
     Wait,
 )
-from grader.submission.code_facts import (
+from grader.submission.read.code_facts import (
     Lint,
     LintFinding,
     SourceClass,

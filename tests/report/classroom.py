@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
-from grader.report.class_row import ClassRow
-from grader.report.result import make_result
-from grader.report.result_model import Result
+from grader.report.model.class_row import ClassRow
+from grader.report.model.result import make_result
+from grader.report.model.result_model import Result
 from tests.report.sample import full_points, lost_points, not_built, not_graded
 
 

@@ -9,7 +9,7 @@ from grader.checks.finding import Case, Cases, Comparison, Evidence, Finding, Mo
 from grader.checks.motion.track import speed_plot
 from grader.grade import grade
 from grader.recording.model import Breach, Recording
-from grader.report.replay import Replay, make_replay
+from grader.report.html.replay import Replay, make_replay
 from tests.checks.builder import drive, endpoint, on_scan, output, reader
 from tests.grade.sample import Told, make_loaded, make_submission
 from tests.report.sample import PERIOD, Sample, at, make_facts, make_run

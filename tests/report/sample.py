@@ -19,7 +19,7 @@ from grader.recording.model import (
     Process,
     Recording,
 )
-from grader.report.facts import RunFacts
+from grader.report.model.facts import RunFacts
 from grader.submission.record import BuildRecord, SourceError
 from tests.grade.sample import (
     LAUNCHED_NS,

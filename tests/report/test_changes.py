@@ -7,8 +7,8 @@ from rich.console import Console
 
 from grader.checks.finding import Finding
 from grader.grade import grade
-from grader.report.changes import changes
-from grader.report.terminal import print_changes
+from grader.report.model.changes import changes
+from grader.report.text.terminal import print_changes
 from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
 
 OTHER = Finding.failed("a node /bot_publisher", "a node /bot", "Look at super().__init__().")

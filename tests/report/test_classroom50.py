@@ -9,8 +9,8 @@ import pytest
 from grader.checks.finding import Finding
 from grader.errors import GraderFault, UsageError
 from grader.grade import grade
-from grader.report.classroom50 import identity, render_release, render_result, whole_factor
-from grader.report.result import make_result
+from grader.report.formats.classroom50 import identity, render_release, render_result, whole_factor
+from grader.report.model.result import make_result
 from tests.assignment.validator import valid
 from tests.grade.sample import Told, make_loaded, make_submission
 from tests.report.sample import (

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from jinja2 import DictLoader, Environment
 
-from grader.report.compiled import CompiledTemplates
+from grader.report.html.compiled import CompiledTemplates
 
 
 def rendered(folder: Path, source: str) -> str:

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from grader.checks.finding import Moment, Plot
 from grader.recording.model import Call, Declaration, Ending, Message, Process
-from grader.report.flags import Flag, place
-from grader.report.plot import draw_plot
-from grader.report.svg import NARROW, WIDE, Scale, fitted, ticks
-from grader.report.timeline import draw_timeline
+from grader.report.drawing.flags import Flag, place
+from grader.report.drawing.plot import draw_plot
+from grader.report.drawing.svg import NARROW, WIDE, Scale, fitted, ticks
+from grader.report.drawing.timeline import draw_timeline
 from tests.report.sample import PROCESS, at, make_run
 
 

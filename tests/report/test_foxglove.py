@@ -8,7 +8,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from grader.report.foxglove import render_layout
+from grader.report.formats.foxglove import render_layout
 from tests.recording.written import write_robot_run
 
 

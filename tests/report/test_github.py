@@ -8,8 +8,8 @@ import pytest
 
 from grader.checks.finding import Evidence, Finding
 from grader.grade import grade
-from grader.report import github
-from grader.report.result import make_result
+from grader.report.formats import github
+from grader.report.model.result import make_result
 from grader.submission.record import SourceError
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.sample import (

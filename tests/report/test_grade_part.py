@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from grader.report.grade_part import GRADE, differences, grade_json
-from grader.report.result import make_result
-from grader.report.result_model import CheckPart, Result
+from grader.report.model.grade_part import GRADE, differences, grade_json
+from grader.report.model.result import make_result
+from grader.report.model.result_model import CheckPart, Result
 from tests.report.sample import lost_points
 
 MEASURED = {

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from grader.errors import UsageError
 from grader.grade import grade
-from grader.report.class_row import ClassRow, RowStatus
-from grader.report.gradebook import canvas_csv, cell, grades_csv, read_canvas
-from grader.report.result import make_result
+from grader.report.formats.gradebook import canvas_csv, cell, grades_csv, read_canvas
+from grader.report.model.class_row import ClassRow, RowStatus
+from grader.report.model.result import make_result
 from tests.grade.sample import Told, make_loaded, make_recording, make_submission
 from tests.report.sample import full_points, lost_points, make_facts, not_graded
 

@@ -11,8 +11,8 @@ from grader.checks.finding import Finding
 from grader.errors import UsageError
 from grader.grade import grade
 from grader.recording.model import Breach
-from grader.report.gradescope import late_s, read_metadata, render_gradescope, unfinished
-from grader.report.result import make_result
+from grader.report.formats.gradescope import late_s, read_metadata, render_gradescope, unfinished
+from grader.report.model.result import make_result
 from tests.assignment.validator import valid
 from tests.grade.sample import Told, make_loaded, make_submission
 from tests.report.sample import (

@@ -7,7 +7,7 @@ import pytest
 
 from grader.assignment.load import list_assignments, load_assignment
 from grader.errors import UsageError
-from grader.report.handout import make_handout, render_handout
+from grader.report.html.handout import make_handout, render_handout
 from tests.grade.sample import Told, make_loaded
 from tests.report.page import Page
 

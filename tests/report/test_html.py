@@ -13,7 +13,7 @@ from grader import resources
 from grader.checks.finding import Finding
 from grader.grade import grade
 from grader.recording.model import Breach, LogLine
-from grader.report.html import render_report
+from grader.report.html.report import render_report
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.page import Page
 from tests.report.sample import (
@@ -261,7 +261,8 @@ def test_text_that_cannot_be_encoded_is_still_a_file(tmp_path):
 
 def test_commands_that_write_no_report_do_not_load_jinja2():
     code = (
-        "import sys, grader.report.result, grader.report.terminal, grader.report.html; "
+        "import sys, grader.report.model.result, grader.report.text.terminal; "
+        "import grader.report.html.report; "
         "sys.exit('jinja2' in sys.modules)"
     )
     root = resources.PACKAGE.parent

@@ -13,8 +13,8 @@ import xmlschema
 
 from grader.checks.finding import Evidence, Finding
 from grader.grade import grade
-from grader.report.junit import render_junit
-from grader.report.result import make_result
+from grader.report.formats.junit import render_junit
+from grader.report.model.result import make_result
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.sample import (
     Sample,

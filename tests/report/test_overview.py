@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from grader.report.class_row import ClassRow
-from grader.report.overview import render_overview
+from grader.report.html.overview import render_overview
+from grader.report.model.class_row import ClassRow
 from tests.report.classroom import classroom
 from tests.report.page import Page
 from tests.report.test_html import ATTACKS, sha256

@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 
 from grader.checks.finding import Case, Cases, Comparison, Plot, Span
 from grader.recording.model import Breach, Intervention, Qos
-from grader.report.build_log import arrange
-from grader.report.callbacks import draw_callbacks
-from grader.report.cases import draw_cases
-from grader.report.comparison import align
-from grader.report.motion import draw_motion, phases
-from grader.report.path import Target, draw_path
-from grader.report.pictures import Gallery
-from grader.report.plot import draw_plot
-from grader.report.qos_table import pairs
-from grader.report.svg import simplified
-from grader.report.timeline import draw_timeline
+from grader.report.drawing.callbacks import draw_callbacks
+from grader.report.drawing.cases import draw_cases
+from grader.report.drawing.motion import draw_motion, phases
+from grader.report.drawing.path import Target, draw_path
+from grader.report.drawing.plot import draw_plot
+from grader.report.drawing.svg import simplified
+from grader.report.drawing.timeline import draw_timeline
+from grader.report.html.build_log import arrange
+from grader.report.html.comparison import align
+from grader.report.html.pictures import Gallery
+from grader.report.html.qos_table import pairs
 from grader.submission.record import BuildRecord, SourceError
 from sim.motion import Pose
 from tests.checks.builder import drive, endpoint, node, on_odometry, reader, recording

@@ -18,7 +18,7 @@ from grader.recording.model import (
     Qos,
     Recording,
 )
-from grader.report.remarks import remarks
+from grader.report.model.remarks import remarks
 from tests.grade.sample import make_recording
 
 TWIST = "geometry_msgs/msg/Twist"

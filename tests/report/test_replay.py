@@ -8,8 +8,8 @@ from itertools import accumulate
 import pytest
 
 from grader.assignment.model import RandomRange
-from grader.report.html import render_report
-from grader.report.replay import DIGITS, NOTHING, embedded, make_replay, with_goals
+from grader.report.html.replay import DIGITS, NOTHING, embedded, make_replay, with_goals
+from grader.report.html.report import render_report
 from tests.grade.sample import Told, make_loaded
 from tests.report.gallery import ahead_until, gallery, reference
 from tests.report.sample import make_run

@@ -9,7 +9,13 @@ from grader.assignment.load import load_assignment
 from grader.checks.finding import Evidence, Finding, Plot
 from grader.errors import UsageError
 from grader.grade import grade
-from grader.report.result import make_result, read_result, result_json, result_schema, write_result
+from grader.report.model.result import (
+    make_result,
+    read_result,
+    result_json,
+    result_schema,
+    write_result,
+)
 from tests.assignment.lessons import GOOD
 from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
 from tests.report.sample import (

@@ -15,18 +15,19 @@ from grader.assignment.withheld import SHOWN_FROM, Withheld
 from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Status, Table
 from grader.grade import grade
-from grader.report import classroom50, explanation, github
-from grader.report.class_row import ClassRow
-from grader.report.foxglove import render_layout
-from grader.report.gradebook import grades_csv
-from grader.report.gradescope import render_gradescope
-from grader.report.html import render_report
-from grader.report.junit import render_junit
-from grader.report.markdown import render_markdown
-from grader.report.result import make_result, result_json
-from grader.report.student import for_student, grade_for_student
-from grader.report.terminal import print_grade
-from grader.report.words import headline, summary
+from grader.report.formats import classroom50, github
+from grader.report.formats.foxglove import render_layout
+from grader.report.formats.gradebook import grades_csv
+from grader.report.formats.gradescope import render_gradescope
+from grader.report.formats.junit import render_junit
+from grader.report.formats.markdown import render_markdown
+from grader.report.html.report import render_report
+from grader.report.model.class_row import ClassRow
+from grader.report.model.result import make_result, result_json
+from grader.report.model.student import for_student, grade_for_student
+from grader.report.text import explanation
+from grader.report.text.terminal import print_grade
+from grader.report.text.words import headline, summary
 from grader.submission.record import SourceError
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.sample import make_facts, make_run

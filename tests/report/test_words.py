@@ -5,14 +5,14 @@ import io
 import pytest
 from rich.console import Console
 
-from grader.report import github
-from grader.report.gradescope import render_gradescope
-from grader.report.html import render_report
-from grader.report.junit import render_junit
-from grader.report.markdown import render_markdown
-from grader.report.result import make_result
-from grader.report.result_model import Result
-from grader.report.terminal import print_grade
+from grader.report.formats import github
+from grader.report.formats.gradescope import render_gradescope
+from grader.report.formats.junit import render_junit
+from grader.report.formats.markdown import render_markdown
+from grader.report.html.report import render_report
+from grader.report.model.result import make_result
+from grader.report.model.result_model import Result
+from grader.report.text.terminal import print_grade
 from tests.report.sample import Sample, lost_points
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from grader.ros import RosInstallation
-from grader.submission.apart import as_handed_in, built_apart, lay
-from grader.submission.locate import only, opened
-from grader.submission.package import read_package
+from grader.submission.build.standalone_build import as_handed_in, built_apart, lay
+from grader.submission.intake.locate import only, opened
 from grader.submission.prepare import Prepared, prepare
+from grader.submission.read.package import read_package
 from grader.submission.record import Definition
 
 from .samples import CMAKE_OF_MSGS as CMAKE

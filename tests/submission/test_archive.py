@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import GraderFault, SubmissionError
-from grader.submission.archive import unpack
-from grader.submission.leftovers import is_left_out
-from grader.submission.members import ArchiveLimits
+from grader.submission.intake.archive import unpack
+from grader.submission.intake.leftovers import is_left_out
+from grader.submission.intake.members import ArchiveLimits
 
 from .samples import tar_bytes, tar_member, zip_bytes
 

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import GraderFault
-from grader.submission import bounded
-from grader.submission.bounded import CappedOutput, Outcome, OutputLimits, run_bounded
+from grader.submission.build import bounded
+from grader.submission.build.bounded import CappedOutput, Outcome, OutputLimits, run_bounded
 
 
 def run(

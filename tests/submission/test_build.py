@@ -18,8 +18,8 @@ from grader.ros import RosInstallation
 from grader.run.descendants import descendants
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
-from grader.submission.build_key import build_key
-from grader.submission.build_limits import BuildLimits
+from grader.submission.build.build_key import build_key
+from grader.submission.build.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
 from grader.submission.record import BuildRecord, PackageRecord
 
@@ -286,7 +286,7 @@ def test_a_setup_py_that_the_kernel_ends_for_want_of_memory_is_no_fault_of_the_s
 ) -> None:
     tree.package({"setup.py": f"import os\nos.kill(os.getpid(), 9)\n{SETUP_PY}"})
     counted = iter([1, kills, 1, 1])
-    monkeypatch.setattr("grader.submission.build.oom_kills", counted.__next__)
+    monkeypatch.setattr("grader.submission.build.build.oom_kills", counted.__next__)
     if kills == 1:
         assert not build_of(prepared(tree, real_ros)).succeeded
         return

@@ -8,7 +8,13 @@ from pathlib import Path
 import pytest
 
 from grader.errors import GraderFault
-from grader.submission.build_cache import INSTALL, BuildCache, CachedBuild, CacheLimits, tree_hash
+from grader.submission.build.build_cache import (
+    INSTALL,
+    BuildCache,
+    CachedBuild,
+    CacheLimits,
+    tree_hash,
+)
 from grader.submission.record import BuildRecord
 
 BUILD = BuildRecord(succeeded=True, duration_s=1.5, log="fine\n")

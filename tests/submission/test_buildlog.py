@@ -1,4 +1,4 @@
-from grader.submission.buildlog import MAX_BYTES, clean, ending, not_found, own_lines
+from grader.submission.build.build_log import MAX_BYTES, clean, ending, not_found, own_lines
 
 
 def test_colours_and_control_characters_are_gone() -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.submission.cmake import Command, read_commands
+from grader.submission.read.cmake import Command, read_commands
 
 
 def arguments(text: str, name: str = "rosidl_generate_interfaces") -> tuple[str, ...]:

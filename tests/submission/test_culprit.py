@@ -7,7 +7,7 @@ from textwrap import dedent
 
 import pytest
 
-from grader.submission.culprit import Sources, find_culprit, last_started
+from grader.submission.build.build_error_location import Sources, find_culprit, last_started
 from grader.submission.record import SourceError
 
 from .samples import SETUP_PY

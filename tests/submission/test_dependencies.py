@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from grader.submission.dependencies import is_known, meant
-from grader.submission.rosdistro import PACKAGES, ROSDEP_KEYS
+from grader.submission.read.dependencies import is_known, meant
+from grader.submission.read.rosdistro import PACKAGES, ROSDEP_KEYS
 
 
 def known(name: str) -> bool | None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.submission.entrypoints import Setup, parse_entry_point, parse_installed, read_setup
+from grader.submission.read.entrypoints import Setup, parse_entry_point, parse_installed, read_setup
 
 from .samples import SETUP_CFG, SETUP_PY
 

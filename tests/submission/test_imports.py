@@ -5,7 +5,7 @@ from textwrap import dedent
 
 import pytest
 
-from grader.submission.imports import find_imports, is_code, ros_imports
+from grader.submission.read.imports import find_imports, is_code, ros_imports
 from grader.submission.record import Import
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.submission.installed import (
+from grader.submission.build.installed import (
     InstallSpace,
     hash_of,
     inspect,

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.submission.lint import EXCLUDED, find_ruff, known_rules, lint, newer_syntax
-from grader.submission.outline import outline
+from grader.submission.read.lint import EXCLUDED, find_ruff, known_rules, lint, newer_syntax
+from grader.submission.read.outline import outline
 
 
 def codes(root: Path, *files: str) -> set[str]:
@@ -52,7 +52,7 @@ def test_a_syntax_error_is_told_elsewhere(tmp_path: Path) -> None:
 
 
 def test_without_ruff_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("grader.submission.lint.find_ruff", lambda: None)
+    monkeypatch.setattr("grader.submission.read.lint.find_ruff", lambda: None)
     assert lint(tmp_path, ["a.py"]).problem == "ruff is not installed: `pip install ruff`"
 
 

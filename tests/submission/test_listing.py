@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from grader.errors import SubmissionError
-from grader.submission.listing import find_packages, list_files
-from grader.submission.members import ArchiveLimits
+from grader.submission.intake.listing import find_packages, list_files
+from grader.submission.intake.members import ArchiveLimits
 
 from .samples import Tree
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.errors import GraderFault, SubmissionError, UsageError
-from grader.submission.locate import opened, submission_id
+from grader.submission.intake.locate import opened, submission_id
 
 from .samples import PACKAGE, Tree, tar_bytes, tar_member, zip_bytes
 
@@ -146,7 +146,7 @@ def test_a_file_that_cannot_be_read_is_named(tree: Tree, monkeypatch: pytest.Mon
     def forbidden(*_: object) -> bytes:
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    monkeypatch.setattr("grader.submission.locate._copy_file", forbidden)
+    monkeypatch.setattr("grader.submission.intake.locate._copy_file", forbidden)
     with pytest.raises(SubmissionError, match=r"a\.py: cannot be read"):
         sha256(tree.write({"a.py": "x"}))
 
@@ -164,7 +164,7 @@ def test_what_is_saved_while_it_is_read_is_read_again(
             (root / "a.py").write_text(saved)
         return listing
 
-    from grader.submission import locate
+    from grader.submission.intake import locate
 
     listing = locate.list_files(root)
     monkeypatch.setattr(locate, "list_files", save)
@@ -177,7 +177,7 @@ def test_what_never_comes_to_rest_is_no_fault_of_the_student(
     tree: Tree, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root = tree.write({"a.py": "x"})
-    from grader.submission import locate
+    from grader.submission.intake import locate
 
     listing = locate.list_files(root)
     (root / "a.py").unlink()
@@ -192,7 +192,7 @@ def test_a_full_disk_is_no_fault_of_the_student(
     def full(*_: object) -> bytes:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("grader.submission.locate._copy_file", full)
+    monkeypatch.setattr("grader.submission.intake.locate._copy_file", full)
     with pytest.raises(GraderFault, match="No space left"), opened(tree.write({"a.py": "x"})):
         pass
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.submission.manifest import Manifest, read_manifest
+from grader.submission.read.manifest import Manifest, read_manifest
 from grader.submission.record import Dependency
 
 from .samples import MANIFEST

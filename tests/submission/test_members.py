@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import SubmissionError
-from grader.submission.members import (
+from grader.submission.intake.members import (
     ArchiveLimits,
     Entry,
     Kind,

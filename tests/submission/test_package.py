@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 from grader.ros import RosInstallation
-from grader.submission.installed import InstallSpace
-from grader.submission.locate import opened
-from grader.submission.package import read_package, record_packages
+from grader.submission.build.installed import InstallSpace
+from grader.submission.intake.locate import opened
+from grader.submission.read.package import read_package, record_packages
 from grader.submission.record import Import, PackageRecord
 
 from .samples import MANIFEST, NODE, SETUP_PY, Tree
@@ -167,7 +167,7 @@ def test_of_thousands_of_long_definitions_the_first_lines_are_kept(
 def test_what_was_built_wins_over_what_was_declared(
     tree: Tree, named_ros: RosInstallation, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    from grader.submission.installed import inspect
+    from grader.submission.build.installed import inspect
 
     tree.package()
     install = Tree(tmp_path_factory.mktemp("install"))

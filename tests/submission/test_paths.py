@@ -1,7 +1,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.submission.paths import is_within, join, parents, shown
+from grader.submission.intake.paths import is_within, join, parents, shown
 
 
 def test_ordinary_names_are_shown_as_they_are() -> None:

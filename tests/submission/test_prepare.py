@@ -9,7 +9,7 @@ import pytest
 
 from grader.errors import UsageError
 from grader.ros import RosInstallation
-from grader.submission.members import ArchiveLimits
+from grader.submission.intake.members import ArchiveLimits
 from grader.submission.prepare import Prepared, PrepareLimits, fingerprint, prepare
 
 from .samples import MANIFEST, NODE, Tree, tar_bytes, tar_member, zip_bytes

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from grader.submission.read.source import MAX_BYTES, Allowance, is_python_script, parse
 from grader.submission.record import SourceError
-from grader.submission.source import MAX_BYTES, Allowance, is_python_script, parse
 
 
 def error(data: bytes) -> SourceError:

@@ -5,8 +5,8 @@ from collections.abc import Collection
 
 import pytest
 
-from grader.submission.entrypoints import parse_entry_point
-from grader.submission.targets import Modules, defined_names, missing_target
+from grader.submission.read.entrypoints import parse_entry_point
+from grader.submission.read.targets import Modules, defined_names, missing_target
 
 FILES = {
     "bot_publisher/__init__.py": "",

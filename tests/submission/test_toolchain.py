@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from grader.errors import GraderFault
-from grader.submission.buildlog import not_found
-from grader.submission.toolchain import check_toolchain, missing_here
+from grader.submission.build.build_log import not_found
+from grader.submission.build.toolchain import check_toolchain, missing_here
 
 
 def _install(folder: Path, *tools: str) -> str:

@@ -12,8 +12,8 @@ from grader import ros as ros_module
 from grader.errors import GraderFault
 from grader.recording.interface import sections_of
 from grader.ros import RosInstallation
-from grader.submission.build_cache import BuildCache
-from grader.submission.underlay import CARRIED, completed, install_prefix
+from grader.submission.build.build_cache import BuildCache
+from grader.submission.build.underlay import CARRIED, completed, install_prefix
 
 EXAMPLE = CARRIED / "example_interfaces"
 

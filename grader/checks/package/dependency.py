@@ -10,7 +10,7 @@ from grader.checks.finding import Evidence, Finding, Table
 from grader.checks.wording import code, codes
 from grader.diagnosis.not_built import existing_package, why_no_manifest, why_too_new
 from grader.spec.nearest_name import nearest
-from grader.submission.dependencies import meant
+from grader.submission.read.dependencies import meant
 from grader.submission.record import (
     Dependency,
     Import,

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from grader.diagnosis.process.raised import submission_path
 from grader.recording.model import Recording
+from grader.submission.read.rosdistro import PACKAGES
 from grader.submission.record import Import, PackageRecord, SubmissionRecord
-from grader.submission.rosdistro import PACKAGES
 
 
 def with_runtime_imports(

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from grader.submission.code_facts import SourceClass, SourceFile
+from grader.submission.read.code_facts import SourceClass, SourceFile
 
 NODE = "rclpy.node.Node"
 

@@ -21,8 +21,8 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
 from grader.spec.nearest_name import nearest
 from grader.spec.quantity import Ratio
-from grader.submission.code_facts import LintFinding, SourceFile, SourceFunction
-from grader.submission.lint import EXCLUDED
+from grader.submission.read.code_facts import LintFinding, SourceFile, SourceFunction
+from grader.submission.read.lint import EXCLUDED
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 
 _MOST_PLACES = 20

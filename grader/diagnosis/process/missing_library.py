@@ -8,8 +8,8 @@ from collections.abc import Collection
 from grader.checks.wording import code, codes
 from grader.recording.model import Recording
 from grader.spec.nearest_name import nearest
+from grader.submission.read.rosdistro import PACKAGES, PYTHON_MODULES
 from grader.submission.record import SubmissionRecord
-from grader.submission.rosdistro import PACKAGES, PYTHON_MODULES
 
 _MISSING = re.compile(r"No module named '([A-Za-z_]\w*)")
 _MISSING_ROOT = re.compile(r"No module named '([A-Za-z_]\w*)'$")

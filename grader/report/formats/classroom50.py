@@ -1,0 +1,112 @@
+"""Classroom 50's ``result.json`` and ``release-body.md``.
+
+Its scores are whole numbers. So all points are multiplied by the smallest factor that makes the
+points of every check whole, and partial credit is rounded down: only a check that passed has all
+of its points. The release says the factor.
+Source: https://github.com/foundation50/classroom50/wiki, "Advanced Autograding".
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from decimal import ROUND_FLOOR, Decimal
+from typing import Any
+
+from grader.checks.finding import Status
+from grader.errors import GraderFault, UsageError
+from grader.report.formats.markdown import COMMENT_BYTES, render_markdown
+from grader.report.model.result_model import Result
+from grader.report.model.student import for_student
+from grader.report.text import words
+
+SCHEMA = "classroom50/result/v1"
+RESULT_FILE = "result.json"
+RELEASE_FILE = "release-body.md"
+_IDENTITY = {
+    "classroom": "CLASSROOM",
+    "assignment": "ASSIGNMENT",
+    "submission": "SUBMISSION_TAG",
+    "commit": "COMMIT_URL",
+    "release": "RELEASE_URL",
+}
+_FACTORS = (1, 2, 4, 5, 10, 20, 25, 50, 100)
+
+
+def identity(environment: Mapping[str, str]) -> dict[str, str]:
+    """What the runner of Classroom 50 says of the submission, by its variables.
+
+    Raises:
+        UsageError: It is not the runner of Classroom 50 that started this.
+    """
+    missing = [name for name in _IDENTITY.values() if not environment.get(name)]
+    if missing:
+        raise UsageError(f"not started by Classroom 50: the environment lacks {', '.join(missing)}")
+    found = {key: environment[name] for key, name in _IDENTITY.items()}
+    return {**found, "review": environment.get("REVIEW_URL") or found["commit"]}
+
+
+def render_result(result: Result, identity: Mapping[str, str], committed: str) -> str:
+    """Render ``result.json``; students can read it, so it is made from their copy.
+
+    Args:
+        result: What to render.
+        identity: See :func:`identity`.
+        committed: When the graded commit was made, ISO 8601 in UTC; a regrade does not move it.
+
+    Raises:
+        GraderFault: There is no grade; Classroom 50 learns that from the exit code.
+    """
+    copy = for_student(result)
+    if not copy.graded:
+        raise GraderFault("not graded, so there is no result for Classroom 50")
+    factor = whole_factor(copy)
+    tests: list[dict[str, Any]] = [
+        {
+            "test-name": check.title,
+            "passed": check.status is Status.PASSED,
+            "score": _whole(check.points, factor),
+            "max-score": _whole(check.max_points, factor),
+            "id": check.id,
+            "status": check.status.value,
+            "observed": check.observed,
+        }
+        for check in copy.checks
+    ]
+    data = {
+        "schema": SCHEMA,
+        **identity,
+        "datetime": committed,
+        "graded_at": copy.started,
+        "score": sum(test["score"] for test in tests),
+        "max-score": sum(test["max-score"] for test in tests),
+        "tests": tests,
+    }
+    return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
+
+
+def render_release(result: Result) -> str:
+    """Render ``release-body.md``, which students read."""
+    copy = for_student(result)
+    # A release may be twice as long, but its reader wants no more than the reader of a comment.
+    text = render_markdown(copy, COMMENT_BYTES)
+    factor = whole_factor(copy)
+    if factor == 1:
+        return text
+    return (
+        f"{text}\nClassroom 50 counts in whole points, so it shows every point as {factor}: "
+        f"{words.counted_points(copy.max_score)} are {_whole(copy.max_score, factor)} there, and "
+        "partial credit is rounded down.\n"
+    )
+
+
+def whole_factor(result: Result) -> int:
+    """The smallest factor that makes the points of every check whole, at most 100."""
+    points = [Decimal(repr(check.max_points)) for check in result.checks]
+    return next(
+        (n for n in _FACTORS if all((n * value) % 1 == 0 for value in points)), _FACTORS[-1]
+    )
+
+
+def _whole(points: float, factor: int) -> int:
+    return int((Decimal(repr(points)) * factor).to_integral_value(ROUND_FLOOR))

@@ -1,0 +1,134 @@
+"""What GitHub Actions reads: annotations, the job summary, outputs.
+
+A line of output that begins with ``::`` is a command to the runner. What a student chose is
+therefore escaped in our own commands, and printed only while commands are stopped by a token
+that the student cannot know.
+Sources: https://docs.github.com/actions/reference/workflow-commands-for-github-actions;
+limits of annotations: actions/runner, ``ExecutionContext.cs``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from grader.checks.finding import Status
+from grader.report.formats.markdown import render_markdown
+from grader.report.model.result_model import CheckPart, Result
+from grader.report.model.student import for_student
+from grader.report.text import explanation, words
+from grader.report.text.clean import clean, one_line
+
+MOST_ANNOTATIONS = 10
+"""Of each kind and step; the runner drops what comes after."""
+MOST_CHARACTERS = 4096
+"""Of a message; the runner cuts what comes after."""
+SUMMARY_BYTES = 1 << 20
+"""Of the summary of a step; beyond it GitHub shows nothing of it."""
+
+
+def annotation_lines(result: Result, prefix: str | None = "") -> tuple[str, ...]:
+    """Workflow commands that put the most useful findings at the student's lines.
+
+    Args:
+        result: What to tell of; only what students get to see is told.
+        prefix: Folder of the submission in the repository, such as ``src/``; empty for its top,
+            None where its files are not in the repository.
+
+    Returns:
+        At most :data:`MOST_ANNOTATIONS` lines: the check to fix first, then those that cost the
+        most points. What is not graded is one warning.
+    """
+    copy = for_student(result)
+    if not copy.graded:
+        return (command("warning", explanation.headline(copy), title="Not graded"),)
+    failed = [check for check in copy.checks if check.status is Status.FAILED]
+    failed.sort(key=lambda check: (check.id != copy.first_to_fix, check.points - check.max_points))
+    shown = explanation.only_shown(copy)
+    return tuple(
+        _annotation(check, copy, "notice" if check.id in shown else "error", prefix)
+        for check in failed[:MOST_ANNOTATIONS]
+    )
+
+
+def summary(result: Result, used_bytes: int = 0) -> str:
+    """Markdown for ``$GITHUB_STEP_SUMMARY``.
+
+    Args:
+        result: What to tell of; only what students get to see is told.
+        used_bytes: What the file holds already.
+    """
+    return render_markdown(for_student(result), SUMMARY_BYTES - used_bytes)
+
+
+def outputs(result: Result, delimiter: str) -> str:
+    """Lines for ``$GITHUB_OUTPUT``.
+
+    They set ``score`` (empty where there is none), ``max-score``, ``status`` and ``summary``.
+
+    Args:
+        result: What to tell of.
+        delimiter: A text that stands in no value, such as a random one.
+    """
+    copy = for_student(result)
+    values = {
+        "score": words.number(copy.score) if copy.score is not None else "",
+        "max-score": words.number(copy.max_score),
+        "status": status(copy),
+        "summary": explanation.headline(copy),
+    }
+    return "".join(f"{name}<<{delimiter}\n{value}\n{delimiter}\n" for name, value in values.items())
+
+
+def status(result: Result) -> str:
+    """``passed`` with full points, ``failed`` without, ``error`` where there is no grade."""
+    if not result.graded:
+        return "error"
+    return "passed" if result.score == result.max_score else "failed"
+
+
+def stop_commands(token: str) -> str:
+    """Make the runner obey nothing until :func:`resume_commands` with the same token."""
+    return f"::stop-commands::{token}"
+
+
+def resume_commands(token: str) -> str:
+    """Make the runner obey again."""
+    return f"::{token}::"
+
+
+def command(name: str, message: str, **properties: str) -> str:
+    """Write a workflow command.
+
+    Args:
+        name: Such as ``error``.
+        message: Any text.
+        properties: Such as ``file``; the runner decodes them.
+    """
+    told = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
+    return f"::{name}{' ' if told else ''}{told}::{_data(clean(message)[:MOST_CHARACTERS])}"
+
+
+def _annotation(check: CheckPart, result: Result, level: str, prefix: str | None) -> str:
+    properties: dict[str, str] = {}
+    place = next(iter(check.evidence.places), None)
+    if place is not None and prefix is not None:
+        properties["file"] = one_line(prefix + place.file)
+        if place.line:
+            properties["line"] = str(place.line)
+    properties["title"] = one_line(f"{check.title} ({explanation.points(check)})")
+    return command(level, "\n".join(_message(check, result)), **properties)
+
+
+def _message(check: CheckPart, result: Result) -> Iterator[str]:
+    for row in explanation.explain(check, result):
+        if row.name in ("scenario", "expected", "observed", *words.ADVICE, "waiting"):
+            yield f"{row.name}: {row.text}"
+
+
+def _data(text: str) -> str:
+    # The percent sign first, or the escapes would be escaped.
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    return _data(text).replace(":", "%3A").replace(",", "%2C")

@@ -1,0 +1,147 @@
+"""A result as GitHub-flavoured Markdown: for a comment, a job summary, a release.
+
+What a student chose is text and never markup: no heading, image, link, table, HTML, mention or
+reference to an issue can be made from it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from grader.checks.finding import Status
+from grader.report.model.result_model import CheckPart, Result
+from grader.report.text import explanation, words
+from grader.report.text.clean import clean, one_line
+
+# Within a word an underscore is no markup; names would be hard to read with it escaped.
+_MARKUP = re.compile(r"[\\`*\[\]~|$]|(?<![^\W_])_|_(?![^\W_])")
+# GitHub makes links of bare addresses; escaped they show the same, and can be copied.
+_ADDRESS = re.compile(r":(?=//)|(?<=www)\.", re.IGNORECASE)
+_HTML = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
+_CALL = re.compile(r"@(?=\w)|#(?=\d)|\bGH-(?=\d)", re.IGNORECASE)
+COMMENT_BYTES = 65_536
+"""Longest comment: GitHub refuses more characters, and none has less than a byte."""
+_LOG_LINES = 12
+_LINE_CHARACTERS = 500
+_CELL_BAR = "\\|"
+_MORE = "… the rest is in the report.\n"
+
+
+def render_markdown(result: Result, most_bytes: int | None = None) -> str:
+    """Render a result.
+
+    Args:
+        result: What to render.
+        most_bytes: Length as UTF-8 that must not be exceeded; what comes last is left out.
+
+    Returns:
+        Markdown; the same input gives the same text.
+    """
+    blocks = [_head(result), _table(result), *notes(result), *_explanations(result)]
+    whole = "\n".join(blocks)
+    if most_bytes is None or len(whole.encode()) <= most_bytes:
+        return whole
+    left_bytes = most_bytes - len(_MORE.encode())
+    kept: list[str] = []
+    for block in blocks:
+        left_bytes -= len(block.encode()) + 1
+        if left_bytes < 0:
+            break
+        kept.append(block)
+    return "\n".join([*kept, _MORE]) if kept else ""
+
+
+def prose(text: str, *, cell: bool = False) -> str:
+    """Text of a finding in one line; only what stands between backticks is markup, as code.
+
+    Args:
+        text: What to show.
+        cell: It stands in a table, whose cells end at a bar even within code.
+    """
+    parts = one_line(text).split("`")
+    if len(parts) % 2 == 0:
+        parts[-2:] = [f"{parts[-2]}`{parts[-1]}"]
+    return "".join(
+        f"`{part.replace('|', _CELL_BAR) if cell else part}`"
+        if index % 2 and part.strip()
+        else literal(part)
+        for index, part in enumerate(parts)
+    )
+
+
+def literal(text: str) -> str:
+    """Text in one line that shows as it is."""
+    escaped = _MARKUP.sub(lambda match: f"\\{match[0]}", one_line(text)).translate(_HTML)
+    escaped = _ADDRESS.sub(lambda match: f"\\{match[0]}", escaped)
+    # A word joiner is not seen, and nobody and no issue is called.
+    return _CALL.sub(lambda match: f"{match[0]}\N{WORD JOINER}", escaped)
+
+
+def fence(text: str) -> str:
+    """Lines as a block of code, whatever stands in them."""
+    shown = clean(text)
+    longest = max((len(run) for run in re.findall(r"`+", shown)), default=0)
+    marks = "`" * max(3, longest + 1)
+    return f"{marks}text\n{shown}\n{marks}"
+
+
+def explained(check: CheckPart, result: Result) -> str:
+    """What a check says, as a list."""
+    lines: list[str] = []
+    for row in explanation.explain(check, result):
+        if row.name == "printed":
+            printed = [_cut(line) for line in row.text.splitlines()[-_LOG_LINES:]]
+            lines += ["", fence("\n".join(printed)), ""]
+        else:
+            lines.append(f"- **{row.name}:** {prose(row.text)}")
+    return "\n".join(lines).strip("\n")
+
+
+def _cut(line: str) -> str:
+    return line if len(line) <= _LINE_CHARACTERS else f"{line[: _LINE_CHARACTERS - 1]}…"
+
+
+def _head(result: Result) -> str:
+    lines = [
+        f"## {literal(result.assignment.id)}: {explanation.score(result)}",
+        "",
+        explanation.headline(result),
+    ]
+    return "\n".join([*lines, *first_to_fix(result), ""])
+
+
+def first_to_fix(result: Result) -> list[str]:
+    """What to mend first, and where; no lines where nothing failed."""
+    first = next((check for check in result.checks if check.id == result.first_to_fix), None)
+    if first is None:
+        return []
+    place = words.first_place(first)
+    where = f" ({literal(place)})" if place else ""
+    return ["", f"**Fix this first:** {prose(first.title)}{where}"]
+
+
+def _table(result: Result) -> str:
+    lines = ["| | check | points |", "| --- | --- | ---: |"]
+    for check in result.checks:
+        said = words.STATUS[check.status]
+        title = prose(check.title, cell=True)
+        lines.append(f"| {said.symbol} {said.word} | {title} | {explanation.points(check)} |")
+    return "\n".join([*lines, ""])
+
+
+def notes(result: Result) -> Iterator[str]:
+    """Limits of the sandbox that were reached and what else is worth knowing, a block for each."""
+    for kind in explanation.notes_of_runs(result):
+        lines = [f"- scenario {literal(run)}: {prose(text)}" for run, text in kind.notes]
+        if kind.rest:
+            lines.append(f"- {kind.rest}")
+        yield "\n".join([f"**{kind.title}**", "", *lines, ""])
+
+
+def _explanations(result: Result) -> Iterator[str]:
+    for status in (Status.FAILED, Status.ERROR):
+        for check in result.checks:
+            if check.status is status:
+                yield f"### {words.STATUS[status].symbol} {prose(check.title)}\n"
+                yield f"{explained(check, result)}\n"

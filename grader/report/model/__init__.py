@@ -1,0 +1,1 @@
+"""A grade as data: what every format is made from."""

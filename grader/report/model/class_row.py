@@ -1,0 +1,82 @@
+"""A row of a class: a student, what was handed in, and whether that has a grade."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from grader.report.model.result_model import Result
+
+
+class RowStatus(str, Enum):
+    """Whether a row has a grade, and if not, why."""
+
+    GRADED = "graded"
+    NOT_GRADED = "not graded"
+    """A fault of ours or of the machine, or the batch has not come to it yet."""
+    UNREADABLE = "unreadable"
+    """What was handed in cannot be read, or holds no package: nothing was built or run."""
+    MISSING = "missing"
+    """Nothing was handed in."""
+
+
+@dataclass(frozen=True)
+class ClassRow:
+    """One row of a class.
+
+    Attributes:
+        id: Key of the submission, unique.
+        name: The student's; may be empty.
+        report: The HTML report, relative to the overview, or None where there is none.
+        result: As in ``result.json``, or None where nothing could be graded at all.
+        note: What an instructor should know, in a few words; empty for an ordinary one.
+        late: Whether it was handed in late.
+        missing: Whether nothing was handed in.
+    """
+
+    id: str
+    name: str = ""
+    report: str | None = None
+    result: Result | None = None
+    note: str = ""
+    late: bool = False
+    missing: bool = False
+
+    @property
+    def status(self) -> RowStatus:
+        """Whether it has a grade, and if not, why."""
+        if self.result is None:
+            return RowStatus.MISSING if self.missing else RowStatus.NOT_GRADED
+        if self.result.submission.problem is not None:
+            return RowStatus.UNREADABLE
+        return RowStatus.GRADED if self.result.graded else RowStatus.NOT_GRADED
+
+    @property
+    def graded(self) -> bool:
+        """Whether it has a score."""
+        return self.status is RowStatus.GRADED
+
+    @property
+    def full(self) -> bool:
+        """Whether it got all points."""
+        return self.result is not None and self.score == self.result.max_score
+
+    @property
+    def states(self) -> str:
+        """Words that the overview filters by."""
+        found = {
+            "full": self.full,
+            "lost": self.graded and not self.full,
+            "ungraded": self.status is RowStatus.NOT_GRADED,
+            "unreadable": self.status is RowStatus.UNREADABLE,
+            "missing": self.status is RowStatus.MISSING,
+            "disturbed": self.result is not None
+            and any(run.disturbed for run in self.result.scenarios),
+            "late": self.late,
+        }
+        return " ".join(word for word, holds in found.items() if holds)
+
+    @property
+    def score(self) -> float | None:
+        """Its points; None where there is no grade."""
+        return self.result.score if self.result is not None and self.graded else None

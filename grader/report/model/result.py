@@ -1,0 +1,183 @@
+"""``result.json``: the grade for programs. Stable: a change of meaning raises ``schema``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from grader.checks.finding import Status
+from grader.errors import UsageError
+from grader.grade.model import CheckResult, Grade, ScenarioFinding
+from grader.recording.model import NS, Recording
+from grader.report.files import write_whole
+from grader.report.model.facts import RunFacts
+from grader.report.model.remarks import remarks
+from grader.report.model.result_model import (
+    SCHEMA,
+    AssignmentPart,
+    BuildPart,
+    CheckPart,
+    DisturbancePart,
+    EvidencePart,
+    FindingPart,
+    Result,
+    ScenarioPart,
+    SubmissionPart,
+    WithheldPart,
+)
+
+
+def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFacts) -> Result:
+    """Make the result of a grade.
+
+    Args:
+        grade: The grade.
+        recordings: By scenario id; may lack scenarios that were not run.
+        facts: How the grade came about.
+    """
+    first = grade.first_to_fix()
+    submission = grade.submission
+    return Result(
+        schema_=SCHEMA,
+        rosgrade_version=facts.rosgrade_version,
+        assignment=AssignmentPart(
+            id=grade.assignment.id,
+            sha256=grade.assignment_sha256,
+            location=grade.assignment_location,
+        ),
+        submission=SubmissionPart(
+            id=submission.id, sha256=submission.sha256, problem=submission.problem
+        ),
+        score=grade.score if grade.graded else None,
+        max_score=grade.max_score,
+        graded=grade.graded,
+        first_to_fix=first.id if first else None,
+        checks=tuple(_check(result) for result in grade.results),
+        withheld=WithheldPart(checks=grade.withheld.checks, points=grade.withheld.points),
+        scenarios=tuple(
+            _scenario(
+                recordings[scenario.id],
+                facts.recordings.get(scenario.id),
+                facts.runs.get(scenario.id, 1),
+            )
+            for scenario in grade.assignment.scenarios
+            if scenario.id in recordings
+        ),
+        build=BuildPart.model_validate(asdict(submission.build)) if submission.build else None,
+        environment=dict(sorted(facts.environment.items())),
+        started=facts.started,
+        duration_s=facts.duration_s,
+    )
+
+
+def result_json(result: Result) -> str:
+    """Write a result as JSON; keys are always in the same order."""
+    data = result.model_dump(mode="json", by_alias=True)
+    return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_result(
+    grade: Grade, recordings: Mapping[str, Recording], facts: RunFacts, file: Path
+) -> Result:
+    """Write ``result.json``, whole or not at all.
+
+    Args:
+        grade: The grade.
+        recordings: By scenario id.
+        facts: How the grade came about.
+        file: Where to.
+
+    Returns:
+        What was written.
+
+    Raises:
+        UsageError: It cannot be written there.
+    """
+    result = make_result(grade, recordings, facts)
+    write_whole(file, result_json(result))
+    return result
+
+
+def read_result(file: Path) -> Result:
+    """Read a ``result.json``.
+
+    Raises:
+        UsageError: There is none, it is not one, or it has a schema that is not ours.
+    """
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{file} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise UsageError(f"{file} is not JSON: {error}") from error
+    schema = data.get("schema") if isinstance(data, dict) else None
+    if schema != SCHEMA:
+        raise UsageError(
+            f"{file} is not a result that this rosgrade reads: its schema is {schema!r}, "
+            f"not {SCHEMA}"
+        )
+    try:
+        return Result.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(step) for step in first["loc"])
+        raise UsageError(f"{file} is not a result: {place}: {first['msg']}") from error
+
+
+def result_schema() -> dict[str, Any]:
+    """The JSON Schema of ``result.json``."""
+    return Result.model_json_schema(by_alias=True, mode="serialization")
+
+
+def _check(result: CheckResult) -> CheckPart:
+    decisive = result.decisive
+    missed = result.status in (Status.FAILED, Status.SKIPPED)
+    return CheckPart(
+        **dict(_finding(decisive)),
+        id=result.id,
+        title=result.title,
+        points=result.points,
+        max_points=result.max_points,
+        visibility=result.visibility.value,
+        author_hint=result.hint if missed else "",
+        waits_for=result.waits_for,
+        other_scenarios=tuple(_finding(item) for item in result.findings if item is not decisive),
+    )
+
+
+def _finding(item: ScenarioFinding) -> FindingPart:
+    finding = item.finding
+    return FindingPart(
+        scenario=item.scenario,
+        status=finding.status,
+        expected=finding.expected,
+        observed=finding.observed,
+        hint=finding.hint,
+        disturbed=finding.disturbed,
+        traceback=item.traceback,
+        evidence=EvidencePart.model_validate(finding.evidence, from_attributes=True),
+    )
+
+
+def _scenario(recording: Recording, file: str | None, runs: int) -> ScenarioPart:
+    begin, end = recording.launched_ns, recording.end_ns
+    return ScenarioPart(
+        id=recording.scenario,
+        seed=recording.seed,
+        recording=file,
+        ending=recording.ending.value,
+        duration_s=(end - begin) / NS,
+        disturbance=DisturbancePart(
+            taken_s=recording.taken_s(begin, end),
+            worst_late_s=max((item.late_ns for item in recording.disturbance), default=0) / NS,
+        ),
+        faults=recording.faults,
+        breaches=tuple(str(breach) for breach in recording.breaches),
+        remarks=remarks(recording),
+        runs=runs,
+    )

@@ -1,0 +1,1 @@
+"""Build packages with colcon, and keep what was built."""

@@ -1,0 +1,30 @@
+"""How much a build may take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from grader.sandbox.limits import BUILD, Limits
+from grader.submission.build.bounded import OutputLimits
+from grader.submission.intake.members import MIB
+
+
+@dataclass(frozen=True)
+class BuildLimits:
+    """How much a build may take.
+
+    Attributes:
+        python_s: Wall time where all packages are ament_python.
+        other_s: Wall time where one is not.
+        install_bytes: Size of the install space.
+        install_files: Number of files in it.
+        output: What is kept of the log, and how much ends the build.
+        room: What it may take in a sandbox.
+    """
+
+    python_s: float = 120.0
+    other_s: float = 300.0
+    install_bytes: int = 512 * MIB
+    install_files: int = 20_000
+    output: OutputLimits = field(default_factory=OutputLimits)
+    room: Limits = BUILD

@@ -1,0 +1,257 @@
+"""``colcon build``, and what else of a build is a program, bounded and in the sandbox."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from grader.errors import GraderFault
+from grader.ros import RosInstallation
+from grader.submission.build import build_log as buildlog
+from grader.submission.build.bounded import Outcome, run_bounded
+from grader.submission.build.build_limits import BuildLimits
+from grader.submission.build.installed import site_packages
+from grader.tree import MOST_DEEP, cut_deep
+
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
+
+COMPILE_S = 60.0
+STOPPED = "Exception in job execution"
+"""What colcon says when its executor stops, whatever --continue-on-error says."""
+UNTOUCHABLE = """\
+import ctypes, os, runpy, sys
+ctypes.CDLL(None).prctl(4, 0, 0, 0, 0)
+sys.argv.pop(0)
+sys.path[0] = os.path.dirname(sys.argv[0])
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+"""Runs a Python program whose memory no other process can reach: PR_SET_DUMPABLE, prctl(2)."""
+_CMAKE_INCLUDE = Path(__file__).with_name("wheels.cmake")
+_PROGRESS = re.compile(r"(Starting >>>|Finished <<<|Failed   <<<|Aborted  <<<) (\S+)")
+
+
+@dataclass(frozen=True)
+class Colcon:
+    """colcon for one submission.
+
+    Attributes:
+        root: Folder of the submission's private copy.
+        folders: Of its packages, relative to ``root``.
+        scratch: For what a build leaves behind; exists.
+        install: Where it installs to.
+        ros: Builds with this installation only.
+        only_python: All packages are ament_python.
+        is_apart: This is one interface package, built for itself.
+        limits: What is too much.
+        wall_s: Wall time of all that :meth:`build` starts.
+        on_progress: Told in a few words what happens.
+        sandbox: What everything runs in, or None.
+        stop: Ends the build from another thread when it is set.
+        on_output: Called with each line of colcon's as it comes.
+    """
+
+    root: Path
+    folders: tuple[str, ...]
+    scratch: Path
+    install: Path
+    ros: RosInstallation
+    only_python: bool
+    is_apart: bool
+    limits: BuildLimits
+    wall_s: float
+    on_progress: Callable[[str], None]
+    sandbox: Sandbox | None
+    stop: threading.Event | None
+    on_output: Callable[[str], None]
+
+    def build(self, finished: set[str]) -> Outcome:
+        """Build what can be built.
+
+        Args:
+            finished: Packages that are built already; what is built is added.
+
+        Raises:
+            GraderFault: colcon is not installed, or nobody wants the build any more.
+        """
+        started: set[str] = set()
+
+        def on_output(text: str) -> None:
+            for line in buildlog.own_lines(text).split("\n"):
+                on_line(line)
+
+        def on_line(line: str) -> None:
+            self.on_output(line)
+            match = _PROGRESS.match(line)
+            if match is None:
+                return
+            if match[1].startswith("Finished"):
+                finished.add(match[2])
+            elif match[1].startswith("Starting"):
+                started.add(match[2])
+                self.on_progress(f"building {match[2]}")
+            else:
+                # colcon has the last word, whatever a package printed as if it were colcon.
+                finished.discard(match[2])
+
+        failed: set[str] = set()
+        outcomes: list[Outcome] = []
+        while True:
+            command = self._command()
+            if failed or finished:
+                command += ["--packages-skip", *sorted(failed | finished)]
+            if failed:
+                command += ["--packages-skip-by-dep", *sorted(failed)]
+            outcome = self._run(
+                command,
+                self.wall_s - sum(item.duration_s for item in outcomes),
+                on_output,
+            )
+            outcomes.append(replace(outcome, output=buildlog.own_lines(outcome.output)))
+            # Where setup.py raises before anything is built, colcon's executor stops with the
+            # exception, whatever --continue-on-error says; the others are still to be built.
+            stopped = not outcome.ended_by_us and STOPPED in outcome.output
+            if not stopped or started - finished <= failed:
+                return _together(outcomes)
+            failed = started - finished
+
+    def compile(self) -> None:
+        """Compile what the build installed, so that nodes start without doing it."""
+        folders = [str(path) for path in site_packages(self.install)]
+        if folders:
+            command = [str(self.ros.python), "-I", "-S", "-m", "compileall", "-qq", *folders]
+            self._run(command, COMPILE_S)
+
+    @cached_property
+    def environment(self) -> dict[str, str]:
+        """Variables of a build; none of the caller's, on which what is kept would depend."""
+        environment = self.ros.environment({})
+        for name in ("HOME", "TMPDIR", "COLCON_HOME"):
+            folder = self.scratch / name.lower()
+            folder.mkdir()
+            environment[name] = str(folder)
+        # Messages of CMake and the compiler are searched for whom to blame.
+        environment["LC_ALL"] = "C.UTF-8"
+        return environment
+
+    def _command(self) -> list[str]:
+        folders = [str(self.root / folder) for folder in self.folders]
+        command = [*_colcon(self.ros, self.environment["PATH"]), "--log-base", os.devnull, "build"]
+        command += ["--merge-install", "--continue-on-error", "--executor", "sequential"]
+        command += [
+            "--build-base",
+            str(self.scratch / "build"),
+            "--install-base",
+            str(self.install),
+        ]
+        command += ["--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"]
+        command += ["--base-paths", *folders]
+        if not self.only_python:
+            # Linters and test frameworks are not there to be found on a small installation.
+            command += ["--cmake-args", "-DBUILD_TESTING=OFF"]
+            # Quicker than make, but stricter with rules that a student may have written; of these
+            # an interface package has none.
+            if self.is_apart and shutil.which("ninja", path=self.environment["PATH"]):
+                command += ["-GNinja"]
+            if self.ros.source == "wheels":
+                command += [f"-DCMAKE_PROJECT_INCLUDE={self._include}"]
+        return command
+
+    @cached_property
+    def _include(self) -> Path:
+        """Copied where a sandbox shows it, too, and only before anything of the student's ran.
+
+        Afterwards there might be a link in its place.
+        """
+        return Path(shutil.copy(_CMAKE_INCLUDE, self.scratch))
+
+    def _run(
+        self,
+        command: Sequence[str],
+        wall_s: float,
+        on_line: Callable[[str], None] | None = None,
+    ) -> Outcome:
+        """Run a part of the build, in the sandbox if there is one."""
+        # Not the folder around the install space: what is written there afterwards is written by
+        # us, and would go wherever a link that was left there points to.
+        folders = (self.scratch, self.root, self.install)
+        run = partial(self._bounded, folders, wall_s=wall_s, on_line=on_line)
+        if self.sandbox is None:
+            return run(command, environment=self.environment, excess=self._watched())
+        self.limits.room.check_allowed()
+        with self.sandbox.build(self.ros, folders, self.limits.room) as room:
+            return run(
+                room.command(command, self.environment),
+                environment=room.environment,
+                excess=self._watched(room.excess),
+            )
+
+    def _bounded(
+        self,
+        folders: Sequence[Path],
+        command: Sequence[str],
+        *,
+        environment: Mapping[str, str],
+        wall_s: float,
+        on_line: Callable[[str], None] | None,
+        excess: Callable[[int], str | None],
+    ) -> Outcome:
+        """Run a command, and take away what it left too deep for anybody to come to its end."""
+        try:
+            outcome = run_bounded(
+                command,
+                cwd=self.scratch,
+                environment=environment,
+                wall_s=wall_s,
+                output=self.limits.output,
+                on_line=on_line,
+                excess=excess,
+            )
+        finally:
+            deep = [folder for folder in folders if cut_deep(folder)]
+        if not deep or outcome.ended_by_us:
+            return outcome
+        return replace(outcome, ended_by_us=f"it made more than {MOST_DEEP} folders in one another")
+
+    def _watched(
+        self, excess: Callable[[int], str | None] = lambda _: None
+    ) -> Callable[[int], str | None]:
+        """Look for a passed limit, and for whoever wants the build to end."""
+
+        def look(pid: int) -> str | None:
+            if self.stop is not None and self.stop.is_set():
+                raise GraderFault("interrupted")
+            return excess(pid)
+
+        return look
+
+
+def _together(outcomes: Sequence[Outcome]) -> Outcome:
+    """One outcome of several commands: it succeeded if all did."""
+    last = outcomes[-1]
+    return Outcome(
+        status=next((item.status for item in outcomes if item.status), last.status),
+        ended_by_us=last.ended_by_us,
+        output="".join(item.output for item in outcomes),
+        duration_s=sum(item.duration_s for item in outcomes),
+    )
+
+
+def _colcon(ros: RosInstallation, path: str) -> list[str]:
+    beside = ros.python.parent / "colcon"
+    if beside.exists():
+        return [str(ros.python), "-c", UNTOUCHABLE, str(beside)]
+    found = shutil.which("colcon", path=path)
+    if found is None:
+        raise GraderFault(
+            "colcon is not installed: apt install python3-colcon-common-extensions, "
+            "or install the wheels with pip install 'rosgrade[ros]'"
+        )
+    return [found]

@@ -1,0 +1,243 @@
+"""What the build put into the install space, for ``ros2 run`` and for Python."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import stat
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from grader.submission.intake.paths import is_within
+from grader.submission.read.entrypoints import EntryPoint, parse_installed
+from grader.submission.record import Definition
+
+MOST_BYTES = 64 * 1024
+"""Largest definition of an interface that is kept."""
+
+_INDEX = Path("share", "ament_index", "resource_index", "packages")
+_MAX_METADATA_BYTES = 256 * 1024
+_MAX_HASHED_BYTES = 16 * 2**20
+_DISTRIBUTION = re.compile(r"(?P<name>.+?)-[^-]+(-py3[.\d]*)?\.(egg-info|dist-info)")
+
+
+@dataclass(frozen=True)
+class InstallSpace:
+    """The facts of one install space (merged layout).
+
+    Attributes:
+        executables: Package -> what is in ``lib/<package>``, sorted.
+        in_bin: What is in ``bin``, sorted.
+        entry_points: Distribution, normalised -> its console scripts.
+        python: Path of each Python file -> hash of its content; relative to site-packages, or
+            ``lib/<package>/...`` for scripts.
+        origins: Path of each of them -> the student's file that it is a copy of.
+        definitions: Package -> the interfaces that it generates, such as ``msg/Bot.msg``, with
+            their definitions.
+        registered: Packages that are in ament's index of packages, where ROS looks for them.
+    """
+
+    executables: Mapping[str, tuple[str, ...]]
+    in_bin: tuple[str, ...]
+    entry_points: Mapping[str, tuple[EntryPoint, ...]]
+    python: Mapping[str, str]
+    origins: Mapping[str, str]
+    definitions: Mapping[str, tuple[Definition, ...]]
+    registered: frozenset[str]
+
+
+def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) -> InstallSpace:
+    """Look at an install space; what is not a regular file there does not count.
+
+    Args:
+        install: The install space.
+        packages: The submission's packages.
+        sources: Path of each of the student's Python files -> hash of its content.
+    """
+    executables = {}
+    definitions = {}
+    python: dict[str, str] = {}
+    for package in packages:
+        folder = install / "lib" / package
+        found = [path for path in regular_files(folder) if os.access(path, os.X_OK)]
+        executables[package] = tuple(sorted({path.name for path in found}))
+        for path in regular_files(folder):
+            python[path.relative_to(install).as_posix()] = _hash(path)
+        definitions[package] = tuple(_definitions(install / "share" / package))
+    entry_points = {}
+    for site in site_packages(install):
+        for path in regular_files(site):
+            name = path.relative_to(site).as_posix()
+            if name.endswith(".py"):
+                python[name] = _hash(path)
+        for metadata in sorted(site.glob("*-info")):
+            match = _DISTRIBUTION.fullmatch(metadata.name)
+            if match:
+                entry_points[normalised(match["name"])] = _entry_points(metadata)
+    in_bin = sorted(path.name for path in regular_files(install / "bin"))
+    return InstallSpace(
+        executables,
+        tuple(in_bin),
+        entry_points,
+        python,
+        match_files(python, sources),
+        definitions,
+        frozenset(path.name for path in regular_files(install / _INDEX)),
+    )
+
+
+def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> str | None:
+    """See that an install space holds nothing that nobody of ours should open or follow.
+
+    Symbolic links to what was handed in, or to nothing, go: nobody would find anything there.
+
+    Args:
+        install: The install space, as the student's build files left it.
+        sources: Folder of what was handed in, where it was built.
+        most_bytes: Largest size of all files together.
+        most_files: Largest number of files and folders.
+
+    Returns:
+        Why it cannot be used at all, in which case it is removed, or None.
+    """
+    if install.is_symlink():
+        install.unlink()
+        return "the build put a symbolic link in place of the install space"
+    total = count = 0
+    planted: list[str] = []
+    base, own = os.path.realpath(install), os.path.realpath(sources)
+    for parent, folders, names in os.walk(install):
+        for name in [*folders, *names]:
+            path = Path(parent, name)
+            status = path.lstat()
+            if stat.S_ISLNK(status.st_mode):
+                end = os.path.realpath(path)
+                if not f"{end}/".startswith(f"{base}/"):
+                    if Path(end).exists() and not f"{end}/".startswith(f"{own}/"):
+                        target = str(path.readlink())
+                        planted.append(f"{_named(path, install)}, a link out to {target!r}")
+                    path.unlink()
+            elif not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+                planted.append(f"{_named(path, install)}, which is no file, folder or link")
+                path.unlink()
+            total += status.st_size
+            count += 1
+    if total > most_bytes or count > most_files:
+        shutil.rmtree(install)
+        return f"the build installed more than {most_files} files or {most_bytes} bytes"
+    if planted:
+        shutil.rmtree(install)
+        more = f" and {len(planted) - 1} more of that kind" if len(planted) > 1 else ""
+        return f"the build installed {min(planted)}{more}"
+    return None
+
+
+def _named(path: Path, install: Path) -> str:
+    """In quotes: the name is the student's."""
+    return repr(str(path.relative_to(install)))
+
+
+def site_packages(install: Path) -> list[Path]:
+    """Folders of an install space that Python imports from."""
+    return sorted(install.glob("lib/python3*/site-packages"))
+
+
+def normalised(distribution: str) -> str:
+    """Write a distribution's name so that ``bot-publisher`` equals ``bot_publisher``."""
+    return re.sub(r"[-_.]+", "_", distribution).lower()
+
+
+def regular_files(folder: Path) -> Iterator[Path]:
+    """All regular files below a folder, without following links, sorted.
+
+    But for those of names that are no text: nobody could write them down, or ask ROS for them.
+    """
+    for parent, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if name != "__pycache__" and _is_text(name))
+        for name in sorted(filter(_is_text, names)):
+            path = Path(parent, name)
+            if stat.S_ISREG(path.lstat().st_mode):
+                yield path
+
+
+def _is_text(name: str) -> bool:
+    """Whether a name as the file system gave it has no undecodable bytes, which are surrogates."""
+    return not any("\ud800" <= char <= "\udfff" for char in name)
+
+
+def match_files(python: Mapping[str, str], sources: Mapping[str, str]) -> dict[str, str]:
+    """Find for each installed Python file the student's file that it was copied from.
+
+    Args:
+        python: Installed path -> hash.
+        sources: The student's path -> hash.
+
+    Returns:
+        Installed path -> student's path: of those with the same content the one whose path ends
+        most alike. Files that the build changed or made are left out.
+    """
+    first: dict[str, str] = {}
+    ending: dict[tuple[str, int], str] = {}
+    for path, digest in sorted(sources.items()):
+        first.setdefault(digest, path)
+        for mark in _endings(path):
+            ending.setdefault((digest, mark), path)
+    found = {}
+    for installed, digest in python.items():
+        if digest not in first:
+            continue
+        found[installed] = first[digest]
+        for mark in _endings(installed):
+            alike = ending.get((digest, mark))
+            if alike is None:
+                break
+            found[installed] = alike
+    return found
+
+
+def _endings(path: str) -> Iterator[int]:
+    """A mark for each ending of a path, the shortest first: there may be thousands of copies."""
+    mark = 0
+    for part in reversed(path.split("/")):
+        mark = hash((part, mark))
+        yield mark
+
+
+def in_folder(files: Mapping[str, str], folder: str) -> tuple[tuple[str, str], ...]:
+    """Those of the matched files that come from one package's folder, sorted."""
+    return tuple(sorted((new, old) for new, old in files.items() if is_within(old, folder)))
+
+
+def hash_of(data: bytes) -> str:
+    """The hash by which installed and handed-in files are compared."""
+    return sha256(data).hexdigest()
+
+
+def _definitions(share: Path) -> Iterator[Definition]:
+    """Interfaces with generated code: beside each definition lies its description (REP-2011)."""
+    for kind in ("msg", "srv", "action"):
+        for path in regular_files(share / kind):
+            described = path.with_suffix(".json").is_file()
+            if path.suffix == f".{kind}" and described and path.stat().st_size <= MOST_BYTES:
+                text = path.read_text(encoding="utf-8", errors="replace")
+                yield Definition(path.relative_to(share).as_posix(), text)
+
+
+def _hash(path: Path) -> str:
+    if path.stat().st_size > _MAX_HASHED_BYTES:
+        return ""
+    return hash_of(path.read_bytes())
+
+
+def _entry_points(metadata: Path) -> tuple[EntryPoint, ...]:
+    path = metadata / "entry_points.txt"
+    try:
+        if not stat.S_ISREG(path.lstat().st_mode) or path.stat().st_size > _MAX_METADATA_BYTES:
+            return ()
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ()
+    return tuple(parse_installed(text, "setup.py"))

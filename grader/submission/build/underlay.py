@@ -1,0 +1,107 @@
+"""Interface packages of ours: built as a student's are, kept in the cache, laid under others.
+
+The wheels of ROS 2 lack ``example_interfaces``, which tutorials and course material use all
+the time, so rosgrade carries its definitions. And an assignment in whose lesson the student
+writes an interface package brings its own copy, because the probe never imports anything that
+a student wrote.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from grader.errors import GraderFault
+from grader.resources import carried_interfaces
+from grader.ros import RosInstallation
+from grader.submission.build.build import build, once_more
+from grader.submission.build.build_cache import BuildCache, CachedBuild
+from grader.submission.build.build_error_location import Sources
+from grader.submission.build.build_limits import BuildLimits
+from grader.submission.build.toolchain import check_toolchain, missing_tools
+from grader.submission.intake.locate import opened
+
+CARRIED = carried_interfaces()
+"""One folder for each package that the wheels lack."""
+
+# Thirty interfaces take 95 s of CPU, and whoever builds them may have little of it.
+_LIMITS = BuildLimits(other_s=1200.0)
+
+
+def install_prefix(
+    packages: Path,
+    ros: RosInstallation,
+    cache: BuildCache,
+    on_progress: Callable[[str], None] = lambda _: None,
+) -> Path:
+    """Build interface packages of ours, unless that was done before.
+
+    Args:
+        packages: A folder with ament packages in it, each in a folder of its own name.
+        ros: Builds with this installation.
+        cache: Where builds are kept.
+        on_progress: Told in a few words what happens.
+
+    Returns:
+        Their install space (merged layout).
+
+    Raises:
+        GraderFault: They do not build on this machine.
+    """
+    check_toolchain(ros.environment({})["PATH"])
+
+    def attempt(is_second: bool) -> CachedBuild:
+        with opened(packages) as located:
+            folders = {
+                packages.name if folder == "." else folder.rpartition("/")[2]: folder
+                for folder in located.packages
+            }
+            return build(
+                located,
+                Sources({file.path for file in located.files}, folders),
+                ros,
+                only_python=False,
+                cache=cache,
+                is_apart=True,
+                limits=_LIMITS,
+                on_progress=lambda what: on_progress(f"{what} (ours, once on this machine)"),
+                is_second=is_second,
+            )
+
+    built = once_more(attempt)
+    if built.install is None or not built.build.succeeded:
+        reason = built.build.culprit or built.build.log[-2000:]
+        raise GraderFault(f"the interface packages in {packages} could not be built: {reason}")
+    return built.install
+
+
+def completed(
+    ros: RosInstallation,
+    named: Iterable[str],
+    cache: BuildCache,
+    on_progress: Callable[[str], None] = lambda _: None,
+) -> RosInstallation:
+    """Add to an installation what it lacks of the packages that rosgrade carries.
+
+    Args:
+        ros: The installation.
+        named: Packages that are used; what is not among them is not built.
+        cache: Where builds are kept.
+        on_progress: Told in a few words what happens.
+
+    Returns:
+        The same installation where nothing is to be added, else one with it as underlay.
+
+    Raises:
+        GraderFault: It does not build on this machine.
+    """
+    if missing_tools(ros.environment({})["PATH"]):
+        # What needs them will say so, and the rest of the submission is graded.
+        return ros
+    underlays = tuple(
+        install_prefix(CARRIED / name, ros, cache, on_progress)
+        for name in sorted(set(named) - ros.packages)
+        if (CARRIED / name).is_dir()
+    )
+    return replace(ros, underlays=(*ros.underlays, *underlays)) if underlays else ros

@@ -1,0 +1,1 @@
+"""Open what a student handed in: a folder or an archive, within limits."""

@@ -1,0 +1,90 @@
+"""What colcon, Python, git, editors and macOS leave behind: never a student's work."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection
+from functools import partial
+
+from grader.submission.intake.paths import parents
+from grader.submission.read.manifest import MANIFEST
+
+TOOL_FOLDERS = frozenset(
+    {
+        ".git",
+        ".hg",
+        ".svn",
+        "__pycache__",
+        ".venv",
+        "node_modules",
+        ".pytest_cache",
+        ".mypy_cache",
+        ".ruff_cache",
+        ".hypothesis",
+        ".tox",
+        ".colcon",
+        "__MACOSX",
+        "rosgrade-report",
+    }
+)
+"""Folders that tools make, wherever they are."""
+
+COLCON_FOLDERS = ("build", "install", "log")
+_COLCON_MARKS = ("COLCON_IGNORE", ".built_by", ".colcon_install_layout", "local_setup.sh")
+_VIRTUAL_ENVIRONMENT = "pyvenv.cfg"
+
+_EDITORS = re.compile(
+    r"""
+    .*~ | .*\.sw[a-z] | 4913                                     # backups, Vim
+    | \.\#.* | \#.*\# | flycheck_.*                              # Emacs
+    | \.goutputstream-.* | .*\.kate-swp | .*___jb_(tmp|old)___   # gedit, Kate, JetBrains
+    """,
+    re.VERBOSE | re.DOTALL,
+)
+
+
+def is_left_out(path: str) -> bool:
+    """Whether a path is something that a tool, an editor or macOS left behind."""
+    parts = path.split("/")
+    return (
+        not TOOL_FOLDERS.isdisjoint(parts)
+        or parts[-1] == ".DS_Store"
+        or parts[-1].startswith("._")
+        or _EDITORS.fullmatch(parts[-1]) is not None
+    )
+
+
+def is_leftover(name: str, holds: Callable[[str], bool], in_package: bool) -> bool:
+    """Whether a folder is something that a tool left behind.
+
+    Args:
+        name: The folder's.
+        holds: Whether there is something of a name in it.
+        in_package: It is in the folder of a package, or in one of its folders.
+    """
+    if name in TOOL_FOLDERS or name.endswith(".egg-info") or holds(_VIRTUAL_ENVIRONMENT):
+        return True
+    if name not in COLCON_FOLDERS:
+        return False
+    # A package may well have a module called "log"; a workspace has no use for another "log".
+    return any(map(holds, _COLCON_MARKS)) or not (in_package or holds(MANIFEST))
+
+
+def is_within_leftover(path: str, present: Collection[str]) -> bool:
+    """Whether a path is in a folder that :func:`is_leftover`.
+
+    Args:
+        path: Relative.
+        present: All paths that there are.
+    """
+    in_package = MANIFEST in present
+    for folder in reversed(parents(path)):
+        name = folder.rpartition("/")[2]
+        if is_leftover(name, partial(_is_there, present, folder), in_package):
+            return True
+        in_package = in_package or f"{folder}/{MANIFEST}" in present
+    return False
+
+
+def _is_there(present: Collection[str], folder: str, name: str) -> bool:
+    return f"{folder}/{name}" in present

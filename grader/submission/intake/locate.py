@@ -1,0 +1,216 @@
+"""Open a submission: a folder or an archive becomes a snapshot that nobody changes any more.
+
+Everything that is found out about a submission (hash, manifests, imports, build) is found out
+of one private copy. So the student may go on editing, and nothing of ours can touch the
+original.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from grader.errors import UsageError
+from grader.scratch import Scratch
+from grader.submission.intake import archive
+from grader.submission.intake.listing import (
+    ChangedMeanwhile,
+    Listing,
+    SubmissionFile,
+    find_packages,
+    list_files,
+    unreadable,
+    wrapper_of,
+)
+from grader.submission.intake.members import ArchiveLimits
+from grader.submission.intake.paths import is_within, shown
+
+NO_FILES = hashlib.sha256().hexdigest()
+"""The hash of a submission that is empty."""
+_CHUNK = 1024 * 1024
+_PAUSES_S = (0.05, 0.5)
+"""Before it is read again because somebody wrote to it meanwhile."""
+_URL = re.compile(r"(https?|ssh|git|file|ftp):/|[\w.-]+@[\w.-]+:")
+
+
+@dataclass(frozen=True)
+class Located:
+    """An opened submission.
+
+    Attributes:
+        id: The folder's or archive's name, without the archive's suffix.
+        sha256: Hash over the files' paths, contents and executable bits, as hex.
+        root: The private copy; holds exactly ``files``.
+        files: Sorted by path; folders that are just around all of it are left out of the paths.
+        packages: Folders with a ``package.xml``, sorted; ``.`` for the submission itself.
+        skipped: Folders that were left out, such as ``build`` and ``install``.
+    """
+
+    id: str
+    sha256: str
+    root: Path
+    files: tuple[SubmissionFile, ...]
+    packages: tuple[str, ...]
+    skipped: tuple[str, ...] = ()
+
+
+@contextmanager
+def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Located]:
+    """Open a submission for as long as the context lasts.
+
+    Args:
+        path: A folder (package, ``src``, workspace, clone of a repository, with any number of
+            folders around it) or an archive of one.
+        limits: What is too much.
+
+    Yields:
+        The located submission, with its private copy.
+
+    Raises:
+        UsageError: Nothing is there, or it is a URL.
+        SubmissionError: It cannot be read as a submission.
+        GraderFault: This machine cannot hold the copy.
+    """
+    limits = limits or ArchiveLimits()
+    source = check_path(path)
+    with Scratch("submission") as scratch:
+        if not source.is_dir():
+            unpacked = scratch / "unpacked"
+            unpacked.mkdir()
+            archive.unpack(source, unpacked, limits)
+            listed = unpacked
+        else:
+            listed = source
+        root = scratch / "submission"
+        listing, sha256 = _snapshot(listed, root, limits)
+        yield Located(
+            id=submission_id(source),
+            sha256=sha256,
+            root=root,
+            files=tuple(listing.files),
+            packages=tuple(find_packages(file.path for file in listing.files)),
+            skipped=tuple(listing.skipped),
+        )
+
+
+@contextmanager
+def only(located: Located, folder: str, name: str) -> Iterator[Located]:
+    """Open one package of a submission for as long as the context lasts, without the others.
+
+    Args:
+        located: The submission.
+        folder: The package's folder; not the submission itself.
+        name: What the folder is called here, wherever it was.
+
+    Yields:
+        The package as if it had been handed in alone, with a copy of its own.
+
+    Raises:
+        GraderFault: This machine cannot hold the copy.
+    """
+    inside = [
+        replace(file, path=file.path[len(folder) + 1 :])
+        for file in located.files
+        if is_within(file.path, folder)
+    ]
+    with tempfile.TemporaryDirectory(prefix="apart-", dir=located.root.parent) as scratch:
+        root = Path(scratch, "submission")
+        root.mkdir()
+        sha256 = _copy(located.root / folder, Listing(inside), root / name)
+        files = tuple(replace(file, path=f"{name}/{file.path}") for file in inside)
+        yield Located(located.id, sha256, root, files, (name,))
+
+
+def check_path(path: Path | str) -> Path:
+    """Return the path of a submission that exists.
+
+    Raises:
+        UsageError: Nothing is there, it is a URL, or neither a folder nor a file.
+    """
+    text = os.fspath(path)
+    if _URL.match(text):
+        # A Path holds one of the two slashes.
+        address = re.sub(r"^(\w+:)/+", r"\1//", text)
+        raise UsageError(f"{shown(address)}: is a URL; clone it with git and name the folder")
+    source = Path(path)
+    if not (source.is_dir() or source.is_file()):
+        problem = "is neither a folder nor a file" if source.exists() else "does not exist"
+        raise UsageError(f"{shown(text)}: {problem}")
+    return source
+
+
+def submission_id(source: Path) -> str:
+    """Name a submission after its folder or archive."""
+    name = source.name if source.name not in ("", "..") else source.resolve().name
+    name = name or "submission"
+    if not source.is_dir():
+        suffix = next((s for s in archive.SUFFIXES if name.lower().endswith(s)), "")
+        name = name[: len(name) - len(suffix)] or name
+    return shown(name)
+
+
+def _snapshot(source: Path, root: Path, limits: ArchiveLimits) -> tuple[Listing, str]:
+    """Copy a folder as it was at one moment, as far as one can tell."""
+    for pause_s in _PAUSES_S:
+        try:
+            return _snapshot_once(source, root, limits)
+        except ChangedMeanwhile:
+            shutil.rmtree(root, ignore_errors=True)
+            time.sleep(pause_s)
+    return _snapshot_once(source, root, limits)
+
+
+def _snapshot_once(source: Path, root: Path, limits: ArchiveLimits) -> tuple[Listing, str]:
+    listing = list_files(source, limits)
+    wrapper = wrapper_of(listing.files)
+    listing = listing.inside(wrapper)
+    return listing, _copy(source / wrapper, listing, root)
+
+
+def _copy(source: Path, listing: Listing, root: Path) -> str:
+    """Copy the listed files and hash what was copied, so that both agree for certain."""
+    total = hashlib.sha256()
+    root.mkdir()
+    for file in listing.files:
+        target = root / file.path
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if file.link is not None:
+                target.symlink_to(file.link)
+                digest, kind = hashlib.sha256(os.fsencode(file.link)).digest(), b"l"
+            else:
+                digest = _copy_file(source / file.path, target, file)
+                kind = b"x" if file.executable else b"f"
+        except OSError as error:
+            raise unreadable(file.path, error) from error
+        # A NUL ends the path: no path contains one.
+        total.update(kind + os.fsencode(file.path) + b"\0" + digest)
+    return total.hexdigest()
+
+
+def _copy_file(source: Path, target: Path, file: SubmissionFile) -> bytes:
+    digest = hashlib.sha256()
+    left = file.size
+    # Not following a link that was put there since the listing; not waiting for a pipe either.
+    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
+    mode = 0o755 if file.executable else 0o644
+    with (
+        os.fdopen(os.open(source, flags), "rb") as reading,
+        os.fdopen(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as writing,
+    ):
+        while block := reading.read(min(_CHUNK, left)):
+            digest.update(block)
+            writing.write(block)
+            left -= len(block)
+        if left or reading.read(1):
+            # Half a file that is just being saved would be graded as a whole one.
+            raise ChangedMeanwhile(file.path)
+    return digest.digest()

@@ -1,0 +1,258 @@
+"""Which members of an archive may be unpacked, and where: decided before a byte is written.
+
+Everything here is a pure function of names, kinds and sizes. Symbolic links are kept only where
+they lead to something inside; :mod:`grader.submission.intake.archive` makes them after all files,
+so that nothing is ever written through one.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from grader.errors import SubmissionError
+from grader.submission.intake.leftovers import is_left_out, is_within_leftover
+from grader.submission.intake.paths import parents, shown
+
+MIB = 2**20
+
+_MAX_HOPS = 40
+_DRIVE = re.compile(r"[A-Za-z]:[/\\]")
+
+
+@dataclass(frozen=True)
+class ArchiveLimits:
+    """How much a submission may hold; folders are held to the same sizes and numbers.
+
+    Attributes:
+        total_bytes: Sum of the files' sizes, and largest archive file.
+        members: Number of files, folders and links. What tools left behind
+            (``leftovers.TOOL_FOLDERS``) is not unpacked and may be ten times as much.
+        ratio: Largest allowed unpacked size divided by the archive's size...
+        ratio_from_bytes: ...from this unpacked size on, since small texts compress well.
+        depth: Largest number of folders in a path.
+        path_bytes: Longest path.
+        name_bytes: Longest name of a file or folder.
+    """
+
+    total_bytes: int = 256 * MIB
+    members: int = 20_000
+    ratio: int = 200
+    ratio_from_bytes: int = 16 * MIB
+    depth: int = 40
+    path_bytes: int = 1024
+    name_bytes: int = 255
+
+    @property
+    def members_with_tools(self) -> int:
+        """How many members an archive may list, with everything that is left out."""
+        return 10 * self.members
+
+
+class Kind(Enum):
+    """What a member of an archive is."""
+
+    FILE = "file"
+    FOLDER = "folder"
+    LINK = "symbolic link"
+    SPECIAL = "device, pipe or other special file"
+
+
+@dataclass(frozen=True)
+class Member:
+    """A member as the archive declares it.
+
+    Attributes:
+        place: Where its reader finds it again: index in a zip, offset of the data in a tar.
+        name: Its name, forward slashes, otherwise untouched.
+        kind: What it is.
+        size: Declared size in bytes.
+        executable: Whether anyone may execute it.
+        target: Where a link leads.
+    """
+
+    place: int
+    name: str
+    kind: Kind
+    size: int = 0
+    executable: bool = False
+    target: str = ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An admitted member with its safe relative path."""
+
+    path: str
+    member: Member
+
+
+class Refused(Exception):
+    """Why one member is refused; :func:`admit` adds which one, and of which archive."""
+
+
+def admit(
+    members: Iterable[Member],
+    *,
+    archive: str,
+    archive_bytes: int,
+    limits: ArchiveLimits,
+) -> list[Entry]:
+    """Check every member; nothing may be unpacked when one of them is refused.
+
+    Args:
+        members: In the archive's order; read no further than the limits allow.
+        archive: The archive's name, for messages.
+        archive_bytes: Its size.
+        limits: What is too much.
+
+    Returns:
+        What to unpack. Folders above a file are implied. Links that lead to nothing inside
+        the archive are left out.
+
+    Raises:
+        SubmissionError: A member is unsafe or too much; names the archive and the member.
+    """
+    entries: list[Entry] = []
+    total = 0
+    kinds: dict[str, Kind] = {}
+    for count, member in enumerate(members, start=1):
+        try:
+            path = safe_path(member.name, limits)
+            kept = bool(path) and not is_left_out(path)
+            if count > limits.members_with_tools or (kept and len(entries) >= limits.members):
+                raise Refused(f"the archive holds more than {limits.members} members")
+            if not kept:
+                continue
+            _check_kind(member)
+            total += member.size
+            _check_size(total, archive_bytes, limits)
+            _check_place(path, member.kind, kinds)
+        except Refused as reason:
+            raise SubmissionError(f"{archive}: {shown(member.name)}: {reason}") from None
+        kinds[path] = member.kind
+        entries.append(Entry(path, member))
+    return _with_safe_links(entries, archive)
+
+
+def safe_path(name: str, limits: ArchiveLimits) -> str:
+    """Turn a member's name into a relative path without ``.`` and ``..``.
+
+    Returns:
+        The path, empty for the archive's root.
+
+    Raises:
+        Refused: The name leads out of the folder, or is too long.
+    """
+    if "\0" in name:
+        raise Refused("the name contains a NUL character")
+    if name.startswith(("/", "\\")) or _DRIVE.match(name):
+        raise Refused("absolute paths are refused")
+    parts = [part for part in name.split("/") if part not in ("", ".")]
+    if ".." in parts:
+        raise Refused("paths with '..' are refused")
+    try:
+        sizes = [len(os.fsencode(part)) for part in parts]
+    except UnicodeEncodeError:
+        raise Refused("the name is not valid Unicode") from None
+    if len(parts) > limits.depth:
+        raise Refused(f"more than {limits.depth} folders deep")
+    if max(sizes, default=0) > limits.name_bytes or sum(sizes) + len(sizes) > limits.path_bytes:
+        raise Refused("the name is too long")
+    return "/".join(parts)
+
+
+def _check_kind(member: Member) -> None:
+    if member.kind is Kind.SPECIAL:
+        raise Refused("a device, pipe or other special file is refused")
+    if member.size < 0:
+        raise Refused("its size is negative")
+
+
+def _check_size(total: int, archive_bytes: int, limits: ArchiveLimits) -> None:
+    if total > limits.total_bytes:
+        raise Refused(f"with it the archive unpacks to more than {limits.total_bytes // MIB} MiB")
+    if total > limits.ratio_from_bytes and total > limits.ratio * archive_bytes:
+        raise Refused(f"with it the archive unpacks to more than {limits.ratio} times its size")
+
+
+def _check_place(path: str, kind: Kind, kinds: dict[str, Kind]) -> None:
+    known = kinds.get(path)
+    if known is not None and not (known is kind is Kind.FOLDER):
+        raise Refused("the archive holds this path twice")
+    for folder in parents(path):
+        if kinds.setdefault(folder, Kind.FOLDER) is not Kind.FOLDER:
+            raise Refused(f"{shown(folder)} is not a folder in this archive")
+
+
+def _with_safe_links(entries: list[Entry], archive: str) -> list[Entry]:
+    links = {e.path: e.member.target for e in entries if e.member.kind is Kind.LINK}
+    if not links:
+        return entries
+    present = {entry.path for entry in entries if entry.member.kind is not Kind.LINK}
+    present.update(folder for path in (*present, *links) for folder in parents(path))
+    kept = []
+    for entry in entries:
+        if entry.member.kind is Kind.LINK:
+            # `colcon build --symlink-install` and venv fill their folders with links out.
+            if is_within_leftover(entry.path, present):
+                continue
+            try:
+                end = resolve_link(entry.path, links)
+            except LeadsOut:
+                raise SubmissionError(
+                    f"{archive}: {shown(entry.path)}: the link to "
+                    f"{shown(entry.member.target)!r} leads out of the archive"
+                ) from None
+            if end not in present:
+                continue
+        kept.append(entry)
+    return kept
+
+
+class LeadsOut(Exception):
+    """A symbolic link leads out of the folder that it must stay in."""
+
+
+def resolve_link(path: str, links: Mapping[str, str]) -> str | None:
+    """Follow a link, and the links on its way, as the file system would.
+
+    Args:
+        path: Where the link is.
+        links: All links: path -> target.
+
+    Returns:
+        The path it ends at, whether or not something is there; None for a loop and for the
+        root itself.
+
+    Raises:
+        LeadsOut: A target on the way is absolute or goes above the root.
+    """
+    reached: list[str] = []
+    ahead = deque(path.split("/"))
+    hops = 0
+    while ahead:
+        part = ahead.popleft()
+        if part in ("", "."):
+            continue
+        if part == "..":
+            if not reached:
+                raise LeadsOut(path)
+            reached.pop()
+            continue
+        reached.append(part)
+        target = links.get("/".join(reached))
+        if target is None:
+            continue
+        hops += 1
+        if hops > _MAX_HOPS:
+            return None
+        if target.startswith("/"):
+            raise LeadsOut(path)
+        reached.pop()
+        ahead.extendleft(reversed(target.split("/")))
+    return "/".join(reached) or None

@@ -1,0 +1,1 @@
+"""Read a package's files without running them."""

@@ -1,0 +1,183 @@
+"""What ruff finds in a student's Python files.
+
+Every rule is asked for, and what a lesson wants is chosen when it is judged, so that a regrade
+with other rules needs neither the files nor ruff. Neither a configuration nor ``# noqa`` of the
+student's has a say.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections import Counter
+from collections.abc import Callable, Collection
+from functools import cache
+from pathlib import Path
+
+from grader.errors import GraderFault
+from grader.submission.build.bounded import OutputLimits, run_bounded
+from grader.submission.intake.paths import shown
+from grader.submission.read.code_facts import Lint, LintFinding
+from grader.submission.record import SourceError
+
+LINE_LENGTH = 99
+"""Of the ROS 2 style guide for Python."""
+
+EXCLUDED = {"D203": "D211", "D213": "D212"}
+"""Rules that ruff leaves out, each since it contradicts another one that it has."""
+
+_PYTHON = (3, 12)
+"""The Python of ROS 2 Jazzy."""
+_NEWER = re.compile(r"on Python [\d.]+ \(syntax was added in Python (\d+)\.(\d+)\)")
+_WALL_S = 20.0
+# No finding is decided by more places of one rule than a student can look at.
+_MOST_PLACES = 20
+
+
+def find_ruff() -> Path | None:
+    """The program: of this Python environment, or else on the path."""
+    own = Path(sysconfig.get_path("scripts")) / "ruff"
+    found = str(own) if own.is_file() else shutil.which("ruff")
+    return Path(found) if found else None
+
+
+@cache
+def known_rules(ruff: Path) -> frozenset[str]:
+    """Codes of all rules that ruff can report.
+
+    Raises:
+        GraderFault: It does not tell.
+    """
+    try:
+        told = subprocess.run(
+            [str(ruff), "rule", "--all", "--output-format", "json"],
+            capture_output=True,
+            timeout=_WALL_S,
+            check=True,
+        )
+        codes = {rule["code"] for rule in json.loads(told.stdout)}
+        return frozenset(code for code in codes if isinstance(code, str)) - EXCLUDED.keys()
+    except (OSError, subprocess.SubprocessError, ValueError, KeyError, TypeError) as error:
+        raise GraderFault(f"{ruff} does not tell its rules: {error}") from error
+
+
+def lint(root: Path, files: Collection[str], ruff: Path | None = None) -> Lint:
+    """Let ruff look at files; they are neither changed nor run.
+
+    Args:
+        root: Folder of the submission's private copy.
+        files: Paths in it.
+        ruff: The program, by default the one that is found.
+    """
+    ruff = ruff or find_ruff()
+    if ruff is None:
+        return Lint("ruff is not installed: `pip install ruff`")
+    if not files:
+        return Lint()
+    found: list[LintFinding] = []
+    problem = _check(ruff, root, files, _PYTHON, found.append)
+    # The code of a syntax error is a word, that of a rule begins with its family.
+    rules = [item for item in found if item.code[:1].isupper()]
+    return Lint(problem, () if problem else _first_of_each(rules))
+
+
+def newer_syntax(
+    root: Path,
+    files: Collection[str],
+    python: tuple[int, int] = sys.version_info[:2],
+    ruff: Path | None = None,
+) -> tuple[SourceError, ...]:
+    """Find files that only the Python of ROS 2 Jazzy can parse, and not the one that is here.
+
+    Args:
+        root: Folder of the submission's private copy.
+        files: Paths in it that the Python here cannot parse.
+        python: Version of the Python here.
+        ruff: The program, by default the one that is found.
+
+    Returns:
+        The first syntax in each that is too new for it, with ruff's words.
+    """
+    ruff = ruff or find_ruff()
+    if python >= _PYTHON or ruff is None or not files:
+        return ()
+    found: list[LintFinding] = []
+    if _check(ruff, root, files, python, found.append) is not None:
+        return ()
+    errors: dict[str, list[LintFinding]] = {}
+    for item in found:
+        if not item.code[:1].isupper():
+            errors.setdefault(item.file, []).append(item)
+    return tuple(
+        SourceError(file, items[0].line, items[0].message)
+        for file, items in sorted(errors.items())
+        if all(map(_is_jazzy_s, items))
+    )
+
+
+def _is_jazzy_s(error: LintFinding) -> bool:
+    newer = _NEWER.search(error.message)
+    return newer is not None and (int(newer[1]), int(newer[2])) <= _PYTHON
+
+
+def _check(
+    ruff: Path,
+    root: Path,
+    files: Collection[str],
+    python: tuple[int, int],
+    take: Callable[[LintFinding], object],
+) -> str | None:
+    """Run ruff with all rules; returns why that was not possible, or None."""
+
+    def read(line: str) -> None:
+        finding = _finding(line, root)
+        if finding is not None:
+            take(finding)
+
+    options = (
+        "--isolated --no-cache --no-fix --exit-zero --ignore-noqa --no-respect-gitignore --quiet "
+        f"--select ALL --line-length {LINE_LENGTH} --target-version py{python[0]}{python[1]} "
+        "--output-format json-lines"
+    )
+    try:
+        outcome = run_bounded(
+            [str(ruff), "check", *options.split(), "--", *(f"./{file}" for file in sorted(files))],
+            cwd=root,
+            environment={"PATH": os.defpath},
+            wall_s=_WALL_S,
+            output=OutputLimits(head=0, tail=2000),
+            on_line=read,
+        )
+    except GraderFault as fault:
+        return f"ruff could not be run: {fault}"
+    if outcome.status != 0:
+        how = f"was ended for its {outcome.ended_by_us}" if outcome.ended_by_us else "failed"
+        return f"ruff {how}"
+    return None
+
+
+def _finding(line: str, root: Path) -> LintFinding | None:
+    """What a line of ruff's output says; None for other output."""
+    try:
+        said = json.loads(line)
+        code, message = str(said["code"]), str(said["message"])
+        file = os.path.relpath(said["filename"], root)
+        number = int(said["location"]["row"])
+    except (ValueError, KeyError, TypeError):
+        return None
+    return LintFinding(code, shown(file), number, shown(message.partition("\n")[0]))
+
+
+def _first_of_each(found: list[LintFinding]) -> tuple[LintFinding, ...]:
+    seen: Counter[str] = Counter()
+    kept = []
+    for finding in sorted(found, key=lambda item: (item.file, item.line, item.code)):
+        seen[finding.code] += 1
+        if seen[finding.code] <= _MOST_PLACES:
+            kept.append(finding)
+    return tuple(kept)

@@ -1,0 +1,193 @@
+"""From the syntax tree of a student's Python file to the facts that checks of the source need.
+
+Nothing is imported or run; names are kept as they are written, and what they stand for is
+found out by who judges.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from grader.submission.read.code_facts import SourceClass, SourceFile, SourceFunction
+
+_MOST = 2000
+_LONGEST_NAME = 200
+_CONSOLE = ("sys.stdout", "sys.stderr", "stdout", "stderr", "sys.__stdout__", "sys.__stderr__")
+
+_Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """Where a node stands.
+
+    Attributes:
+        prefix: Of the qualified names of what is defined in it.
+        in_class: Whether it is the body of a class.
+    """
+
+    prefix: str = ""
+    in_class: bool = False
+
+
+def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
+    """Take the facts from a syntax tree.
+
+    Args:
+        tree: Of the file.
+        path: Of the file in the submission.
+        module: Dotted name that it is imported by.
+    """
+    classes: list[SourceClass] = []
+    functions: list[SourceFunction] = []
+    names: dict[str, str] = {}
+    stars: list[str] = []
+    prints: set[int] = set()
+    redefined = False
+    for node, scope in _walk(tree):
+        if isinstance(node, ast.ClassDef):
+            classes.append(_class(node, scope))
+            redefined |= node.name == "print"
+        elif isinstance(node, _Function):
+            functions.append(_function(node, scope))
+            redefined |= node.name == "print" and not scope.in_class
+        elif isinstance(node, ast.Import):
+            names.update(_imported(node))
+        elif isinstance(node, ast.ImportFrom):
+            origin = _origin(node, module, path)
+            for alias in node.names:
+                if alias.name == "*":
+                    stars.append(origin)
+                else:
+                    names[alias.asname or alias.name] = f"{origin}.{alias.name}"
+        elif isinstance(node, ast.Assign):
+            dotted = _dotted(node.value)
+            targets = [target.id for target in node.targets if isinstance(target, ast.Name)]
+            redefined |= "print" in targets
+            if dotted and not scope.prefix:
+                names.update(dict.fromkeys(targets, dotted))
+        prints.update(_prints(node))
+    return SourceFile(
+        path=path,
+        module=module,
+        documented=bool(ast.get_docstring(tree)),
+        classes=tuple(sorted(classes, key=lambda item: item.line)[:_MOST]),
+        functions=tuple(sorted(functions, key=lambda item: item.line)[:_MOST]),
+        names=tuple(sorted(names.items())[:_MOST]),
+        stars=tuple(dict.fromkeys(stars)),
+        prints=() if redefined else tuple(sorted(prints)[:_MOST]),
+    )
+
+
+def _walk(tree: ast.Module) -> Iterator[tuple[ast.AST, _Scope]]:
+    # A stack instead of recursion: how deep the tree is, is up to the student.
+    pending: list[tuple[ast.AST, _Scope]] = [(tree, _Scope())]
+    while pending:
+        node, scope = pending.pop()
+        yield node, scope
+        inner = scope
+        if isinstance(node, ast.ClassDef):
+            inner = _Scope(f"{scope.prefix}{node.name}."[-_LONGEST_NAME:], in_class=True)
+        elif isinstance(node, _Function):
+            inner = _Scope(f"{scope.prefix}{node.name}.<locals>."[-_LONGEST_NAME:])
+        # Reversed, so that the stack gives them in the order of the file.
+        pending += [(child, inner) for child in reversed(list(ast.iter_child_nodes(node)))]
+
+
+def _class(node: ast.ClassDef, scope: _Scope) -> SourceClass:
+    bases = tuple(dict.fromkeys(name for base in node.bases for name in _base_names(base)))
+    return SourceClass(
+        scope.prefix + node.name, node.lineno, bases[:_MOST], bool(ast.get_docstring(node))
+    )
+
+
+def _base_names(base: ast.expr) -> list[str]:
+    """The dotted name of a base class, or the names in an expression that makes one."""
+    if isinstance(base, ast.Subscript):
+        base = base.value
+    dotted = _dotted(base)
+    if dotted:
+        return [dotted]
+    found = (_dotted(node) for node in ast.walk(base) if isinstance(node, ast.Name | ast.Attribute))
+    return [name for name in found if name][:_MOST]
+
+
+def _function(node: _Function, scope: _Scope) -> SourceFunction:
+    decorators = [
+        _dotted(item.func if isinstance(item, ast.Call) else item) for item in node.decorator_list
+    ]
+    arguments = node.args
+    positional = [*arguments.posonlyargs, *arguments.args]
+    if scope.in_class and "staticmethod" not in decorators:
+        positional = positional[1:]
+    rest = [one for one in (arguments.vararg, arguments.kwarg) if one is not None]
+    return SourceFunction(
+        name=scope.prefix + node.name,
+        line=node.lineno,
+        documented=bool(ast.get_docstring(node)),
+        decorators=tuple(name for name in decorators if name),
+        unannotated=tuple(
+            one.arg for one in (*positional, *arguments.kwonlyargs, *rest) if one.annotation is None
+        ),
+        returns=node.returns is not None,
+    )
+
+
+def _imported(node: ast.Import) -> Iterator[tuple[str, str]]:
+    for alias in node.names:
+        # `import a.b` binds a; `import a.b as c` binds c to a.b.
+        first = alias.name.partition(".")[0]
+        yield (alias.asname, alias.name) if alias.asname else (first, first)
+
+
+def _origin(node: ast.ImportFrom, module: str, path: str) -> str:
+    """The absolute name of the module that is imported from."""
+    if not node.level:
+        return node.module or ""
+    package = module.split(".")
+    if not path.endswith("/__init__.py"):
+        package = package[:-1]
+    package = package[: len(package) - (node.level - 1)]
+    return ".".join([*package, *([node.module] if node.module else [])])
+
+
+def _prints(node: ast.AST) -> Iterator[int]:
+    """Lines where ``print`` is called or handed on, unless it writes to a file."""
+    if isinstance(node, ast.Call) and _is_print(node.func):
+        if _to_console(node):
+            yield node.lineno
+        return
+    # print handed on as a function; called, its name was seen with the call.
+    inner: list[ast.expr] = []
+    if isinstance(node, ast.Call):
+        inner = [*node.args, *(keyword.value for keyword in node.keywords)]
+    elif isinstance(node, ast.Assign) and node.value is not None:
+        inner = [node.value]
+    yield from (item.lineno for item in inner if _is_print(item))
+
+
+def _is_print(node: ast.expr) -> bool:
+    return _dotted(node) in ("print", "builtins.print")
+
+
+def _to_console(call: ast.Call) -> bool:
+    for keyword in call.keywords:
+        if keyword.arg == "file":
+            constant = isinstance(keyword.value, ast.Constant)
+            return constant or _dotted(keyword.value) in _CONSOLE
+    return True
+
+
+def _dotted(node: ast.expr) -> str:
+    """The dotted name that an expression is, or nothing."""
+    parts: list[str] = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    if not isinstance(node, ast.Name):
+        return ""
+    parts.append(node.id)
+    name = ".".join(reversed(parts))
+    return name if len(name) <= _LONGEST_NAME else ""
