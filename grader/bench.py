@@ -41,8 +41,8 @@ from grader.report.model.class_row import ClassRow
 from grader.report.model.facts import Clock, RunFacts
 from grader.report.model.result import make_result
 from grader.run.admission import Admission
-from grader.run.domain import lock_domain
-from grader.run.load import cpu_count
+from grader.run.cell.domain import lock_domain
+from grader.run.host.load import cpu_count
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose

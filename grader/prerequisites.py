@@ -13,7 +13,7 @@ from importlib import metadata
 
 from grader import ros
 from grader.errors import GraderFault
-from grader.run.load import cpu_count
+from grader.run.host.load import cpu_count
 from grader.spec.unit import format_duration
 
 
@@ -123,7 +123,7 @@ def _load() -> Part:
 
 
 def _discovery(installation: ros.RosInstallation) -> Part:
-    from grader.run.meeting import meet
+    from grader.run.cell.discovery_probe import meet
 
     meeting = meet(installation)
     if meeting.met_s is None:

@@ -30,7 +30,7 @@ from grader.batch.selftest import REFERENCE, Role, Trial, TrialResult, run_trial
 from grader.report.model.grade_part import differences
 from grader.resources import cache_folder
 from grader.run.admission import Admission
-from grader.run.load import cpu_count
+from grader.run.host.load import cpu_count
 from grader.run.runner import Runner
 from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose

@@ -13,7 +13,7 @@ from grader import resources, ros
 from grader.assignment.load import list_assignments, load_assignment
 from grader.batch.grading import Grading
 from grader.batch.selftest import Role, mutation_score, selftest, trials
-from grader.run.load import cpu_count
+from grader.run.host.load import cpu_count
 from grader.run.runner import Runner
 
 LEAST_MUTANTS = 12

@@ -22,7 +22,7 @@ from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
 from grader.report.files import write_whole
 from grader.report.html.replay import Replay
-from grader.run.load import cpu_count
+from grader.run.host.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.submission.build.bounded import OutputLimits

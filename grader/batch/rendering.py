@@ -21,7 +21,7 @@ from grader.report.model.class_row import ClassRow
 from grader.report.model.facts import RunFacts
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
-from grader.run.load import cpu_count
+from grader.run.host.load import cpu_count
 
 _MANY = 8
 """Reports from which on more than one process is worth its start."""

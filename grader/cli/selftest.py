@@ -55,7 +55,7 @@ def selftest(
     from grader.batch.selftest import Role, Trial, mutation_score, trials
     from grader.batch.selftest import selftest as run_selftest
     from grader.report.files import refuse_part
-    from grader.run.load import cpu_count
+    from grader.run.host.load import cpu_count
     from grader.run.runner import Runner
 
     def chosen_trial(trial: Trial) -> bool:

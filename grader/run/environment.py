@@ -8,7 +8,7 @@ from pathlib import Path
 
 import grader
 from grader.ros import RosInstallation
-from grader.run.enclosure import HOME
+from grader.run.process.process_sandbox import HOME
 
 _HERE = Path(__file__).resolve().parent
 TRACER = _HERE / "tracer"

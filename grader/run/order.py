@@ -10,7 +10,7 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
-from grader.run.enclosure import Enclosure
+from grader.run.process.process_sandbox import Enclosure
 from grader.run.stimuli.orders import StimulusOrder, from_dict, to_dict
 
 ORDER_FILE = "order.json"

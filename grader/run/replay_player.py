@@ -30,12 +30,12 @@ from grader.recording.mcap_reader import read_recording
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import NS
 from grader.report.text.clean import clean, one_line
-from grader.run.descendants import become_subreaper, kill_descendants
-from grader.run.domain import lock_domain
-from grader.run.probe import import_interface, qos_profile
+from grader.run.cell.domain import lock_domain
+from grader.run.cell.probe import import_interface, qos_profile
+from grader.run.cell.type_support import add_type_support
+from grader.run.process.descendants import become_subreaper, kill_descendants
 from grader.run.replay import ORDER_FILE, ReplayOrder
 from grader.run.stimuli.filling import plain
-from grader.run.type_support import add_type_support
 
 NAME = "rosgrade_replay"
 _TICK_S = 0.01

@@ -19,13 +19,13 @@ from grader.recording.fact import to_json
 from grader.recording.mcap_writer import write_recording
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
-from grader.run.cell_process import SCRATCH, CellProcess
-from grader.run.enclosing import enclose
+from grader.run.cell.cell_process import SCRATCH, CellProcess
+from grader.run.cell.middleware_hang import Stalled, stalled_recording
+from grader.run.cell.prefork_server import SIMULATOR_MODULE, Nursery
 from grader.run.environment import RMW, student_environment
-from grader.run.load import cpu_count
-from grader.run.nursery import SIMULATOR_MODULE, Nursery
+from grader.run.host.load import cpu_count
 from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
-from grader.run.stall import Stalled, stalled_recording
+from grader.run.sandboxed_order import enclose
 from grader.run.stimuli.ordering import stimulus_orders
 from grader.sandbox.python_tree import unlisted
 from grader.submission.record import SubmissionRecord

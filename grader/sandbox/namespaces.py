@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.sandbox.wire import Wire
+from grader.sandbox.packet_monitor import Wire
 
 CELL = Path("/cell")
 """Where a cell sees its folder."""

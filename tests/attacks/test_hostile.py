@@ -27,7 +27,7 @@ from grader.checks.finding import Status
 from grader.report.model.grade_part import grade_json
 from grader.report.model.result import result_json
 from grader.report.model.result_model import Result
-from grader.run.descendants import descendants
+from grader.run.process.descendants import descendants
 from grader.run.runner import Runner
 from grader.sandbox.sandbox import Sandbox
 from tests.attacks.conftest import LESSON

@@ -21,8 +21,8 @@ from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Status
 from grader.errors import GraderFault
 from grader.recording.model import NS, Ending, Kind, Owner, Recording
-from grader.run.descendants import command_line
 from grader.run.environment import cell_environment
+from grader.run.process.descendants import command_line
 from tests.checks.builder import judge
 from tests.run import nodes
 from tests.run.conftest import RunNode

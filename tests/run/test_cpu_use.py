@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.run.cpu_use import CpuMeter, CpuTimes, Interval, idle_ticks, interval, others_share
-from grader.run.descendants import Family, descendants
-from grader.run.disturbance import DisturbanceMeter
-from grader.run.run_delay import RunDelays
+from grader.run.host.cpu_use import CpuMeter, CpuTimes, Interval, idle_ticks, interval, others_share
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.run_delay import RunDelays
+from grader.run.process.descendants import Family, descendants
 
 MS = 1_000_000
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import subprocess
 
-from grader.run.descendants import command_line
+from grader.run.process.descendants import command_line
 
 
 def test_of_a_very_long_command_line_the_beginning_is_told() -> None:

@@ -7,7 +7,7 @@ import contextlib
 import pytest
 
 from grader.errors import GraderFault
-from grader.run.domain import DOMAINS, domains_of_ports, lock_domain
+from grader.run.cell.domain import DOMAINS, domains_of_ports, lock_domain
 
 
 def test_two_holders_never_have_the_same_domain() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from grader.run.guard import Guard
+from grader.run.process.guard import Guard
 from grader.sandbox.seccomp import can_end, guard_filter, guarded_calls, told_of
 
 pytest.importorskip("pyseccomp")

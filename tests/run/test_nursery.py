@@ -13,9 +13,9 @@ import pytest
 from grader import ros
 from grader.errors import GraderFault
 from grader.recording.mcap_reader import read_recording
-from grader.run.cell_process import CellProcess
-from grader.run.descendants import descendants
-from grader.run.nursery import Nursery
+from grader.run.cell.cell_process import CellProcess
+from grader.run.cell.prefork_server import Nursery
+from grader.run.process.descendants import descendants
 from grader.run.runner import Runner
 from grader.sandbox import bubblewrap
 from grader.sandbox.sandbox import Sandbox
@@ -32,7 +32,7 @@ def nurseries() -> set[int]:
     return {
         pid
         for pid, command in descendants(os.getpid()).items()
-        if "grader.run.nursery" in command
+        if "grader.run.cell.prefork_server" in command
         and f"PPid:\t{os.getpid()}\n" in Path(f"/proc/{pid}/status").read_text()
     }
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.recording.model import LogLine
-from grader.run.output import OutputReader, _Stream
+from grader.run.process.output import OutputReader, _Stream
 
 
 def read(*chunks: bytes, stream: str = "stdout", limit: int = 1 << 16) -> tuple[LogLine, ...]:

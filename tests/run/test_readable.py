@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from grader.run.nursery import _TOLD, ForkedCell
-from grader.run.readable import readable
+from grader.run.cell.prefork_server import _TOLD, ForkedCell
+from grader.run.host.readable import readable
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.run import run_delay
-from grader.run.run_delay import RunDelays
+from grader.run.host import run_delay
+from grader.run.host.run_delay import RunDelays
 
 BURN = """\
 import os, sys, time

@@ -12,8 +12,8 @@ from grader.assignment.model import Scenario
 from grader.checks.check import Subject
 from grader.checks.finding import Status
 from grader.grade.judge import grade
+from grader.run.cell.middleware_hang import ENDED_BY, Stall, stalled_recording
 from grader.run.order import CellOrder, Command, Limits, Until
-from grader.run.stall import ENDED_BY, Stall, stalled_recording
 from tests.checks.builder import submission
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.run.wall_clock import WallClock
+from grader.run.host.wall_clock import WallClock
 
 MS = 1_000_000
 

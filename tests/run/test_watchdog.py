@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.run import watchdog
-from grader.run.watchdog import Watchdog
+from grader.run.host import watchdog
+from grader.run.host.watchdog import Watchdog
 from grader.sandbox.limits import Limits
 
 

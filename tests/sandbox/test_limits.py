@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.errors import GraderFault
 from grader.recording.model import Breach
-from grader.run.enclosure import Enclosure
+from grader.run.process.process_sandbox import Enclosure
 from grader.sandbox.limits import BUILD, Limits
 from grader.sandbox.usage import (
     files_in_flight,

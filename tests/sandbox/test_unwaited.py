@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from grader.sandbox.unwaited import Process, Taken, Unwaited
+from grader.sandbox.orphan_cpu import Process, Taken, Unwaited
 from grader.sandbox.usage import CpuAccount, usage_of
 
 PARENT, CHILD, OTHER = Process(10, 1), Process(11, 2), Process(12, 3)

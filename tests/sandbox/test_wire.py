@@ -9,11 +9,11 @@ import sys
 import pytest
 
 from grader.sandbox import trial
-from grader.sandbox.wire import heartbeats
+from grader.sandbox.packet_monitor import heartbeats
 
 SOURCE = """\
 import fcntl, socket, struct
-from grader.sandbox.wire import Wire, bound_ports
+from grader.sandbox.packet_monitor import Wire, bound_ports
 from grader.sandbox.namespaces import _bring_up_loopback
 _bring_up_loopback()
 wire = Wire()

@@ -25,7 +25,7 @@ def test_figures_are_times() -> None:
 @pytest.mark.filterwarnings("ignore:module 'sre_:DeprecationWarning")
 def test_the_share_of_a_core_is_a_share() -> None:
     pytest.importorskip("rclpy")
-    from grader.run.domain import lock_domain
+    from grader.run.cell.domain import lock_domain
 
     with lock_domain() as lock:
         assert 0.0 < share_of_core(10, 0.2, lock.domain_id) < 8.0

@@ -18,7 +18,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from grader.errors import UsageError
-from grader.run.domain import lock_domain
+from grader.run.cell.domain import lock_domain
 from sim.__main__ import main
 from sim.live import parse_pose
 from sim.motion import Pose

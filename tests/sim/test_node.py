@@ -24,7 +24,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 
-from grader.run.domain import lock_domain
+from grader.run.cell.domain import lock_domain
 from sim.description import SimulatorOptions
 from sim.motion import NS, Pose, Twist
 from sim.node import RosSimulator, make_node

@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 from grader import ros
-from grader.run.domain import lock_domain
+from grader.run.cell.domain import lock_domain
 from grader.submission.prepare import prepare
 
 pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.compiles]

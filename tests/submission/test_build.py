@@ -15,7 +15,7 @@ import pytest
 from grader.diagnosis.not_built import why_not_built
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.run.descendants import descendants
+from grader.run.process.descendants import descendants
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
 from grader.submission.build.build_key import build_key

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.recording.model import Call
-from grader.run.probe import Probe, import_interface
+from grader.run.cell.probe import Probe, import_interface
 from grader.run.stimuli.filling import filled, plain
 
 NO_SERVER = "no server"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 
 from grader.recording.model import NS, Wait
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.asking import NO_SERVER, Asked
 from grader.run.stimuli.orders import CallOrder, GoalOrder, ParametersOrder
 from grader.run.stimuli.stage import Playing, Stage
-from grader.run.stopwatch import Stopwatch
 
 _POLL_S = 0.02
 # The server may match the client, for its answers, a moment later than the client the server.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from grader.recording.interaction import Feedback, Goal
-from grader.run.probe import import_interface
+from grader.run.cell.probe import import_interface
 from grader.run.stimuli.asking import NO_SERVER
 from grader.run.stimuli.calling import Asking
 from grader.run.stimuli.filling import filled, plain

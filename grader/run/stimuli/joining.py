@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from grader.recording.model import Join, Qos
-from grader.run.probe import qos_profile
+from grader.run.cell.probe import qos_profile
 from grader.run.stimuli.orders import JoinOrder
 from grader.run.stimuli.stage import Playing, Stage
 

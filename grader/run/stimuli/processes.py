@@ -6,9 +6,9 @@ import signal
 import time
 
 from grader.recording.model import Intervention
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.orders import KillOrder, RestartOrder
 from grader.run.stimuli.stage import Playing, Stage
-from grader.run.stopwatch import Stopwatch
 
 
 class Killing(Playing):

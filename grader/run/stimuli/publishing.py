@@ -10,12 +10,12 @@ from rclpy.serialization import serialize_message
 from grader.checks.qos.compatibility import refusals
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Kind, Qos, Wait
-from grader.run.probe import import_interface, qos_profile
+from grader.run.cell.probe import import_interface, qos_profile
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.answers import Answers
 from grader.run.stimuli.filling import filled
 from grader.run.stimuli.orders import PublishOrder
 from grader.run.stimuli.stage import Playing, Stage
-from grader.run.stopwatch import Stopwatch
 
 _POLL_S = 0.02
 # Of a node that declares nothing to us, the writer that answers may match a moment later.

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 from grader.recording.interaction import EXECUTOR_SERVICES
 from grader.recording.model import NS, Endpoint, Intervention, Join, Kind, Owner, Wait
-from grader.run.disturbance import DisturbanceMeter
-from grader.run.graph import GraphObserver
+from grader.run.cell.graph import GraphObserver
+from grader.run.cell.probe import Probe
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.order import Limits
-from grader.run.probe import Probe
+from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.asking import Asker
-from grader.run.stopwatch import Stopwatch
-from grader.run.student import StudentProcesses
 
 if TYPE_CHECKING:
     from grader.run.stimuli.calling import Asking

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from grader.errors import GraderFault, machine_fault
-from grader.oom import oom_kills
+from grader.out_of_memory import oom_kills
 from grader.ros import RosInstallation
 from grader.submission.build import build_log as buildlog
 from grader.submission.build import standalone_build as apart

@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterable, Sequence
 
-from grader.oom import oom_kills
+from grader.out_of_memory import oom_kills
 from grader.recording.model import Breach, Process
 
 

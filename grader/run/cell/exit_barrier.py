@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from grader.recording.model import Owner
-from grader.run.graph import GraphObserver
-from grader.run.output import OutputReader
-from grader.run.student import StudentProcesses
+from grader.run.cell.graph import GraphObserver
+from grader.run.process.output import OutputReader
+from grader.run.process.student import StudentProcesses
 
 
 class Leave:

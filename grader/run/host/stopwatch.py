@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from grader.run.disturbance import DisturbanceMeter
+from grader.run.host.disturbance import DisturbanceMeter
 
 _LONGEST_STRETCH = 8.0
 

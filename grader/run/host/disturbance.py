@@ -5,7 +5,7 @@ it was; and the kernel's run delay of each thread of the student, the time it wa
 run but had no CPU. A verdict that this could explain is not held against anybody.
 
 Of both only what others than the student's processes can explain is counted (see
-:mod:`grader.run.cpu_use`): who keeps the CPUs from himself was not disturbed.
+:mod:`grader.run.host.cpu_use`): who keeps the CPUs from himself was not disturbed.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from grader.recording.model import NS, Disturbance
-from grader.run.cpu_use import CpuMeter, CpuTimes, Interval, interval, others_share
-from grader.run.run_delay import RunDelays
+from grader.run.host.cpu_use import CpuMeter, CpuTimes, Interval, interval, others_share
+from grader.run.host.run_delay import RunDelays
 
 _TICK_S = 0.02
 _TICKS_PER_SAMPLE = 5

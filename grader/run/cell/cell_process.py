@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from grader.errors import GraderFault
-from grader.run.descendants import kill_by_variable
-from grader.run.nursery import Nursery
+from grader.run.cell.middleware_hang import ENDED_BY, Stalled
+from grader.run.cell.prefork_server import Nursery
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
-from grader.run.stall import ENDED_BY, Stalled
+from grader.run.process.descendants import kill_by_variable
 
 _ENDING_LIMIT_S = 10.0
 # Beyond every bounded wait of a cell, even stretched by a busy host: something of ours hangs.

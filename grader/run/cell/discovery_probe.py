@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass
 
 from grader.ros import RosInstallation
-from grader.run.domain import lock_domain
+from grader.run.cell.domain import lock_domain
 from grader.run.environment import cell_environment
 
 _LIMIT_S = 15.0
@@ -33,7 +33,7 @@ def meet(ros: RosInstallation) -> Meeting:
         environment = cell_environment(ros)
         environment["ROS_DOMAIN_ID"] = str(domain.domain_id)
         first = subprocess.Popen(
-            [str(ros.python), "-m", "grader.run.meeting", "listen"],
+            [str(ros.python), "-m", "grader.run.cell.discovery_probe", "listen"],
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -45,7 +45,7 @@ def meet(ros: RosInstallation) -> Meeting:
             if first.stdout.readline().strip() != "listening":
                 return Meeting(None, _last_line(first.communicate()[1]))
             second = subprocess.run(
-                [str(ros.python), "-m", "grader.run.meeting", "publish"],
+                [str(ros.python), "-m", "grader.run.cell.discovery_probe", "publish"],
                 env=environment,
                 capture_output=True,
                 text=True,

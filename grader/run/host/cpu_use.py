@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.recording.model import NS
-from grader.sandbox.unwaited import Process, Taken, Unwaited
+from grader.sandbox.orphan_cpu import Process, Taken, Unwaited
 
 _STAT = Path("/proc/stat")
 _TICK_NS = NS // os.sysconf("SC_CLK_TCK")

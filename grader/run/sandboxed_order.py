@@ -13,9 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.ros import RosInstallation
-from grader.run.enclosure import HOME, WORKSPACE, Enclosure
 from grader.run.environment import TRACER, TRACER_IN_SANDBOX, enclosed_environment
 from grader.run.order import CellOrder
+from grader.run.process.process_sandbox import HOME, WORKSPACE, Enclosure
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.limits import Limits

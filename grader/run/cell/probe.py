@@ -22,8 +22,8 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Call, Endpoint, Kind, Owner
+from grader.run.cell.rosout import RosoutLog, told_of_matches
 from grader.run.order import Limits, Topic
-from grader.run.rosout import RosoutLog, told_of_matches
 
 NAME = "rosgrade_probe"
 _BEFORE_ALL_NS = 1

@@ -13,7 +13,10 @@ from functools import partial
 from pathlib import Path
 
 from grader.recording.model import NS, Breach, Process
-from grader.run.descendants import (
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.stopwatch import Stopwatch
+from grader.run.order import Limits
+from grader.run.process.descendants import (
     descendants,
     is_init,
     is_stopped,
@@ -21,13 +24,10 @@ from grader.run.descendants import (
     kill_tree,
     reap,
 )
-from grader.run.disturbance import DisturbanceMeter
-from grader.run.enclosure import EnclosedProcess, Enclosure
-from grader.run.guard import Guard
-from grader.run.order import Limits
-from grader.run.output import OutputReader
-from grader.run.shared_memory import remove_orphaned_segments
-from grader.run.stopwatch import Stopwatch
+from grader.run.process.guard import Guard
+from grader.run.process.output import OutputReader
+from grader.run.process.process_sandbox import EnclosedProcess, Enclosure
+from grader.run.process.shared_memory import remove_orphaned_segments
 
 _AFTERMATH_S = 0.5
 _STOP_TICK_S = 0.005

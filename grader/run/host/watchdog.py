@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from grader.recording.model import Breach
-from grader.run.descendants import send
+from grader.run.process.descendants import send
 from grader.sandbox.limits import MIB, Limits, size_words
 from grader.sandbox.namespaces import STUDENT
 from grader.sandbox.usage import (

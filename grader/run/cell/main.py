@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 
 from grader.recording.definition import concatenated_definition, definition_finder
 from grader.recording.mcap_writer import write_recording
-from grader.run.cell import Abandoned, Cell
-from grader.run.descendants import become_subreaper, kill_descendants
-from grader.run.domain import DomainLock, lock_domain
+from grader.run.cell.cell import Abandoned, Cell
+from grader.run.cell.domain import DomainLock, lock_domain
+from grader.run.cell.probe import Probe
+from grader.run.cell.progress_events import keep_apart, tell
+from grader.run.cell.type_support import add_type_support
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
-from grader.run.probe import Probe
-from grader.run.telling import keep_apart, tell
-from grader.run.type_support import add_type_support
+from grader.run.process.descendants import become_subreaper, kill_descendants
 
 if TYPE_CHECKING:
     from grader.recording.model import Recording

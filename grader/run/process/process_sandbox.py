@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from grader.run.descendants import descendants
+from grader.run.process.descendants import descendants
 from grader.sandbox.limits import Limits
 
 WORKSPACE = "/ws"

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from grader.recording.model import NS, LogLine
-from grader.run.output import KeptLines
+from grader.run.process.output import KeptLines
 
 _TOPIC = "/rosout"
 _DEPTH = 1000

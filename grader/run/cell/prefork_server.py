@@ -1,7 +1,7 @@
 """A process that has imported what every cell imports, and forks into cells.
 
-``python -m grader.run.nursery SOCKET`` reads requests from the socket that it inherits as that
-descriptor. Interpreter start, imports and loading of the DDS libraries are most of what a cell
+``python -m grader.run.cell.prefork_server SOCKET`` reads requests from the socket that it inherits
+as that descriptor. Interpreter start, imports and loading of the DDS libraries are most of what a cell
 costs; here they are paid once for all cells of a batch. Nothing of a student's is ever imported
 by it, and it has neither a node nor a thread of its own, so that a fork of it is a whole
 process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without them.)
@@ -31,10 +31,10 @@ from typing import IO, TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.run.descendants import descendants, is_stopped, kill_tree, send
+from grader.run.cell.middleware_hang import Stall
 from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
-from grader.run.readable import readable
-from grader.run.stall import Stall
+from grader.run.host.readable import readable
+from grader.run.process.descendants import descendants, is_stopped, kill_tree, send
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.namespaces import CELL, enter
@@ -55,11 +55,11 @@ _STOPPED_S = 3.0
 _ORPHANED_LIMIT_S = 30.0
 """More than whoever needs cells waits before it kills them itself."""
 _ALWAYS = (
-    "grader.run.cell_main",
+    "grader.run.cell.main",
     "rcl_interfaces/msg/Log",
     "rcl_interfaces/srv/ListParameters",
 )
-SIMULATOR_MODULE = "grader.run.simulator"
+SIMULATOR_MODULE = "grader.run.cell.simulator"
 """What a cell with a simulated robot imports besides."""
 
 
@@ -146,7 +146,7 @@ class Nursery:
         self._sandbox = sandbox
         self._trees = _trees_of(sandbox)
         self._cells = Scratch("cells")
-        command = [str(ros.python), "-m", "grader.run.nursery", str(theirs.fileno())]
+        command = [str(ros.python), "-m", "grader.run.cell.prefork_server", str(theirs.fileno())]
         environment = cell_environment(ros, sandboxed=sandbox is not None)
         if sandbox is not None:
             bubblewrap.give(self._cells.path)
@@ -370,7 +370,7 @@ def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool)
     """Run a cell in this process, which was just forked, and end it."""
     status = 1
     try:
-        from grader.run.cell_main import main
+        from grader.run.cell.main import main
 
         os.setsid()
         signal.set_wakeup_fd(-1)

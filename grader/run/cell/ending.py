@@ -6,13 +6,13 @@ import time
 from typing import TYPE_CHECKING
 
 from grader.recording.model import NS
+from grader.run.host.stopwatch import Stopwatch
 from grader.run.order import Until
-from grader.run.output import OutputReader
-from grader.run.stopwatch import Stopwatch
+from grader.run.process.output import OutputReader
 
 if TYPE_CHECKING:
-    from grader.run.probe import Probe
-    from grader.run.simulator import SimulatedRobot
+    from grader.run.cell.probe import Probe
+    from grader.run.cell.simulator import SimulatedRobot
     from grader.run.stimuli.player import Player
 
 _AFTER_CONTACT_S = 1.0

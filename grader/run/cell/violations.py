@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from grader.run.graph import GraphObserver
-from grader.run.output import OutputReader
-from grader.run.student import StudentProcesses
-from grader.sandbox.wire import Wire, bound_ports
+from grader.run.cell.graph import GraphObserver
+from grader.run.process.output import OutputReader
+from grader.run.process.student import StudentProcesses
+from grader.sandbox.packet_monitor import Wire, bound_ports
 
 _MOST_MALFORMED = 10
 """Packets; nothing of good manners sends a single one."""

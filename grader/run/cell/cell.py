@@ -11,29 +11,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording, Wait
-from grader.run.descendants import Family
-from grader.run.disturbance import DisturbanceMeter
-from grader.run.domain import joined_domains
-from grader.run.ending import EndingConditions
-from grader.run.graph import GraphObserver
-from grader.run.leave import Leave
+from grader.run.cell.domain import joined_domains
+from grader.run.cell.ending import EndingConditions
+from grader.run.cell.exit_barrier import Leave
+from grader.run.cell.graph import GraphObserver
+from grader.run.cell.probe import Probe
+from grader.run.cell.progress_events import tell, tell_line
+from grader.run.cell.violations import Witnesses
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.memory_shortage import Shortage
+from grader.run.host.stopwatch import Stopwatch
+from grader.run.host.wall_clock import WallClock
+from grader.run.host.watchdog import Watchdog
 from grader.run.order import CellOrder, Command
-from grader.run.output import OutputReader
-from grader.run.probe import Probe
-from grader.run.shortage import Shortage
+from grader.run.process.descendants import Family
+from grader.run.process.output import OutputReader
+from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.player import Player
 from grader.run.stimuli.stage import Stage
-from grader.run.stopwatch import Stopwatch
-from grader.run.student import StudentProcesses
-from grader.run.telling import tell, tell_line
-from grader.run.wall_clock import WallClock
-from grader.run.watchdog import Watchdog
-from grader.run.witnesses import Witnesses
-from grader.sandbox.wire import Wire
+from grader.sandbox.packet_monitor import Wire
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
-    from grader.run.simulator import SimulatedRobot
+    from grader.run.cell.simulator import SimulatedRobot
 
 _TICK_S = 0.05
 _CALM_TICK_S = 0.1
@@ -85,7 +85,7 @@ class Cell:
         self._waits: list[Wait] = []
         self._robot: SimulatedRobot | None = None
         if order.simulator is not None:
-            from grader.run.simulator import SimulatedRobot
+            from grader.run.cell.simulator import SimulatedRobot
 
             self._robot = SimulatedRobot(probe.node, order.simulator)
         self._stage = Stage(

@@ -1,0 +1,1 @@
+"""The isolated place of one run: the probe, the simulator, and how a run ends."""

@@ -1,0 +1,1 @@
+"""What the machine takes from a run: CPU time, memory, the clock."""

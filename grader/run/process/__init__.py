@@ -1,0 +1,1 @@
+"""The student's processes: their start, their output, their end."""
