@@ -1,10 +1,11 @@
 """A process that has imported what every cell imports, and forks into cells.
 
-``python -m grader.run.cell.prefork_server SOCKET`` reads requests from the socket that it inherits
-as that descriptor. Interpreter start, imports and loading of the DDS libraries are most of what a cell
-costs; here they are paid once for all cells of a batch. Nothing of a student's is ever imported
-by it, and it has neither a node nor a thread of its own, so that a fork of it is a whole
-process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without them.)
+``python -m grader.run.cell.prefork_server SOCKET`` reads requests from the socket that it
+inherits as that descriptor. Interpreter start, imports and loading of the DDS libraries are most
+of what a cell costs; here they are paid once for all cells of a batch. Nothing of a student's is
+ever imported by it, and it has neither a node nor a thread of its own, so that a fork of it is a
+whole process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without
+them.)
 """
 
 from __future__ import annotations
