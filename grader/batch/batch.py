@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from grader.assignment.load import LoadedAssignment
-from grader.batch.executor import Crew, CrewLost
+from grader.batch.executor import BatchExecutor, ExecutorLost
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
 from grader.batch.intake import HandedIn
@@ -108,18 +108,18 @@ class Batch:
         self._write()
         return list(self._entries.values()), to_do
 
-    def grade(self, to_do: dict[str, Path], crew: Crew | None) -> Iterator[Done]:
+    def grade(self, to_do: dict[str, Path], executor: BatchExecutor | None) -> Iterator[Done]:
         """Grade, and put each result into place as soon as it is there.
 
         Args:
             to_do: What to grade, by key.
-            crew: Who does it; needed where there is anything to do.
+            executor: Who does it; needed where there is anything to do.
 
         Yields:
             Every row, in the order in which they are finished; at first those that were.
 
         Raises:
-            CrewLost: There is nobody any more who could grade the others.
+            ExecutorLost: There is nobody any more who could grade the others.
             UsageError: The folder of the results is not there any more.
         """
         for key, entry in self._entries.items():
@@ -128,11 +128,11 @@ class Batch:
         waiting = list(to_do.items())[::-1]
         running: dict[Future[None], tuple[str, Path]] = {}
         try:
-            while crew is not None and (waiting or running):
-                while waiting and len(running) < crew.capacity:
+            while executor is not None and (waiting or running):
+                while waiting and len(running) < executor.capacity:
                     key, path = waiting.pop()
                     partial = self.ledger.partial(key)
-                    running[crew.submit(key, path, partial)] = (key, partial)
+                    running[executor.submit(key, path, partial)] = (key, partial)
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     key, partial = running.pop(future)
@@ -205,7 +205,7 @@ class Batch:
         try:
             future.result()
             self.ledger.put(key, partial)
-        except CrewLost:
+        except ExecutorLost:
             raise
         except Exception as error:
             self._entries[key] = self._with_fault(self._entries[key], error)

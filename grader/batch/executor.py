@@ -19,11 +19,11 @@ _EACH_WORKER = 2
 """Submissions on their way to a thread of a worker: one is graded, one waits."""
 
 
-class CrewLost(GraderFault):
+class ExecutorLost(GraderFault):
     """Nobody is left to grade what was handed over, nor anything else."""
 
 
-class Crew(Protocol):
+class BatchExecutor(Protocol):
     """Grades submissions."""
 
     @property
@@ -33,14 +33,14 @@ class Crew(Protocol):
     def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
         """Grade what is at a path, and leave report, result and recordings in a folder.
 
-        A future that ends with :class:`CrewLost` says nothing of its submission.
+        A future that ends with :class:`ExecutorLost` says nothing of its submission.
         """
 
     def close(self) -> None:
         """End what is being graded and let nothing of it run on."""
 
 
-class LocalCrew:
+class LocalExecutor:
     """Threads of this process; the cells and builds below them are what takes the CPUs."""
 
     def __init__(self, grading: Grading, jobs: int) -> None:
@@ -55,11 +55,11 @@ class LocalCrew:
         self._pool = ThreadPoolExecutor(max_workers=jobs, thread_name_prefix="submission")
 
     def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
-        """See :class:`Crew`."""
+        """See :class:`BatchExecutor`."""
         return self._pool.submit(self._grade, key, path, folder)
 
     def close(self) -> None:
-        """See :class:`Crew`."""
+        """See :class:`BatchExecutor`."""
         self._pool.shutdown(wait=False, cancel_futures=True)
         self._grading.close()
         self._pool.shutdown()
@@ -95,7 +95,7 @@ def _connected(address: str, connect: Any) -> Any:
     return answer.result()
 
 
-class DaskCrew:
+class DaskExecutor:
     """Workers of a cluster: one task for each submission.
 
     A worker that dies loses no submission: the scheduler gives its tasks to others.
@@ -129,7 +129,7 @@ class DaskCrew:
 
     @property
     def capacity(self) -> int:
-        """See :class:`Crew`; workers come and go."""
+        """See :class:`BatchExecutor`; workers come and go."""
         return max(1, _EACH_WORKER * self._threads())
 
     def _threads(self) -> int:
@@ -138,11 +138,11 @@ class DaskCrew:
         except OSError:
             return 0
 
-    def _lost(self) -> CrewLost:
-        return CrewLost(f"the Dask scheduler at {self._address} was lost")
+    def _lost(self) -> ExecutorLost:
+        return ExecutorLost(f"the Dask scheduler at {self._address} was lost")
 
     def submit(self, key: str, path: Path, folder: Path) -> Future[None]:
-        """See :class:`Crew`."""
+        """See :class:`BatchExecutor`."""
         done: Future[None] = Future()
         try:
             parcel = Parcel.of(key, path)
@@ -175,5 +175,5 @@ class DaskCrew:
         return done
 
     def close(self) -> None:
-        """See :class:`Crew`."""
+        """See :class:`BatchExecutor`."""
         self._client.close()

@@ -136,7 +136,7 @@ class Grading:
         return self.grade_prepared(prepared, folder)
 
     @property
-    def enclosure(self) -> str:
+    def process_sandbox(self) -> str:
         """The sandbox that is in force, in a few words."""
         return self._runner.sandbox.description if self._runner.sandbox else "none"
 

@@ -195,8 +195,8 @@ def _told(graded: Graded, check: str) -> Iterator[str]:
         recording = graded.recordings.get(item.scenario or "")
         if recording is not None:
             place = f" in {item.scenario}"
-            taken_s = recording.taken_s(recording.launched_ns, recording.end_ns)
-            taken = f" (the machine took {format_duration(taken_s)} from the run)"
+            stolen_s = recording.stolen_s(recording.launched_ns, recording.end_ns)
+            taken = f" (the machine took {format_duration(stolen_s)} from the run)"
         yield f"{check}{place}: {item.finding.observed}{taken}"
 
 

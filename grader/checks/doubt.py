@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 
-from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.lateness import stolen_s
 from grader.recording.model import NS, Recording
 
 # As long as a timer of 10 Hz makes a command wait anyway; tolerances are made for that.
@@ -52,7 +52,7 @@ def _was_out_of_hand(recording: Recording) -> bool:
         return False
     begin_ns, end_ns = recording.truth[0].time_ns, recording.truth[-1].time_ns
     return any(
-        taken_s(recording, item.time_ns, item.time_ns + _STALL_WINDOW_NS) > _STALL_S
+        stolen_s(recording, item.time_ns, item.time_ns + _STALL_WINDOW_NS) > _STALL_S
         for item in recording.disturbance
         if begin_ns <= item.time_ns <= end_ns and item.waited_ns + item.late_ns
     )
@@ -67,9 +67,9 @@ def _did_not_meet(recording: Recording) -> bool:
     silent = any(call.service not in answered for call in recording.calls) or any(
         goal.answered_ns is None for goal in recording.goals
     )
-    return silent and recording.taken_s(recording.launched_ns, recording.stop_ns) > _HELD_UP_S
+    return silent and recording.stolen_s(recording.launched_ns, recording.stop_ns) > _HELD_UP_S
 
 
 def was_held_up(recording: Recording) -> bool:
     """Whether the machine was so busy that discovery may have lost what a node announces."""
-    return recording.taken_s(recording.launched_ns, recording.stop_ns) > _LOST_S
+    return recording.stolen_s(recording.launched_ns, recording.stop_ns) > _LOST_S

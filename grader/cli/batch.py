@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from grader.batch.batch import Done
-    from grader.batch.executor import Crew
+    from grader.batch.executor import BatchExecutor
     from grader.batch.intake import HandedIn
     from grader.batch.roster import Roster
 
@@ -69,7 +69,7 @@ def batch(
     from grader.assignment.load import load_assignment, refuse_swapped
     from grader.batch.batch import Batch
     from grader.batch.class_files import GRADES_FILE, write_class
-    from grader.batch.executor import CrewLost, DaskCrew, LocalCrew
+    from grader.batch.executor import DaskExecutor, ExecutorLost, LocalExecutor
     from grader.batch.ledger import Ledger
     from grader.batch.worker import Order, make_grading
     from grader.report.files import check_folder, refuse_inputs, refuse_part
@@ -89,7 +89,7 @@ def batch(
     began_s = time.monotonic()
     with Scratch("batch") as staging, ClassProgress(quiet) as progress:
         if grading is not None:
-            progress.say(f"sandbox: {grading.enclosure}")
+            progress.say(f"sandbox: {grading.process_sandbox}")
         names, rows = _rows(submissions, roster, out, staging, progress)
         problems = names.problems if names else ()
         for problem in problems[:_MOST_PROBLEMS]:
@@ -102,19 +102,19 @@ def batch(
             work = Batch(loaded, ledger, frozenset(retry or ()))
             progress.begin("reading", len(rows))
             entries, to_do = work.read(rows, progress.advance)
-            crew: Crew | None = None
+            executor: BatchExecutor | None = None
             if to_do and scheduler is not None:
-                crew = DaskCrew(scheduler, order)
+                executor = DaskExecutor(scheduler, order)
             elif to_do and grading is not None:
-                crew = LocalCrew(grading, admission.most)
+                executor = LocalExecutor(grading, admission.most)
             done: list[Done] = []
             known = [e for e in entries if e.key not in to_do and ledger.result(e.key) is not None]
             progress.begin("grading", len(entries), already=len(known))
             try:
-                for item in work.grade(to_do, crew):
+                for item in work.grade(to_do, executor):
                     done.append(item)
                     progress.advance(item.entry.key, _said(item), fresh=item.fresh)
-            except (KeyboardInterrupt, CrewLost):
+            except (KeyboardInterrupt, ExecutorLost):
                 with _undisturbed():
                     progress.note(
                         f"interrupted; {len(done)} of {len(entries)} are in {out}, and the same "
@@ -123,8 +123,8 @@ def batch(
                     write_class([*done, *work.left(done)], ledger)
                 raise
             finally:
-                if crew is not None:
-                    crew.close()
+                if executor is not None:
+                    executor.close()
             overview = write_class(done, ledger)
     console = output_console()
     console.print(_summary(done, time.monotonic() - began_s), soft_wrap=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.process.process_exit import dead, ended_early
+from grader.diagnosis.process.process_exit import ended_early, exited
 from grader.recording.interaction import Service
 from grader.recording.model import Endpoint, Kind, Recording
 
@@ -61,8 +61,8 @@ def why_destroyed(
         return None
     last_ns = max(ends)
     for item in found:
-        process = testimony.process_of(recording, item.node)
-        if ended_early(recording, process) if process is not None else dead(recording):
+        process = declarations.process_of(recording, item.node)
+        if ended_early(recording, process) if process is not None else exited(recording):
             return None
         if any(
             done.time_ns <= last_ns and (process is None or process.name == done.process)

@@ -35,7 +35,7 @@ class Reported(Parameters):
     callbacks: tuple[str, ...] = Field(min_length=1, description="Names of the callbacks.")
 
 
-def why_unreported(
+def why_reports_are_missing(
     recording: Recording,
     topic: str,
     callbacks: Sequence[str],
@@ -91,12 +91,12 @@ def _incomplete(
     begun, ended = len(reports.of(name)), len(reports.ended([name]))
     begin_ns = recording.matched_ns or recording.launched_ns
     watched_s = (recording.stop_ns - begin_ns) / NS
-    taken_s = recording.taken_s(begin_ns, recording.stop_ns)
+    stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
     # With the time that was taken from it, the node may have come to as many as are needed.
-    if taken_s > 0.0 and ended * watched_s >= at_least * (watched_s - taken_s):
+    if stolen_s > 0.0 and ended * watched_s >= at_least * (watched_s - stolen_s):
         return Cause.to_repeat(
             f"{code(name)} ran {counted(ended, 'time')}, but the machine took "
-            f"{format_duration(taken_s)} of {format_duration(watched_s)} from the process"
+            f"{format_duration(stolen_s)} of {format_duration(watched_s)} from the process"
         )
     if begun > ended:
         return Cause(

@@ -6,14 +6,14 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.no_server import Word, offered
 from grader.diagnosis.process.blocked_executor import why_never_spun
-from grader.diagnosis.process.process_exit import cause_of_death, dead, ended_early
+from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place, parse_failures, student_place
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
@@ -49,7 +49,7 @@ def why_unanswered(
     own = offered(recording, server, name)
     # A parameter service is named after its node.
     node = own[-1].node if own else name.rpartition("/")[0]
-    process = testimony.process_of(recording, node)
+    process = declarations.process_of(recording, node)
     moment = Moment("asked, not answered in time", recording.since_launch_s(asked_ns))
     cause = (
         why_gone(recording, what, node)
@@ -93,10 +93,10 @@ def why_gone(recording: Recording, what: str, node: str) -> Cause | None:
         what: What came of it, in words.
         node: Fully qualified name.
     """
-    process = testimony.process_of(recording, node)
-    ended = dead(recording) if process is None else (process,)
+    process = declarations.process_of(recording, node)
+    ended = exited(recording) if process is None else (process,)
     if ended and ended_early(recording, ended[0]):
-        return cause_of_death(recording, ended[0]).after(what)
+        return why_it_exited(recording, ended[0]).after(what)
     return None
 
 
@@ -114,15 +114,15 @@ def why_taken(
         end_ns: When it came, or when the observation ended.
         within_s: How long it may have taken.
     """
-    taken_s = recording.taken_s(begin_ns, end_ns)
+    stolen_s = recording.stolen_s(begin_ns, end_ns)
     excess_s = (end_ns - begin_ns) / NS - within_s
     if excess_s < -_ROUNDING_S:
         ended = format_duration((end_ns - begin_ns) / NS)
         return Cause.to_repeat(f"{what}: the run ended {ended} later, before that was due")
-    if taken_s <= 0.0 or taken_s < excess_s:
+    if stolen_s <= 0.0 or stolen_s < excess_s:
         return None
     return Cause.to_repeat(
-        f"{what}, but the machine took {format_duration(taken_s)} from the process meanwhile"
+        f"{what}, but the machine took {format_duration(stolen_s)} from the process meanwhile"
     )
 
 
@@ -136,7 +136,7 @@ def why_one_cpu(recording: Recording, what: str) -> Cause | None:
     spins = [item.data for item in recording.declared("spin")]
     alone = any(item.get("executor") == _MULTI and item.get("threads") == 1 for item in spins)
     one_cpu = recording.environment.get("cpus", "1") == "1"
-    if not (alone and one_cpu and testimony.traced(recording)):
+    if not (alone and one_cpu and declarations.traced(recording)):
         return None
     return Cause(
         f"{what}: MultiThreadedExecutor() has as many threads as the machine has CPUs, and here "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.finding import Evidence, Table
 from grader.checks.first_seen import endpoints_seen, nodes_seen
 from grader.checks.wording import code, codes
@@ -13,7 +13,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.near_name import Named, why_misnamed
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.process_exit import cause_of_death, dead
+from grader.diagnosis.process.process_exit import crashed, why_it_exited
 from grader.recording.model import Endpoint, Kind, Owner, Recording
 
 # Every rclpy node has these by itself; they say nothing of what the student wrote.
@@ -48,12 +48,12 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
         moments=endpoints_seen(recording, own) or nodes_seen(recording),
         tables=_endpoints_table(recording),
     )
-    ended = [process for process in dead(recording) if process.exit_code != 0]
+    ended = crashed(recording)
     # What a process that lives has is no misspelling of what a dead one never came to create.
     suspects = [
         item
         for item in own
-        if not ended or testimony.process_of(recording, item.node) in (None, *ended)
+        if not ended or declarations.process_of(recording, item.node) in (None, *ended)
     ]
     near = why_misnamed(
         topic,
@@ -65,9 +65,9 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
     if near is not None:
         return near
     if ended:
-        return cause_of_death(recording, ended[0])
-    if testimony.declares(recording, kind.value, "topic", topic):
-        return testimony.why_never_appeared(recording, f"a {kind.value} on {code(topic)}")
+        return why_it_exited(recording, ended[0])
+    if declarations.declares(recording, kind.value, "topic", topic):
+        return declarations.why_never_appeared(recording, f"a {kind.value} on {code(topic)}")
     exchanged = why_exchanged(recording)
     if exchanged is not None:
         return exchanged.after(f"there is no {kind.value} on {code(topic)}")

@@ -109,15 +109,15 @@ def _disturbed(
     blocked: Cause | None,
 ) -> Cause | None:
     begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + within_ns
-    taken_s = recording.taken_s(begin_ns, end_ns)
+    stolen_s = recording.stolen_s(begin_ns, end_ns)
     if len(echoes(recording, wanted, decimals, within_ns, forgive=True)) < needed:
-        if taken_s < _STARVED * (end_ns - begin_ns) / NS:
+        if stolen_s < _STARVED * (end_ns - begin_ns) / NS:
             return None
         if blocked is not None:
             return replace(blocked, disturbed=True)
     return Cause.to_repeat(
         f"log lines for {code(topic)} are late or missing, but the machine took "
-        f"{format_duration(taken_s)} from the process meanwhile"
+        f"{format_duration(stolen_s)} from the process meanwhile"
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import endpoints_seen, until_the_end
@@ -125,16 +125,16 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
         Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
         for index, message in enumerate(messages[:10], start=1)
     )
-    taken_s = recording.taken_s(begin_ns, recording.stop_ns)
+    stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
     # With the time that was taken from it, the node may have come to as many as are needed.
-    if taken_s > 0.0 and len(messages) * watched_s >= needed * (watched_s - taken_s):
+    if stolen_s > 0.0 and len(messages) * watched_s >= needed * (watched_s - stolen_s):
         return Cause.to_repeat(
-            f"{seen}, but the machine took {format_duration(taken_s)} of them from the process"
+            f"{seen}, but the machine took {format_duration(stolen_s)} of them from the process"
         )
     destroyed = why_unpublished(recording, topic, seen)
     if destroyed is not None:
         return destroyed
-    period_s = [timer.period_s for timer in testimony.timers(recording)]
+    period_s = [timer.period_s for timer in declarations.timers(recording)]
     periods = list(map(format_duration, period_s))
     unspun = why_never_spun(recording, seen, moments=moments) if periods else None
     if unspun is not None:
@@ -157,15 +157,15 @@ def why_few(recording: Recording, topic: str, needed: int) -> Cause:
     )
 
 
-def _slow_timer(recording: Recording) -> testimony.DeclaredTimer | None:
+def _slow_timer(recording: Recording) -> declarations.DeclaredTimer | None:
     """A declared timer that could not fire before the end of the observation, if all are such."""
-    timers = testimony.timers(recording)
+    timers = declarations.timers(recording)
     if not timers or any(_fires(recording, timer) for timer in timers):
         return None
     return min(timers, key=lambda timer: timer.period_s)
 
 
-def _fires(recording: Recording, timer: testimony.DeclaredTimer) -> bool:
+def _fires(recording: Recording, timer: declarations.DeclaredTimer) -> bool:
     return timer.declared_ns + timer.period_s * NS <= recording.stop_ns
 
 
@@ -277,12 +277,12 @@ def _unanswered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cau
 
 def _starved(recording: Recording, topic: str) -> Cause | None:
     begin_ns = recording.matched_ns or recording.launched_ns
-    taken_s = recording.taken_s(begin_ns, recording.stop_ns)
+    stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
     watched_s = (recording.stop_ns - begin_ns) / NS
-    if taken_s < _STARVED * watched_s:
+    if stolen_s < _STARVED * watched_s:
         return None
     return Cause.to_repeat(
-        f"no message on {code(topic)}, but the machine took {format_duration(taken_s)} of "
+        f"no message on {code(topic)}, but the machine took {format_duration(stolen_s)} of "
         f"{format_duration(watched_s)} from the process"
     )
 
@@ -322,7 +322,7 @@ def _idle(recording: Recording, topic: str) -> Cause:
         log=tuple(complaints[-_LOG_LINES:]),
     )
     heard = _heard(recording, topic)
-    if heard and not testimony.said(recording, "timer"):
+    if heard and not declarations.said(recording, "timer"):
         return Cause(
             f"the publisher on {code(topic)} is there but silent, although {heard} reached the "
             "node",
@@ -330,8 +330,8 @@ def _idle(recording: Recording, topic: str) -> Cause:
             "`return` before it, and for an `except: pass` that hides an error.",
             evidence,
         )
-    traced = testimony.traced(recording)
-    if traced and not testimony.said(recording, "timer"):
+    traced = declarations.traced(recording)
+    if traced and not declarations.said(recording, "timer"):
         return Cause(
             f"the publisher on {code(topic)} is there but silent, and the process declared no "
             "timer that would call it",
@@ -340,9 +340,9 @@ def _idle(recording: Recording, topic: str) -> Cause:
             "calls it: self.create_timer(period_in_seconds, self.callback) does.",
             evidence,
         )
-    timers = [timer for timer in testimony.timers(recording) if _fires(recording, timer)]
+    timers = [timer for timer in declarations.timers(recording) if _fires(recording, timer)]
     runs = [format_duration(timer.period_s) for timer in timers]
-    spins = testimony.said(recording, "spin")
+    spins = declarations.said(recording, "spin")
     though = f", although the process declared a timer of {listing(runs)}" if runs and spins else ""
     seen = f"the publisher on {code(topic)} is there but silent{though}"
     if runs and all(timer.callback.endswith("<lambda>") for timer in timers):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.finding import Evidence
 from grader.checks.first_seen import nodes_seen, until_the_end
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.not_built import why_not_built
-from grader.diagnosis.process.process_exit import cause_of_death, dead, why_ended
+from grader.diagnosis.process.process_exit import crashed, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.nearest_name import nearest
@@ -76,8 +76,8 @@ def _hangs(recording: Recording, process: Process) -> Cause:
             "Do not set ROS_DOMAIN_ID or domain_id in the code: the environment chooses it.",
             Evidence(moments=(nothing,)),
         )
-    if testimony.said(recording, "node", name):
-        return testimony.why_never_appeared(recording, "a node")
+    if declarations.said(recording, "node", name):
+        return declarations.why_never_appeared(recording, "a node")
     place = interrupted_place(recording, name)
     evidence = Evidence(
         moments=(nothing,),
@@ -91,13 +91,13 @@ def _hangs(recording: Recording, process: Process) -> Cause:
             "A launched node has no keyboard: take the value from a ROS parameter.",
             evidence,
         )
-    if testimony.said(recording, "init", name):
+    if declarations.said(recording, "init", name):
         return Cause(
             f"{who} called rclpy.init() but created no node until the end{where}",
             "Create the node right after rclpy.init(): no loop and no sleep before it.",
             evidence,
         )
-    if testimony.traced(recording, name):
+    if declarations.traced(recording, name):
         return Cause(
             f"{who} ran until the end but never called rclpy.init(){where}",
             "Look for a loop, a sleep or input() at the top level of a module or before "
@@ -133,14 +133,14 @@ def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
             )
     # Without the namespaces, which make any two names alike.
     if nearest(base, [name.rpartition("/")[2] for name in names]) is None:
-        ended = [process for process in dead(recording) if process.exit_code != 0]
+        ended = crashed(recording)
         if ended:
-            return cause_of_death(recording, ended[0])
+            return why_it_exited(recording, ended[0])
     # A process may declare anything, also what is no text.
     declared = {str(item.data.get("node")) for item in recording.declared("node")}
     # A process that shows as many nodes as it declared only calls them by other names.
     if wanted in declared and len(declared) > len(set(names)):
-        return testimony.why_never_appeared(recording, f"the node {code(wanted)}").after(there)
+        return declarations.why_never_appeared(recording, f"the node {code(wanted)}").after(there)
     exchanged = why_exchanged(recording)
     if exchanged is not None:
         return exchanged.after(there)

@@ -12,7 +12,7 @@ from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.near_name import Named, why_misnamed
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.process_exit import cause_of_death, dead
+from grader.diagnosis.process.process_exit import crashed, why_it_exited
 from grader.recording.interaction import Service
 from grader.recording.model import Recording
 
@@ -151,9 +151,9 @@ def why_not_offered(
     )
     if near is not None:
         return near
-    ended = [process for process in dead(recording) if process.exit_code != 0]
+    ended = crashed(recording)
     if ended:
-        return cause_of_death(recording, ended[0])
+        return why_it_exited(recording, ended[0])
     wrong = ACTION if word is SERVICE else SERVICE
     if any(item.name == name for item in _of_students(recording, wrong)):
         return Cause(

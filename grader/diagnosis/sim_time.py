@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.finding import Evidence
 from grader.checks.first_seen import endpoints_seen
 from grader.checks.wording import code, listing
@@ -25,7 +25,7 @@ def why_time_stands_still(recording: Recording, what: str) -> Cause | None:
     """
     listeners = recording.student_endpoints(Kind.SUBSCRIPTION, _CLOCK)
     told = any(item.topic == _CLOCK and item.kind is Kind.PUBLISHER for item in recording.endpoints)
-    timers = testimony.timers(recording)
+    timers = declarations.timers(recording)
     if told or not listeners or not timers:
         return None
     periods = listing(format_duration(timer.period_s) for timer in timers)

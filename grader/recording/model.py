@@ -572,7 +572,7 @@ class Recording:
         """Seconds from launch to a time."""
         return (time_ns - self.launched_ns) / NS
 
-    def taken_s(self, begin_ns: int, end_ns: int) -> float:
+    def stolen_s(self, begin_ns: int, end_ns: int) -> float:
         """How much the host took from the run in ``[begin_ns, end_ns]``, at most.
 
         The sum of the student's waits for a CPU and the worst lateness of the metronome, over

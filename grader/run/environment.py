@@ -77,7 +77,7 @@ def student_environment(ros: RosInstallation, install: Path, scratch: Path) -> d
     return environment
 
 
-def enclosed_environment(
+def sandboxed_environment(
     environment: Mapping[str, str], places: Mapping[str, str]
 ) -> dict[str, str]:
     """The same variables of a student's process for one in a sandbox.

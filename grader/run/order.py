@@ -10,7 +10,7 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
-from grader.run.process.process_sandbox import Enclosure
+from grader.run.process.process_sandbox import ProcessSandbox
 from grader.run.stimuli.orders import StimulusOrder, from_dict, to_dict
 
 ORDER_FILE = "order.json"
@@ -134,7 +134,7 @@ class CellOrder:
         values: Random values of the scenario, to go into the recording.
         facts: Environment facts to go into the recording.
         type_support: Install spaces of ours with interfaces that the probe needs.
-        enclosure: The sandbox of each process of the student, or None.
+        process_sandbox: The sandbox of each process of the student, or None.
         tells_output: Whether lines that the student prints are told as they come.
     """
 
@@ -153,7 +153,7 @@ class CellOrder:
     values: dict[str, float] = field(default_factory=dict)
     facts: dict[str, str] = field(default_factory=dict)
     type_support: tuple[str, ...] = ()
-    enclosure: Enclosure | None = None
+    process_sandbox: ProcessSandbox | None = None
     tells_output: bool = False
 
     def to_json(self) -> str:
@@ -176,6 +176,6 @@ class CellOrder:
         data["limits"] = Limits(**data["limits"])
         data["prefixes"] = tuple(data["prefixes"])
         data["type_support"] = tuple(data["type_support"])
-        if data["enclosure"] is not None:
-            data["enclosure"] = Enclosure.from_dict(data["enclosure"])
+        if data["process_sandbox"] is not None:
+            data["process_sandbox"] = ProcessSandbox.from_dict(data["process_sandbox"])
         return cls(**data)

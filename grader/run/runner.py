@@ -20,12 +20,12 @@ from grader.recording.mcap_writer import write_recording
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
 from grader.run.cell.cell_process import SCRATCH, CellProcess
-from grader.run.cell.middleware_hang import Stalled, stalled_recording
-from grader.run.cell.prefork_server import SIMULATOR_MODULE, Nursery
+from grader.run.cell.middleware_hang import MiddlewareHung, hung_recording
+from grader.run.cell.prefork_server import SIMULATOR_MODULE, PreforkServer
 from grader.run.environment import RMW, student_environment
 from grader.run.host.load import cpu_count
 from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
-from grader.run.sandboxed_order import enclose
+from grader.run.sandboxed_order import sandboxed
 from grader.run.stimuli.ordering import stimulus_orders
 from grader.sandbox.python_tree import unlisted
 from grader.submission.record import SubmissionRecord
@@ -190,8 +190,8 @@ class Runner:
     _ready: list[CellProcess] = field(default_factory=list)
     _cells: set[CellProcess] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
-    _nursery: Nursery | None = None
-    _retired: list[Nursery] = field(default_factory=list)
+    _server: PreforkServer | None = None
+    _retired: list[PreforkServer] = field(default_factory=list)
     _aborted: bool = False
 
     def get_ready(self) -> None:
@@ -259,8 +259,8 @@ class Runner:
                         if event["event"] in _STARTED_EVENTS:
                             ticket.started()
                         self.progress(scenario.id, event)
-                except Stalled:
-                    stalled = stalled_recording(order, submission, launched_ns)
+                except MiddlewareHung:
+                    stalled = hung_recording(order, submission, launched_ns)
                     write_recording(recording, stalled, (), {})
                 else:
                     shutil.move(cell.recording, recording)
@@ -284,7 +284,7 @@ class Runner:
                 cell.abandon()
         for cell in ready:
             cell.close()
-        for nursery in (*self._retired, *filter(None, (self._nursery,))):
+        for nursery in (*self._retired, *filter(None, (self._server,))):
             nursery.close()
 
     def successor(self) -> Runner:
@@ -294,14 +294,14 @@ class Runner:
         """
         with self._lock:
             self._aborted = True
-            nursery, self._nursery = self._nursery, None
+            nursery, self._server = self._server, None
         self.close()
         return replace(
             self,
             _ready=[],
             _cells=set(),
             _lock=threading.Lock(),
-            _nursery=nursery,
+            _server=nursery,
             _retired=[],
             _aborted=False,
         )
@@ -315,13 +315,13 @@ class Runner:
         return cell
 
     def _new_cell(self, imports: Sequence[str]) -> CellProcess:
-        if self._nursery is not None and not self._nursery.is_alive:
+        if self._server is not None and not self._server.is_alive:
             # Its cells may still run and need their folders, and nobody may wait for them here.
-            self._retired.append(self._nursery)
-            self._nursery = None
-        if self._nursery is None:
-            self._nursery = Nursery(self.ros, self.sandbox)
-        return CellProcess(self._nursery, imports)
+            self._retired.append(self._server)
+            self._server = None
+        if self._server is None:
+            self._server = PreforkServer(self.ros, self.sandbox)
+        return CellProcess(self._server, imports)
 
     def _give_back(self, cell: CellProcess) -> None:
         cell.close()
@@ -403,7 +403,7 @@ class Runner:
         limits = (scenario.limits or assignment.limits).limits()
         limits.check_allowed()
         sandbox = self.sandbox.allowing(assignment.libraries)
-        return enclose(order, folder, sandbox, ros, install, limits)
+        return sandboxed(order, folder, sandbox, ros, install, limits)
 
     def command(
         self,

@@ -13,9 +13,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.ros import RosInstallation
-from grader.run.environment import TRACER, TRACER_IN_SANDBOX, enclosed_environment
+from grader.run.environment import TRACER, TRACER_IN_SANDBOX, sandboxed_environment
 from grader.run.order import CellOrder
-from grader.run.process.process_sandbox import HOME, WORKSPACE, Enclosure
+from grader.run.process.process_sandbox import HOME, WORKSPACE, ProcessSandbox
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.limits import Limits
@@ -29,7 +29,7 @@ _WORLD, _PASSWD_FILE = "world.yaml", "passwd"
 _SYSTEM = "system"
 
 
-def enclose(
+def sandboxed(
     order: CellOrder,
     folder: Path,
     sandbox: Sandbox,
@@ -72,14 +72,14 @@ def enclose(
         commands=tuple(
             replace(command, argv=_moved(command.argv, seen)) for command in order.commands
         ),
-        environment=enclosed_environment(
+        environment=sandboxed_environment(
             order.environment, {**seen, str(TRACER): str(TRACER_IN_SANDBOX)}
         ),
         prefixes=_moved(order.prefixes, in_cell),
         type_support=_moved(order.type_support, in_cell),
         scratch=str(CELL),
         simulator=simulator,
-        enclosure=Enclosure(
+        process_sandbox=ProcessSandbox(
             arguments=(*_arguments(sandbox, ros, binds), "--chdir", HOME),
             filter=str(CELL / _FILTER),
             guard=str(CELL / _GUARD),

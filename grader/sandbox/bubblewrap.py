@@ -28,13 +28,13 @@ _STAGE = "/run/rosgrade"
 _FILTER_FD = 9
 _STAGING = """\
 set -e
-stage=$1; shift
-mkdir -p -m 755 "$stage"
-mount -t tmpfs -o mode=755,size=1m rosgrade "$stage"
+context=$1; shift
+mkdir -p -m 755 "$context"
+mount -t tmpfs -o mode=755,size=1m rosgrade "$context"
 n=0
 while [ "$1" != -- ]; do
-  if [ -d "$1" ]; then mkdir "$stage/$n"; else : > "$stage/$n"; fi
-  mount --rbind "$1" "$stage/$n"
+  if [ -d "$1" ]; then mkdir "$context/$n"; else : > "$context/$n"; fi
+  mount --rbind "$1" "$context/$n"
   n=$((n + 1)); shift
 done
 shift

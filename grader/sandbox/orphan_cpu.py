@@ -43,7 +43,7 @@ class Taken(NamedTuple):
     waited: int
 
 
-class Unwaited:
+class OrphanCpu:
     """Keeps an account of processes that are looked at again and again.
 
     All of it is a lower bound: what a process took since it was seen last is not known, nor

@@ -173,7 +173,7 @@ class Sandbox:
             binds.append(Bind(trees / tree.name if trees else tree, own))
         return binds
 
-    def nursery_command(
+    def server_command(
         self,
         command: Sequence[str],
         ros: RosInstallation,
@@ -287,7 +287,7 @@ class BuildRoom:
         taken = memory_bytes(usages, limits.memory_bytes, hidden_bytes(usages, room))
         if taken > limits.memory_bytes:
             return f"it took more than {size_words(limits.memory_bytes)} of memory"
-        if self._cpu.taken_s(usages) > limits.cpu_s:
+        if self._cpu.stolen_s(usages) > limits.cpu_s:
             return f"it took more than {limits.cpu_s} s of CPU time"
         if sum(usage.threads for usage in usages) >= _NEARLY_ALL * limits.processes:
             return f"it started {limits.processes} processes"

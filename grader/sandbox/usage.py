@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from grader.sandbox.orphan_cpu import Process, Taken, Unwaited
+from grader.sandbox.orphan_cpu import OrphanCpu, Process, Taken
 
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
@@ -45,9 +45,9 @@ class CpuAccount:
 
     def __init__(self) -> None:
         """Nothing was seen yet."""
-        self._unwaited = Unwaited()
+        self._unwaited = OrphanCpu()
 
-    def taken_s(self, usages: Iterable[Usage]) -> float:
+    def stolen_s(self, usages: Iterable[Usage]) -> float:
         """What was taken so far, at least.
 
         Args:

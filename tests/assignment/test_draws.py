@@ -25,7 +25,7 @@ from grader.checks.rotation.conversion import (
     oracle,
     rotations_of_answers,
 )
-from grader.checks.rotation.rotation_mistakes import SLIPS
+from grader.checks.rotation.rotation_mistakes import MISTAKES
 from sim.lidar import Lidar
 
 Rows = NDArray[np.float64]
@@ -151,7 +151,7 @@ MISTAKES: dict[str, tuple[str, str, Callable[[Rows, str], Rows]]] = {
         ("rpy", "rpy_to_quaternion"),
         ("quaternion", "quaternion_to_rpy"),
     )
-    for slip in SLIPS[conversion]
+    for slip in MISTAKES[conversion]
 }
 
 

@@ -18,7 +18,7 @@ import pytest
 from grader import ros
 from grader.assignment.load import load_assignment
 from grader.batch.batch import Batch, Done
-from grader.batch.executor import LocalCrew
+from grader.batch.executor import LocalExecutor
 from grader.batch.files import REPORT_FILE
 from grader.batch.grading import Grading
 from grader.batch.intake import take_in
@@ -717,11 +717,11 @@ def grade_class(folder: Path, members: dict[str, Attack]) -> dict[str, Handed]:
         Ledger(folder / "out").opened() as ledger,
     ):
         batch = Batch(loaded, ledger)
-        crew = LocalCrew(Grading(loaded, runner, cache), AT_ONCE)
+        executor = LocalExecutor(Grading(loaded, runner, cache), AT_ONCE)
         try:
-            done = list(batch.grade(batch.read(rows)[1], crew))
+            done = list(batch.grade(batch.read(rows)[1], executor))
         finally:
-            crew.close()
+            executor.close()
         assert {item.entry.key for item in done} == set(members)
         return {item.entry.key: _handed(item, ledger) for item in done}
 

@@ -21,7 +21,7 @@ from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
 from grader.batch.batch import NOT_YET, Batch, Done
 from grader.batch.class_files import class_rows, copies, notes
-from grader.batch.executor import Crew, CrewLost, LocalCrew
+from grader.batch.executor import BatchExecutor, ExecutorLost, LocalExecutor
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
 from grader.batch.intake import HandedIn, take_in
@@ -61,18 +61,18 @@ class Class:
         (self.folder / "class" / name).mkdir(parents=True)
         (self.folder / "class" / name / "notes.txt").write_text(content)
 
-    def crew(self, jobs: int = 2) -> LocalCrew:
+    def executor(self, jobs: int = 2) -> LocalExecutor:
         """Who can grade."""
         runner = Runner(ros.RosInstallation("wheels", Path("python"), ()))
-        return LocalCrew(Grading(self.loaded, runner, self.folder / "cache"), jobs)
+        return LocalExecutor(Grading(self.loaded, runner, self.folder / "cache"), jobs)
 
-    def grade(self, crew: Crew, *retry: str) -> dict[str, Done]:
+    def grade(self, executor: BatchExecutor, *retry: str) -> dict[str, Done]:
         """Run a batch to its end."""
         with self.ledger.opened():
             batch = Batch(self.loaded, self.ledger, frozenset(retry))
             _, to_do = batch.read(take_in(self.folder / "class", self.folder))
-            done = {item.entry.key: item for item in batch.grade(to_do, crew)}
-        crew.close()
+            done = {item.entry.key: item for item in batch.grade(to_do, executor)}
+        executor.close()
         return done
 
     def written(self) -> dict[str, int]:
@@ -112,9 +112,9 @@ def course(tmp_path: Path) -> Class:
 def test_of_the_same_submissions_either_may_be_named_to_be_graded_again(
     course: Class, named: str
 ) -> None:
-    assert not any(item.entry.fault for item in course.grade(course.crew()).values())
+    assert not any(item.entry.fault for item in course.grade(course.executor()).values())
     before = course.written()
-    done = course.grade(course.crew(), named)
+    done = course.grade(course.executor(), named)
     assert {key for key, item in done.items() if item.fresh} == {"ana", "cai"}
     after = course.written()
     assert after["ana"] != before["ana"] and after["ben"] == before["ben"]
@@ -142,7 +142,7 @@ def test_who_is_to_be_graded_again_and_is_not_there_is_told_with_the_nearest(
 def test_two_who_handed_in_nothing_did_not_copy_from_each_other(course: Class) -> None:
     for name in ("dora", "emil"):
         (course.folder / "class" / name).mkdir()
-    done = course.grade(course.crew())
+    done = course.grade(course.executor())
     assert [done[key].entry.same_as for key in ("cai", "dora", "emil")] == ["ana", "", ""]
     told = notes(list(done.values()))
     assert told["dora"] == told["emil"] == "the submission is empty"
@@ -150,7 +150,7 @@ def test_two_who_handed_in_nothing_did_not_copy_from_each_other(course: Class) -
 
 def test_each_of_those_who_handed_in_the_same_names_the_others(course: Class) -> None:
     course.hand_in("dora", "first")
-    told = notes(list(course.grade(course.crew()).values()))
+    told = notes(list(course.grade(course.executor()).values()))
     assert {key: note.partition(";")[0] for key, note in told.items() if key != "ben"} == {
         "ana": "the same submission as cai and dora",
         "cai": "the same submission as ana and dora",
@@ -165,7 +165,7 @@ def test_a_team_did_not_copy_from_itself_but_may_have_been_copied_from(course: C
         "ana:\n  :submitters:\n  - :name: Ana\n  - :name: Abe\n"
         "dora:\n  :submitters:\n  - :name: Dora\n  - :name: Dan\n"
     )
-    done = list(course.grade(course.crew()).values())
+    done = list(course.grade(course.executor()).values())
     assert {key: "same submission" in note for key, note in notes(done).items()} == {
         **dict.fromkeys(("Ana", "Abe", "cai"), True),
         **dict.fromkeys(("Dora", "Dan", "ben"), False),
@@ -215,12 +215,12 @@ def test_what_could_not_be_graded_is_told_on_the_row_of_its_twin_too(course: Cla
 
 
 def test_a_lost_cluster_ends_the_batch_and_is_the_fault_of_no_row(course: Class) -> None:
-    with pytest.raises(CrewLost, match="the scheduler is gone"):
-        course.grade(FailingCrew(CrewLost("the scheduler is gone")))
+    with pytest.raises(ExecutorLost, match="the scheduler is gone"):
+        course.grade(FailingCrew(ExecutorLost("the scheduler is gone")))
     _, entries = course.ledger.read()
     assert not any(entry.fault for entry in entries)
     assert not course.written()
-    assert {item.result is not None for item in course.grade(course.crew()).values()} == {True}
+    assert {item.result is not None for item in course.grade(course.executor()).values()} == {True}
 
 
 def test_a_crew_that_grows_gets_more_to_do(course: Class) -> None:
@@ -254,7 +254,7 @@ def test_a_crew_that_grows_gets_more_to_do(course: Class) -> None:
 
 
 def test_a_batch_of_another_assignment_replaces_no_grades(course: Class) -> None:
-    course.grade(course.crew())
+    course.grade(course.executor())
     before = course.written()
     course.hand_in("dee", "third")
     other = course.folder / "other"
@@ -269,20 +269,20 @@ def test_a_batch_of_another_assignment_replaces_no_grades(course: Class) -> None
 
 
 def test_who_was_graded_with_another_version_is_named(course: Class) -> None:
-    course.grade(course.crew())
+    course.grade(course.executor())
     yaml = course.folder / "lesson" / "assignment.yaml"
     yaml.write_text(YAML.replace("points: 1", "points: 2"))
     course.loaded = load_assignment(yaml.parent)
     with pytest.raises(UsageError, match=r"2 \(ana, ben\) graded with another version of lesson"):
-        course.grade(course.crew())
+        course.grade(course.executor())
     with pytest.raises(UsageError, match=r"1 \(ben\) graded with another version of lesson"):
-        course.grade(course.crew(), "cai")
-    done = course.grade(course.crew(), "ana", "ben")
+        course.grade(course.executor(), "cai")
+    done = course.grade(course.executor(), "ana", "ben")
     assert {item.result.max_score for item in done.values() if item.result} == {2}
 
 
 def test_what_is_gone_has_no_grade(course: Class) -> None:
-    course.grade(course.crew())
+    course.grade(course.executor())
     shutil.rmtree(course.folder / "class" / "ben")
     with course.ledger.opened():
         batch = Batch(course.loaded, course.ledger)
@@ -294,20 +294,20 @@ def test_what_is_gone_has_no_grade(course: Class) -> None:
 
 
 def test_a_recording_that_is_damaged_costs_only_the_twin_its_grade(course: Class) -> None:
-    course.grade(course.crew())
+    course.grade(course.executor())
     record = course.ledger.folder("ana") / RECORDINGS_FOLDER / SUBMISSION_FILE
     record.write_text("{}")
     course.hand_in("dee", "first")
-    done = course.grade(course.crew())
+    done = course.grade(course.executor())
     assert done["dee"].result is None
     assert done["dee"].entry.fault.endswith("`--retry ana` grades both again")
     assert {key for key, item in done.items() if item.result} == {"ana", "ben", "cai"}
-    again = course.grade(course.crew(), "ana")
+    again = course.grade(course.executor(), "ana")
     assert not again["dee"].entry.fault and again["dee"].result is not None
 
 
 def test_an_interrupted_batch_knows_what_it_has_not_come_to(course: Class) -> None:
-    course.grade(course.crew())
+    course.grade(course.executor())
     course.hand_in("dee", "third")
     (course.folder / "class" / "ben" / "notes.txt").write_text("handed in again")
     with course.ledger.opened():
@@ -326,8 +326,8 @@ def test_no_grade_is_told_that_was_removed_with_its_folder(course: Class, replac
     with course.ledger.opened():
         batch = Batch(course.loaded, course.ledger)
         _, to_do = batch.read(take_in(course.folder / "class", course.folder))
-        crew = course.crew(1)
-        graded = batch.grade(to_do, crew)
+        executor = course.executor(1)
+        graded = batch.grade(to_do, executor)
         assert next(graded).result is not None
         out.rename(course.folder / "moved")
         if replaced:
@@ -337,8 +337,8 @@ def test_no_grade_is_told_that_was_removed_with_its_folder(course: Class, replac
             with pytest.raises(UsageError, match="was removed or replaced while the batch ran"):
                 list(graded)
             assert not (out / "batch.json").exists()
-    crew.close()
-    assert all(item.result is not None for item in course.grade(course.crew()).values())
+    executor.close()
+    assert all(item.result is not None for item in course.grade(course.executor()).values())
 
 
 def steps(work: Callable[[], object]) -> int:

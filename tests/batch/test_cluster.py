@@ -16,7 +16,7 @@ import pytest
 from grader import resources
 from grader.assignment.load import load_assignment
 from grader.batch.batch import Batch, Done
-from grader.batch.executor import Crew, CrewLost, DaskCrew, LocalCrew
+from grader.batch.executor import BatchExecutor, DaskExecutor, ExecutorLost, LocalExecutor
 from grader.batch.intake import take_in
 from grader.batch.ledger import Ledger
 from grader.batch.worker import Order, make_grading
@@ -68,7 +68,9 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
         process.wait()
 
 
-def grade(order: Order, submissions: Path, out: Path, crew: Crew, on_first: object) -> list[Done]:
+def grade(
+    order: Order, submissions: Path, out: Path, executor: BatchExecutor, on_first: object
+) -> list[Done]:
     """Grade a folder of submissions; calls back after the first result."""
     done = []
     staging = out.with_name(out.name + "-staging")
@@ -76,11 +78,11 @@ def grade(order: Order, submissions: Path, out: Path, crew: Crew, on_first: obje
     with Ledger(out).opened() as ledger:
         batch = Batch(load_assignment(ASSIGNMENT), ledger)
         _, to_do = batch.read(take_in(submissions, staging))
-        for item in batch.grade(to_do, crew):
+        for item in batch.grade(to_do, executor):
             done.append(item)
             if len(done) == 1 and callable(on_first):
                 on_first()
-    crew.close()
+    executor.close()
     return sorted(done, key=lambda item: item.entry.key)
 
 
@@ -101,9 +103,9 @@ def test_a_worker_that_dies_loses_nothing_and_changes_nothing(
     (submissions / "leads_out" / "passwd").symlink_to("/etc/passwd")
     loaded = load_assignment(ASSIGNMENT)
     order = Order(ASSIGNMENT, loaded.sha256, None, Choice.NONE)
-    crew = DaskCrew(cluster.address, order)
-    far = grade(order, submissions, tmp_path / "far", crew, cluster.workers[0].kill)
-    local = LocalCrew(make_grading(order, loaded), 4)
+    executor = DaskExecutor(cluster.address, order)
+    far = grade(order, submissions, tmp_path / "far", executor, cluster.workers[0].kill)
+    local = LocalExecutor(make_grading(order, loaded), 4)
     near = grade(order, submissions, tmp_path / "near", local, None)
     assert all(item.result is not None for item in far)
     assert [judged(item) for item in far] == [judged(item) for item in near]
@@ -115,17 +117,17 @@ def test_a_cluster_takes_what_its_workers_can_and_is_lost_with_its_scheduler(
     tmp_path: Path, cluster: Cluster
 ) -> None:
     order = Order(ASSIGNMENT, load_assignment(ASSIGNMENT).sha256, None, Choice.NONE)
-    crew = DaskCrew(cluster.address, order)
-    assert crew.capacity == 4
+    executor = DaskExecutor(cluster.address, order)
+    assert executor.capacity == 4
     cluster.workers[0].kill()
-    await_that(lambda: crew.capacity == 2)
+    await_that(lambda: executor.capacity == 2)
     submission = tmp_path / "ana"
     shutil.copytree(resources.reference() / ASSIGNMENT, submission)
-    on_its_way = crew.submit("ana", submission, tmp_path)
+    on_its_way = executor.submit("ana", submission, tmp_path)
     cluster.processes[0].kill()
-    with pytest.raises(CrewLost, match=r"the Dask scheduler at tcp://.* was lost"):
+    with pytest.raises(ExecutorLost, match=r"the Dask scheduler at tcp://.* was lost"):
         on_its_way.result(LIMIT_S)
-    crew.close()
+    executor.close()
 
 
 def await_that(holds: Callable[[], bool]) -> None:
@@ -162,11 +164,11 @@ def test_what_is_no_scheduler_is_not_waited_for(
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         order = Order(ASSIGNMENT, "", None, Choice.NONE)
         with pytest.raises(UsageError, match=rf"no Dask scheduler answers at {address}: "):
-            DaskCrew(address, order)
+            DaskExecutor(address, order)
         over.set()
 
 
 def test_no_scheduler_is_said() -> None:
     order = Order(ASSIGNMENT, "0" * 64, None, Choice.NONE)
     with pytest.raises(UsageError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1"):
-        DaskCrew("tcp://127.0.0.1:1", order)
+        DaskExecutor("tcp://127.0.0.1:1", order)

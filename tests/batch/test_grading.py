@@ -57,7 +57,9 @@ SUBMISSION = SubmissionRecord(
 SECOND = 1_000_000_000
 
 
-def recording(stop_s: float = 0.1, taken_s: float = 0.0, faults: tuple[str, ...] = ()) -> Recording:
+def recording(
+    stop_s: float = 0.1, stolen_s: float = 0.0, faults: tuple[str, ...] = ()
+) -> Recording:
     """A run whose node took so long to end, while the host took so much."""
     from grader.recording.model import Process
 
@@ -85,7 +87,7 @@ def recording(stop_s: float = 0.1, taken_s: float = 0.0, faults: tuple[str, ...]
             ),
         ),
         processes=(Process("bot/bot", 7, SECOND, end, -2, "SIGINT", stop_s),),
-        disturbance=(Disturbance(6 * SECOND, 0, int(taken_s * SECOND)),),
+        disturbance=(Disturbance(6 * SECOND, 0, int(stolen_s * SECOND)),),
         faults=faults,
     )
 
@@ -146,7 +148,7 @@ def test_a_fault_of_the_student_is_not_run_again(grade: Grade) -> None:
 
 
 def test_a_disturbed_run_is_repeated_alone(grade: Grade) -> None:
-    disturbed = recording(stop_s=2.5, taken_s=3.0)
+    disturbed = recording(stop_s=2.5, stolen_s=3.0)
     graded, runner = grade(disturbed, recording())
     assert graded.grade.full_points
     assert runner.alone == [False, True]
@@ -211,7 +213,7 @@ def test_a_failure_of_a_robot_that_the_host_held_up_counts_if_it_happens_again(
 
 
 def test_after_three_disturbed_runs_it_is_not_graded_and_costs_nothing(grade: Grade) -> None:
-    disturbed = recording(stop_s=2.5, taken_s=3.0)
+    disturbed = recording(stop_s=2.5, stolen_s=3.0)
     graded, runner = grade(disturbed, disturbed, disturbed)
     assert not graded.grade.graded
     assert graded.grade.result("ends").status is Status.ERROR

@@ -15,7 +15,7 @@ from grader.assignment.own_check import load_function
 from grader.checks.finding import Status
 from grader.checks.rotation.conversion import CONVERSIONS, Group, angles_between, oracle
 from grader.checks.rotation.rotation_case import rows
-from grader.checks.rotation.rotation_mistakes import SLIPS
+from grader.checks.rotation.rotation_mistakes import MISTAKES
 from tests.checks.builder import (
     died,
     endpoint,
@@ -255,7 +255,7 @@ ELSEWHERE = {"the quaternion is not scaled to length 1 before": "scaled"}
 @pytest.mark.parametrize("seed", [1])
 @pytest.mark.parametrize(
     ("conversion", "slip"),
-    [(name, slip) for name, slips in SLIPS.items() for slip in slips],
+    [(name, slip) for name, slips in MISTAKES.items() for slip in slips],
     ids=lambda item: item if isinstance(item, str) else item.words[:40],
 )
 def test_each_mistake_fails_and_is_named(conversion, slip, seed):
@@ -622,7 +622,7 @@ class TestSilence:
 
     def test_only_cases_of_a_kind_are_judged(self):
         conversion, asked = asked_of("axis_angle")
-        slip = next(s for s in SLIPS[conversion] if s.words == "the axis is not normalized")
+        slip = next(s for s in MISTAKES[conversion] if s.words == "the axis is not normalized")
         answers = list(slip.formula(asked))
         only = judged(conversion, asked, answers, {"cases": ["ordinary"]})
         assert only.status is Status.PASSED

@@ -309,6 +309,6 @@ def test_the_host_s_share_is_what_overlaps_the_interval() -> None:
             Disturbance(4_000, 20, 400),
         )
     )
-    assert recording.taken_s(2_500, 2_600) == pytest.approx(250e-9)
-    assert recording.taken_s(2_500, 3_500) == pytest.approx(650e-9)
-    assert recording.taken_s(5_000, 6_000) == 0.0
+    assert recording.stolen_s(2_500, 2_600) == pytest.approx(250e-9)
+    assert recording.stolen_s(2_500, 3_500) == pytest.approx(650e-9)
+    assert recording.stolen_s(5_000, 6_000) == 0.0

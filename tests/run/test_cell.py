@@ -16,7 +16,7 @@ from uuid import uuid4
 import pytest
 
 from grader import ros
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Status
 from grader.errors import GraderFault
@@ -125,7 +125,7 @@ def test_which_nodes_an_executor_was_given(run_node: RunNode) -> None:
     recording = run_node(source, until={"elapsed": "1 s"})
     assert not recording.on("/cmd_vel")
     given = {
-        name: not testimony.in_no_executor(recording, name)
+        name: not declarations.in_no_executor(recording, name)
         for name in ("/bot_publisher", "/first", "/second")
     }
     assert given == {"/bot_publisher": False, "/first": True, "/second": True}

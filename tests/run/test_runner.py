@@ -11,7 +11,7 @@ from grader.run import runner as runner_module
 from grader.run.runner import Runner
 
 
-class FakeNursery:
+class FakeServer:
     """A nursery whose cells run on."""
 
     def __init__(self, *_: object) -> None:
@@ -25,14 +25,14 @@ class FakeNursery:
 def test_cells_that_run_keep_their_folders_where_a_nursery_is_replaced(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(runner_module, "Nursery", FakeNursery)
+    monkeypatch.setattr(runner_module, "PreforkServer", FakeServer)
     monkeypatch.setattr(runner_module, "CellProcess", lambda nursery, _imports: nursery)
     runner = Runner(ros.RosInstallation("wheels", Path("python"), ()))
     first = runner._new_cell(())
-    assert isinstance(first, FakeNursery)
+    assert isinstance(first, FakeServer)
     first.is_alive = False
     second = runner._new_cell(())
-    assert isinstance(second, FakeNursery)
+    assert isinstance(second, FakeServer)
     assert second is not first
     # Closing waits for its cells, with the lock held that whoever interrupts needs.
     assert not first.is_closed

@@ -12,7 +12,7 @@ from grader.assignment.model import Scenario
 from grader.checks.check import Subject
 from grader.checks.finding import Status
 from grader.grade.judge import grade
-from grader.run.cell.middleware_hang import ENDED_BY, Stall, stalled_recording
+from grader.run.cell.middleware_hang import ENDED_BY, HangMonitor, hung_recording
 from grader.run.order import CellOrder, Command, Limits, Until
 from tests.checks.builder import submission
 
@@ -39,7 +39,7 @@ def cell(tmp_path: Path) -> Cell:
 
 
 def test_a_middleware_that_works_without_end_is_noticed(cell: Cell) -> None:
-    stall = Stall(cell.folder)
+    stall = HangMonitor(cell.folder)
     cell.is_seen(switches=50, received_s=3.0)
     assert stall.sentence() is None
     cell.is_seen(switches=50, received_s=7.0)
@@ -49,21 +49,21 @@ def test_a_middleware_that_works_without_end_is_noticed(cell: Cell) -> None:
 
 
 def test_whoever_goes_on_is_never_stalled(cell: Cell) -> None:
-    stall = Stall(cell.folder)
+    stall = HangMonitor(cell.folder)
     for look in range(20):
         cell.is_seen(switches=50 + look, received_s=4.0 * look)
         assert stall.sentence() is None
 
 
 def test_whoever_waits_for_a_cpu_is_never_stalled(cell: Cell) -> None:
-    stall = Stall(cell.folder)
+    stall = HangMonitor(cell.folder)
     for look in range(20):
         cell.is_seen(state="R", switches=50, received_s=4.0 * look)
         assert stall.sentence() is None
 
 
 def test_a_cell_that_has_ended_is_never_stalled(cell: Cell) -> None:
-    stall = Stall(cell.folder / "ended")
+    stall = HangMonitor(cell.folder / "ended")
     assert stall.sentence() is None
     assert stall.sentence() is None
 
@@ -95,7 +95,7 @@ def test_no_check_takes_a_stalled_run_for_a_fault_of_ours(name: str) -> None:
         if bound.check.subject is Subject.RECORDING
     ]
     recordings = {
-        scenario.id: stalled_recording(order(scenario), submission(), 0)
+        scenario.id: hung_recording(order(scenario), submission(), 0)
         for scenario in loaded.assignment.scenarios
     }
     results = grade(replace(loaded, checks=tuple(alone)), submission(), recordings).results

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.errors import GraderFault
 from grader.recording.model import Breach
-from grader.run.process.process_sandbox import Enclosure
+from grader.run.process.process_sandbox import ProcessSandbox
 from grader.sandbox.limits import BUILD, Limits
 from grader.sandbox.usage import (
     files_in_flight,
@@ -73,12 +73,15 @@ def test_a_wrong_limit_is_refused_with_its_reason(written: object, problem: str)
 
 def test_the_enclosure_of_an_order_survives_json() -> None:
     files = ("/cell/x", "/cell/y", "/cell/z")
-    enclosure = Enclosure(
+    process_sandbox = ProcessSandbox(
         ("--ro-bind", "/a", "/b"), *files, {"bpf": 1}, Limits(), {"/ws/a": "/cell/a"}
     )
-    assert Enclosure.from_dict(json.loads(json.dumps(dataclasses.asdict(enclosure)))) == enclosure
-    assert enclosure.outside("/ws/a/lib/x") == Path("/cell/a/lib/x")
-    assert enclosure.outside("/ws/ab") == Path("/ws/ab")
+    assert (
+        ProcessSandbox.from_dict(json.loads(json.dumps(dataclasses.asdict(process_sandbox))))
+        == process_sandbox
+    )
+    assert process_sandbox.outside("/ws/a/lib/x") == Path("/cell/a/lib/x")
+    assert process_sandbox.outside("/ws/ab") == Path("/ws/ab")
 
 
 def test_a_breach_says_what_was_taken_and_what_is_allowed() -> None:

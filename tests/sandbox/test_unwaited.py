@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from grader.sandbox.orphan_cpu import Process, Taken, Unwaited
+from grader.sandbox.orphan_cpu import OrphanCpu, Process, Taken
 from grader.sandbox.usage import CpuAccount, usage_of
 
 PARENT, CHILD, OTHER = Process(10, 1), Process(11, 2), Process(12, 3)
@@ -33,8 +33,8 @@ input()
 """
 
 
-def looked(*there: dict[Process, Taken]) -> Unwaited:
-    account = Unwaited()
+def looked(*there: dict[Process, Taken]) -> OrphanCpu:
+    account = OrphanCpu()
     for one in there:
         account.look(one)
     return account
@@ -91,7 +91,7 @@ def test_nothing_is_lost_of_a_tree_in_which_all_are_waited_for(seed: int) -> Non
             if childless and chance.random() < 0.5:
                 taken[parents[one]][1] += sum(taken.pop(one))
 
-    account, knowing = Unwaited(), Unwaited()
+    account, knowing = OrphanCpu(), OrphanCpu()
     for _ in range(60):
         there = {}
         listed = list(taken)
@@ -115,9 +115,9 @@ def test_the_time_of_children_counts_whether_they_are_waited_for_or_not(action: 
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:
         # The time between two looks; all have ended when it writes a line.
         while not select.select([parent.stdout], [], [], 0.02)[0]:
-            account.taken_s(usage_of([parent.pid]))
+            account.stolen_s(usage_of([parent.pid]))
         # Who is missing twice has ended for certain.
-        account.taken_s(usage_of([parent.pid]))
-        taken_s = account.taken_s(usage_of([parent.pid]))
+        account.stolen_s(usage_of([parent.pid]))
+        stolen_s = account.stolen_s(usage_of([parent.pid]))
         parent.communicate(b"\n")
-    assert 0.3 < taken_s < 1.3
+    assert 0.3 < stolen_s < 1.3

@@ -7,7 +7,7 @@ from textwrap import dedent
 
 import pytest
 
-from grader.submission.build.build_error_location import Sources, find_culprit, last_started
+from grader.submission.build.build_error_location import Sources, find_build_error, last_started
 from grader.submission.record import SourceError
 
 from .samples import SETUP_PY
@@ -38,7 +38,7 @@ Traceback (most recent call last):
 
 
 def culprit(log: str, *failed: str, sources: Sources = SOURCES) -> str:
-    return str(find_culprit(dedent(log), failed or ("bot", "c"), sources))
+    return str(find_build_error(dedent(log), failed or ("bot", "c"), sources))
 
 
 def test_setup_py_that_raises_is_blamed_with_its_line() -> None:
@@ -86,7 +86,7 @@ def test_setup_cfg_is_blamed_for_what_is_wrong_in_it_and_not_setup_py(
 ) -> None:
     sources = replace(SOURCES, files={*FILES, "src/bot/setup.cfg"})
     log = f"{READS_CONFIG}configparser.{error}\n"
-    assert str(find_culprit(log, ("bot",), sources)) == f"src/bot/setup.cfg:{said}"
+    assert str(find_build_error(log, ("bot",), sources)) == f"src/bot/setup.cfg:{said}"
     # Without one of its own it is setup.py that reads something else.
     assert culprit(log).startswith("src/bot/setup.py:7: configparser.")
 
@@ -292,7 +292,7 @@ def test_a_manifest_that_ament_refuses_is_blamed_with_the_line_that_we_know() ->
 
 def test_a_message_is_printable_and_not_endless() -> None:
     log = f"Starting >>> bot\nerror: \x1b[31m{'x' * 10_000}\n"
-    found = find_culprit(log, ("bot",), SOURCES)
+    found = find_build_error(log, ("bot",), SOURCES)
     assert found is not None
     assert found.message.isprintable()
     assert len(found.message) == 500
@@ -301,12 +301,12 @@ def test_a_message_is_printable_and_not_endless() -> None:
 def test_a_log_that_quotes_thousands_of_names_is_read_at_once() -> None:
     texts = {"src/bot/setup.py": ["x"] * 100_000}
     quoted = " ".join(f"'a{number}'" for number in range(10_000))
-    found = find_culprit(
+    found = find_build_error(
         f"Starting >>> bot\nerror: {quoted}\n", ("bot",), Sources(FILES, SOURCES.folders, texts)
     )
     assert found is not None
     assert (found.file, found.line) == ("src/bot/setup.py", None)
-    assert find_culprit(f"Starting >>> bot\n{'setup.py' * 16_000}\n", ("bot",), SOURCES) is None
+    assert find_build_error(f"Starting >>> bot\n{'setup.py' * 16_000}\n", ("bot",), SOURCES) is None
 
 
 def test_where_nothing_is_said_the_package_that_was_being_built_is_named() -> None:

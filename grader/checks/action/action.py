@@ -220,10 +220,10 @@ def _other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf, rate_h
     seen = f"feedback came at {rate_hz:.3g} Hz"
     due_s = (len(goal.feedback) - 1) / (parameters.rate or 1.0)
     late_s = (end_ns - begin_ns) / NS - due_s * (1.0 + parameters.tolerance)
-    taken_s = recording.taken_s(begin_ns, end_ns)
-    if 0.0 < late_s <= taken_s:
+    stolen_s = recording.stolen_s(begin_ns, end_ns)
+    if 0.0 < late_s <= stolen_s:
         return Cause.to_repeat(
-            f"{seen}, but the machine took {format_duration(taken_s)} from the process meanwhile"
+            f"{seen}, but the machine took {format_duration(stolen_s)} from the process meanwhile"
         )
     times_s = [recording.since_launch_s(item.time_ns) for item in goal.feedback]
     plot = Plot(

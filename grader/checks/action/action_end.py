@@ -233,7 +233,7 @@ def _why_goes_on(
     )
     if before.result_ns is not None and before.result_ns < goal.sent_ns:
         late_s = (goal.sent_ns - before.result_ns) / NS
-        if recording.taken_s(before.sent_ns, goal.sent_ns) >= late_s:
+        if recording.stolen_s(before.sent_ns, goal.sent_ns) >= late_s:
             return Cause.to_repeat("the old goal had ended before the new one was sent")
         lasted_s = (before.result_ns - (before.answered_ns or before.sent_ns)) / NS
         return _ended_alone(

@@ -10,7 +10,7 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.assignment.model import TopicName
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.callbacks.callback_run import Reports, read_reports, spans
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding
@@ -19,7 +19,7 @@ from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
-from grader.diagnosis.missing_reports import SECONDS_HINT, Reported, why_unreported
+from grader.diagnosis.missing_reports import SECONDS_HINT, Reported, why_reports_are_missing
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
@@ -76,7 +76,7 @@ def run(recording: Recording, parameters: Runs) -> Finding:
     expected = _run_words(parameters)
     reports = read_reports(recording.on(parameters.topic))
     free = parameters.period is None and parameters.stimulus is None
-    cause = why_unreported(
+    cause = why_reports_are_missing(
         recording,
         parameters.topic,
         parameters.callbacks,
@@ -158,7 +158,7 @@ def _judge_period(
         return Finding.failed(
             expected, observed, _period_hint(recording, middle_s, period_s), evidence
         )
-    cause = why_unreported(
+    cause = why_reports_are_missing(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
     return None if cause is None else cause.finding(expected)
@@ -171,7 +171,7 @@ def _declares(recording: Recording, parameters: Runs, limits: Limits) -> bool:
     behind another for a long time may come first, on time and hence early. On the wire that looks
     like a shorter period.
     """
-    timers = testimony.timers(recording)
+    timers = declarations.timers(recording)
     right = [timer for timer in timers if judge([timer.period_s], limits).good]
     return 0 < len(right) == len(timers) <= len(parameters.callbacks)
 
@@ -187,7 +187,7 @@ def _by_chance(
     begins = [item.begin_ns for item in reports.of(callback)]
     if not all(_worked(recording, reports, one, other) for one, other in pairwise(begins)):
         return None
-    declared_s = {timer.period_s for timer in testimony.timers(recording)}
+    declared_s = {timer.period_s for timer in declarations.timers(recording)}
     if not declared_s or any(judge([period_s], limits).good for period_s in declared_s):
         return None
     return Finding.to_repeat(
@@ -213,8 +213,8 @@ def _gained_s(recording: Recording, begins: Sequence[int], period_s: float) -> t
     half = len(phases) // 2
     if not half:
         return 0.0, 0.0
-    taken_s = recording.taken_s(begins[0] - round(period_s * NS), begins[half])
-    return min(phases[:half]) - min(phases[half:]), taken_s
+    stolen_s = recording.stolen_s(begins[0] - round(period_s * NS), begins[half])
+    return min(phases[:half]) - min(phases[half:]), stolen_s
 
 
 def _unhindered(
@@ -236,7 +236,7 @@ def _unhindered(
         # What begins while others still work did not wait for them, and what begins a while after
         # them was not due before.
         idle_s = (item.begin_ns - newest_ns) / NS
-        waited = due_ns < newest_ns <= item.begin_ns and idle_s <= _NEXT_S + recording.taken_s(
+        waited = due_ns < newest_ns <= item.begin_ns and idle_s <= _NEXT_S + recording.stolen_s(
             newest_ns, item.begin_ns
         )
         hindered = waited and _worked(recording, reports, due_ns, item.begin_ns)
@@ -258,7 +258,7 @@ def _period_hint(recording: Recording, found_s: float, wanted_s: float) -> str:
     twice = _made_twice(recording)
     if twice:
         return twice
-    declared_s = {timer.period_s for timer in testimony.timers(recording)}
+    declared_s = {timer.period_s for timer in declarations.timers(recording)}
     if any(math.isclose(item, found_s, rel_tol=_SAME) for item in declared_s):
         given = next(item for item in declared_s if math.isclose(item, found_s, rel_tol=_SAME))
         return (
@@ -275,7 +275,7 @@ def _period_hint(recording: Recording, found_s: float, wanted_s: float) -> str:
 
 def _made_twice(recording: Recording) -> str:
     """What to try where a process made a node twice, with all of its callbacks; else nothing."""
-    name = testimony.made_twice(recording)
+    name = declarations.made_twice(recording)
     return name and (
         f"The process made the node {code(name)} twice, and each has its own timers and "
         "subscriptions. Make it once, and hand this one to the executor."
@@ -313,7 +313,7 @@ def _judge_messages(
         return cause.finding(expected)
     work_s = max((item.seconds or 0.0 for item in reports.ended([callback])), default=0.0)
     missing_s = (len(sent) - ended) * work_s
-    if recording.taken_s(sent[0].stamp_ns, recording.stop_ns) >= missing_s > 0.0:
+    if recording.stolen_s(sent[0].stamp_ns, recording.stop_ns) >= missing_s > 0.0:
         return Finding.to_repeat(
             expected, f"{observed}, but the machine took the time from the process"
         )
@@ -363,7 +363,7 @@ def work(recording: Recording, parameters: Work) -> Finding:
         f"(median within {parameters.tolerance})"
     )
     reports = read_reports(recording.on(parameters.topic))
-    cause = why_unreported(recording, parameters.topic, parameters.callbacks, reports)
+    cause = why_reports_are_missing(recording, parameters.topic, parameters.callbacks, reports)
     if cause is not None:
         return cause.finding(expected)
     allowed_s = parameters.tolerance.of(parameters.duration)
@@ -376,7 +376,7 @@ def work(recording: Recording, parameters: Work) -> Finding:
         if abs(middle_s - parameters.duration) <= allowed_s:
             continue
         excused_s = median(
-            value - recording.taken_s(item.begin_ns, item.end_ns or item.begin_ns)
+            value - recording.stolen_s(item.begin_ns, item.end_ns or item.begin_ns)
             for value, item in zip(seconds, found, strict=True)
         )
         if middle_s > parameters.duration and excused_s <= parameters.duration + allowed_s:

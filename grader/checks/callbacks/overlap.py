@@ -19,7 +19,7 @@ from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.exchanged_executables import why_exchanged
-from grader.diagnosis.missing_reports import Reported, why_unreported
+from grader.diagnosis.missing_reports import Reported, why_reports_are_missing
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
@@ -48,7 +48,7 @@ def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
         else f"{code(names[0])} never running twice at the same time"
     )
     reports = read_reports(recording.on(parameters.topic))
-    cause = why_unreported(
+    cause = why_reports_are_missing(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
     )
     if cause is not None:
@@ -155,7 +155,7 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     )
     reports = read_reports(recording.on(parameters.topic))
     everybody = (*parameters.callbacks, *parameters.others)
-    cause = why_unreported(recording, parameters.topic, everybody, reports)
+    cause = why_reports_are_missing(recording, parameters.topic, everybody, reports)
     if cause is not None:
         return cause.finding(expected)
     told = []
@@ -224,8 +224,8 @@ def _prevented(
         for other in others:
             first, second = sorted((one, other), key=lambda item: item.begin_ns)
             lacking_s = (second.begin_ns - (first.end_ns or 0)) / NS + parameters.by
-            taken_s = recording.taken_s(first.begin_ns, second.begin_ns)
-            if other is not one and taken_s >= lacking_s:
+            stolen_s = recording.stolen_s(first.begin_ns, second.begin_ns)
+            if other is not one and stolen_s >= lacking_s:
                 found += 1
                 break
     return found

@@ -12,7 +12,7 @@ from grader.checks.callbacks.callback_run import Reports, Run, read_reports, spa
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.wording import code, codes, counted
-from grader.diagnosis.missing_reports import Reported, why_unreported
+from grader.diagnosis.missing_reports import Reported, why_reports_are_missing
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
@@ -50,7 +50,7 @@ def together(recording: Recording, parameters: Together) -> Finding:
         f"{format_duration(parameters.by)}"
     )
     reports = read_reports(recording.on(parameters.topic))
-    cause = why_unreported(recording, parameters.topic, names, reports)
+    cause = why_reports_are_missing(recording, parameters.topic, names, reports)
     if cause is not None:
         return cause.finding(expected)
     found = [item for item in _all_at_once(reports, names) if _seconds(item) >= parameters.by]
@@ -106,8 +106,8 @@ def _prevented(recording: Recording, reports: Reports, parameters: Together) -> 
         ]
         group = [run for run in before if run is not None]
         both_s = (min(run.end_ns or 0 for run in group) - last.begin_ns) / NS
-        taken_s = recording.taken_s(min(run.begin_ns for run in group), last.begin_ns)
-        if len(group) == len(before) and 0.0 < parameters.by - both_s <= taken_s:
+        stolen_s = recording.stolen_s(min(run.begin_ns for run in group), last.begin_ns)
+        if len(group) == len(before) and 0.0 < parameters.by - both_s <= stolen_s:
             number += 1
     return number
 

@@ -8,18 +8,18 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field, field_validator
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.first_seen import nodes_seen
 from grader.checks.node.node_name import node_name
-from grader.checks.node.target_nodes import concerned_nodes
+from grader.checks.node.target_nodes import target_nodes
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import why_not_given
-from grader.diagnosis.process.process_exit import cause_of_death, ended_early, why_ended
+from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Process, Recording
@@ -105,7 +105,7 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
         missing = why_no_node(recording)
     if missing is not None:
         return missing.finding(expected)
-    nodes = concerned_nodes(recording) or recording.student_nodes
+    nodes = target_nodes(recording) or recording.student_nodes
     names = [parameters.node] if parameters.node else [node.name for node in nodes]
     groups = [_answers(recording, name, parameters) for name in dict.fromkeys(names)]
     groups = [group for group in groups if group.judged]
@@ -158,7 +158,7 @@ def _working_from(recording: Recording, node: str) -> int:
     begin_ns = min(appeared or [recording.launched_ns])
     begin_ns = max(begin_ns, _spun_from(recording, node))
     # Its first publisher was held by us until it had matched, in vain if its type is another one.
-    process = testimony.process_of(recording, node)
+    process = declarations.process_of(recording, node)
     held = [
         item.time_ns
         for item in recording.declared("held")
@@ -173,7 +173,7 @@ def _spun_from(recording: Recording, node: str) -> int:
     Before that its constructor may wait for something, and a node that never answers does not
     spin, whatever its process says.
     """
-    process = testimony.process_of(recording, node)
+    process = declarations.process_of(recording, node)
     spun = [
         item.time_ns
         for item in recording.declared("spin")
@@ -233,15 +233,15 @@ def _judge_median(
 def _wait_s(recording: Recording, call: Call, *, excused: bool = False) -> float:
     """How long a call waited for its answer, perhaps without what the machine took meanwhile."""
     end_ns = call.answered_ns or recording.stop_ns
-    taken_s = recording.taken_s(call.requested_ns, end_ns) if excused else 0.0
-    return (end_ns - call.requested_ns) / NS - taken_s
+    stolen_s = recording.stolen_s(call.requested_ns, end_ns) if excused else 0.0
+    return (end_ns - call.requested_ns) / NS - stolen_s
 
 
 def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> Cause:
-    process = testimony.process_of(recording, group.node)
+    process = declarations.process_of(recording, group.node)
     seen = _summary([group], parameters)
     if process is not None and ended_early(recording, process):
-        return cause_of_death(recording, process).after(seen)
+        return why_it_exited(recording, process).after(seen)
     evidence = _evidence(recording, [group])
     place = interrupted_place(recording, process.name) if process is not None else None
     if place is not None:
@@ -266,7 +266,7 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
             "self.create_timer(0.3, self.callback), and call rclpy.spin(node) in main().",
             evidence,
         )
-    if testimony.timer_of_zero(recording):
+    if declarations.timer_of_zero(recording):
         return Cause(
             f"{seen}: the process declared a timer of 0 s, whose callbacks take all of the "
             f"executor's time{where}",
@@ -284,7 +284,7 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
 
 
 def _never_spun(recording: Recording, process: Process | None) -> bool:
-    return testimony.never_spun(recording, process.name if process else None)
+    return declarations.never_spun(recording, process.name if process else None)
 
 
 def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
@@ -306,7 +306,7 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
             ours=busy,
             disturbed=busy,
         ).finding(expected)
-    if testimony.said(recording, "spin") and testimony.said(recording, "timer"):
+    if declarations.said(recording, "spin") and declarations.said(recording, "timer"):
         return Finding.passed(
             expected,
             f"{codes(names)} answered no call that could be judged; the process declared a timer "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
@@ -45,11 +45,11 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     messages = recording.on(parameters.topic)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
-    if not testimony.declares(recording, "publisher", "topic", parameters.topic):
-        cause = testimony.why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
+    if not declarations.declares(recording, "publisher", "topic", parameters.topic):
+        cause = declarations.why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
         return cause.finding(expected)
-    timers = testimony.timers(recording)
-    if testimony.not_in_callback(recording, parameters.topic):
+    timers = declarations.timers(recording)
+    if declarations.not_in_callback(recording, parameters.topic):
         return Finding.failed(
             expected,
             f"{counted(len(messages), 'message was', 'messages were')} published, outside of "
@@ -58,7 +58,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
             Evidence(moments=first_seen(recording, messages)),
         )
     calling = [item for item in timers if item.callback != _NOTHING]
-    if calling or testimony.timer_of_zero(recording):
+    if calling or declarations.timer_of_zero(recording):
         first = calling[0] if calling else None
         period = f" of {format_duration(first.period_s)}" if first else ""
         name = f", which calls {code(first.callback)}" if first and first.callback else ""

@@ -107,7 +107,7 @@ def echoes(
         begin_ns = item.message.stamp_ns
         end_ns = item.due_ns + within_ns
         if forgive:
-            end_ns += round(recording.taken_s(begin_ns, end_ns) * NS)
+            end_ns += round(recording.stolen_s(begin_ns, end_ns) * NS)
         missing = set(item.values)
         serving: list[int] = []
         begin = bisect_left(times, begin_ns)

@@ -191,7 +191,7 @@ def _too_seldom(
 def _own_s(recording: Recording, gap: tuple[int, int]) -> float:
     """How long a gap is without what the machine took in it, and shortly before."""
     begin_ns, end_ns = gap
-    return (end_ns - begin_ns) / NS - recording.taken_s(begin_ns - _BACKLOG_NS, end_ns)
+    return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns - _BACKLOG_NS, end_ns)
 
 
 def _passed(

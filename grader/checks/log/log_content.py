@@ -287,10 +287,10 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     if not found:
         return _why_lacking(recording, parameters, records, saying, found).finding(expected)
     seen = f"{counted(len(found), 'log message')}, {rate_hz:.3g} Hz"
-    taken_s = recording.taken_s(begin_ns, end_ns)
-    if rate_hz < low_hz and (end_ns - begin_ns) / NS - taken_s <= len(found) / low_hz:
+    stolen_s = recording.stolen_s(begin_ns, end_ns)
+    if rate_hz < low_hz and (end_ns - begin_ns) / NS - stolen_s <= len(found) / low_hz:
         return Finding.to_repeat(
-            expected, f"{seen}, but the machine took {format_duration(taken_s)}"
+            expected, f"{seen}, but the machine took {format_duration(stolen_s)}"
         )
     hint = (
         "Log in a timer of that period, or with throttle_duration_sec=1.0 in a faster callback: "
@@ -309,10 +309,10 @@ def _fell_silent(recording: Recording, found: Sequence[Logged], low_hz: float) -
     allowed_s = _SILENT_PERIODS / low_hz
     if silent_s <= allowed_s:
         return None
-    taken_s = recording.taken_s(last_ns, recording.stop_ns)
+    stolen_s = recording.stolen_s(last_ns, recording.stop_ns)
     cause = why_ended(recording, seen)
-    if cause is None and silent_s - taken_s <= allowed_s:
-        cause = Cause.to_repeat(f"{seen}: the machine took {format_duration(taken_s)}")
+    if cause is None and silent_s - stolen_s <= allowed_s:
+        cause = Cause.to_repeat(f"{seen}: the machine took {format_duration(stolen_s)}")
     return cause or Cause(
         seen,
         "The node must go on logging: look for a counter or a condition that ends it, for a timer "

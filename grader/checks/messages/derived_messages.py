@@ -95,7 +95,7 @@ class MadeOf:
             if not last:
                 continue
             due_ns = message.stamp_ns - within_ns
-            begin_ns = due_ns - round(recording.taken_s(due_ns, message.stamp_ns) * NS)
+            begin_ns = due_ns - round(recording.stolen_s(due_ns, message.stamp_ns) * NS)
             # Where the source is silent its newest values stay the right ones.
             first, due = (min(bisect_left(stamps, at), last - 1) for at in (begin_ns, due_ns))
             is_known = last < len(sources) and lost[first] == lost[last]

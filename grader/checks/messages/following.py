@@ -138,7 +138,7 @@ def _judged(
     known = [sample for sample in made_of.samples if sample.is_known or fits[sample.number]]
     begin_ns = made_of.sources[0].stamp_ns
     settled_ns = begin_ns + round(parameters.settle * NS)
-    settled_ns += round(recording.taken_s(begin_ns, settled_ns) * NS)
+    settled_ns += round(recording.stolen_s(begin_ns, settled_ns) * NS)
     first = next((index for index, sample in enumerate(known) if fits[sample.number]), 0)
     if first and known[first - 1].message.stamp_ns > settled_ns:
         first = 0

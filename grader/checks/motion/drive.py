@@ -13,7 +13,7 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.contact import why_touched
 from grader.checks.motion.ground import ahead, nearest
-from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.lateness import stolen_s
 from grader.checks.motion.measure import metres, speed
 from grader.checks.motion.scan import misreading
 from grader.checks.motion.track import (
@@ -253,7 +253,7 @@ def _too_slow(recording: Recording, seen: str) -> Cause:
     driven_s = (truth[-1].time_ns - truth[begin].time_ns) / NS
     waited_s = (truth[begin].time_ns - truth[0].time_ns) / NS
     average = way_m(truth) / driven_s if driven_s else 0.0
-    lost_s = taken_s(recording, truth[0].time_ns, truth[-1].time_ns)
+    lost_s = stolen_s(recording, truth[0].time_ns, truth[-1].time_ns)
     words = (
         f"was still on its way when the observation ended: {seen}, at {speed(average)} on "
         f"average, {format_duration(waited_s)} after the beginning"

@@ -12,7 +12,7 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.approach import Approach, approach
 from grader.checks.motion.contact import why_touched
-from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.lateness import stolen_s
 from grader.checks.motion.measure import degrees, metres, point, speed, turn
 from grader.checks.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.checks.reference import GoalPose
@@ -124,7 +124,7 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     deeper = why_cut_short(recording) or why_touched(recording)
     if deeper is not None:
         return deeper.finding(expected)
-    lost_s = taken_s(recording, truth[0].time_ns, end.time_ns)
+    lost_s = stolen_s(recording, truth[0].time_ns, end.time_ns)
     if lost_s > 0.0 and took_s - lost_s <= parameters.within:
         seen = f"after {format_duration(took_s)}" if rest is not None else "not until the end"
         return Finding.to_repeat(
@@ -225,7 +225,7 @@ def _why_far(run: Approach, seen: str, more_m: float) -> Cause | None:
         seen: What was seen.
         more_m: How much longer than allowed it is, in m.
     """
-    lost_s = taken_s(run.recording, run.truth[0].time_ns, run.truth[-1].time_ns)
+    lost_s = stolen_s(run.recording, run.truth[0].time_ns, run.truth[-1].time_ns)
     fastest = max(abs(step.linear_m_s) for step in run.truth)
     # What it drives on without a command, it has to come back.
     if lost_s <= 0.0 or 2.0 * lost_s * fastest < more_m:

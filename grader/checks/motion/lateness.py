@@ -8,7 +8,7 @@ from grader.recording.model import Recording
 _MARGIN_NS = 20_000_000
 
 
-def taken_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
+def stolen_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
     """How much later than without the machine's doing the robot can have got a command, at most.
 
     The student's waits for a CPU and the probe's lateness, and how late the simulator itself
@@ -24,4 +24,4 @@ def taken_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
         for item in recording.incidents
         if item.kind == "late" and begin_ns - _MARGIN_NS <= item.time_ns <= end_ns
     ]
-    return recording.taken_s(begin_ns, max(begin_ns, end_ns)) + max(late_s, default=0.0)
+    return recording.stolen_s(begin_ns, max(begin_ns, end_ns)) + max(late_s, default=0.0)

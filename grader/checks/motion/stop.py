@@ -13,7 +13,7 @@ from grader.checks.first_seen import until_the_end
 from grader.checks.motion.command import commands, scans
 from grader.checks.motion.contact import why_touched
 from grader.checks.motion.ground import Sight, ahead, edge_m, nearest
-from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.lateness import stolen_s
 from grader.checks.motion.measure import metres, speed
 from grader.checks.motion.scan import misreading
 from grader.checks.motion.track import REST_M_S, first_rest, over_time, speed_plot, way_m
@@ -21,7 +21,7 @@ from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.process_exit import cause_of_death, dead
+from grader.diagnosis.process.process_exit import exited, why_it_exited
 from grader.recording.model import NS, Recording, Scene, Truth
 from grader.spec.quantity import Length, PositiveLength, Speed
 from grader.spec.unit import format_duration
@@ -157,7 +157,7 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
     crossed, step = truth[begin], truth[rest]
     took_s = (step.time_ns - crossed.time_ns) / NS
     fastest = max((abs(item.linear_m_s) for item in truth[begin : rest + 1]), default=0.0)
-    lost_s = taken_s(recording, crossed.time_ns, step.time_ns)
+    lost_s = stolen_s(recording, crossed.time_ns, step.time_ns)
     missing_m = wanted_m - parameters.late - sight.distance_m
     if lost_s > 0.0 and lost_s * fastest >= missing_m:
         return Cause.to_repeat(
@@ -271,10 +271,10 @@ def _from_start(recording: Recording, parameters: StaysAtRest) -> Finding:
         return cause.finding(expected)
     truth = recording.truth
     moved = _moves_from(recording, 0, parameters.tolerance)
-    ended = dead(recording)
+    ended = exited(recording)
     if moved is None:
         if ended:
-            return cause_of_death(recording, ended[0]).finding(expected)
+            return why_it_exited(recording, ended[0]).finding(expected)
         watched_s = (truth[-1].time_ns - truth[0].time_ns) / NS
         return Finding.passed(expected, f"at rest for {format_duration(watched_s)}, to the end")
     step = truth[moved]

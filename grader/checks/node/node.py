@@ -7,21 +7,21 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from grader.assignment.model import TopicName
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.check import NoParameters, Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import endpoints_seen
 from grader.checks.node.node_name import node_name
-from grader.checks.node.target_nodes import concerned_nodes
+from grader.checks.node.target_nodes import target_nodes
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.process_exit import (
-    cause_of_death,
-    dead,
     ended_early,
+    exited,
     offence,
     why_ended,
+    why_it_exited,
 )
 from grader.recording.model import NS, Kind, Node, Process, Recording
 from grader.spec.quantity import Duration
@@ -129,12 +129,12 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
     missing = (
         why_not_node(recording, parameters.name) if parameters.name else why_no_node(recording)
     )
-    process = testimony.process_of(recording, parameters.name) if parameters.name else None
+    process = declarations.process_of(recording, parameters.name) if parameters.name else None
     ended = [process] if process and ended_early(recording, process) else []
     if not ended and (parameters.name is None or process is None):
-        ended = list(dead(recording))
+        ended = list(exited(recording))
     if ended:
-        return cause_of_death(recording, ended[0]).finding(expected)
+        return why_it_exited(recording, ended[0]).finding(expected)
     seen = offence(recording) or missing
     if seen is not None:
         return seen.finding(expected)
@@ -157,7 +157,7 @@ def _gone(recording: Recording, name: str | None) -> Node | None:
     if name is not None:
         nodes = tuple(node for node in recording.student_nodes if node.name == name)
         return next((node for node in nodes if _vanished(recording, node)), None)
-    concerned = concerned_nodes(recording)
+    concerned = target_nodes(recording)
     nodes = concerned or recording.student_nodes
     gone = [node for node in nodes if _vanished(recording, node)]
     # Of nodes that the scenario is not about, one is as good as another.
@@ -275,10 +275,10 @@ def _too_late(recording: Recording, process: Process, parameters: Ends) -> Cause
         observed = f"{code(process.name)} needed {format_duration(took_s)} to end after SIGINT"
     else:
         observed = f"{code(process.name)} did not end after SIGINT; {process.stopped_by} was needed"
-    taken_s = recording.taken_s(recording.stop_ns, end_ns)
-    if taken_s > 0.0 and took_s - taken_s <= parameters.within:
+    stolen_s = recording.stolen_s(recording.stop_ns, end_ns)
+    if stolen_s > 0.0 and took_s - stolen_s <= parameters.within:
         return Cause.to_repeat(
-            f"{observed}, but the machine took {format_duration(taken_s)} from it meanwhile"
+            f"{observed}, but the machine took {format_duration(stolen_s)} from it meanwhile"
         )
     stop_s = recording.since_launch_s(recording.stop_ns)
     return Cause(

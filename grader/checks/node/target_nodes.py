@@ -5,7 +5,7 @@ from __future__ import annotations
 from grader.recording.model import Node, Owner, Recording
 
 
-def concerned_nodes(recording: Recording) -> tuple[Node, ...]:
+def target_nodes(recording: Recording) -> tuple[Node, ...]:
     """The student's nodes that publish what the probe subscribes to, or subscribe to what it sends.
 
     A program may have more nodes, such as one that only reads parameters or listens to another

@@ -197,9 +197,9 @@ def _too_few(
     due_s = _LEAST_PERIODS * (parameters.period or 0.0)
     if watched_s <= due_s:
         return Cause.to_repeat(f"{seen}: the scenario is too short to judge")
-    taken_s = recording.taken_s(begin_ns, end_ns)
-    if taken_s > 0.0 and watched_s - taken_s <= due_s:
-        return Cause.to_repeat(f"{seen}, but the machine took {format_duration(taken_s)}")
+    stolen_s = recording.stolen_s(begin_ns, end_ns)
+    if stolen_s > 0.0 and watched_s - stolen_s <= due_s:
+        return Cause.to_repeat(f"{seen}, but the machine took {format_duration(stolen_s)}")
     return why_raised(recording, seen, item.call.requested_ns) or Cause(
         seen,
         "Publish in every call of the callback, whatever the value of the parameter is."
@@ -221,7 +221,7 @@ def _why_other_period(
     if off_s <= parameters.period_tolerance * parameters.period:
         return None
     seen = f"messages come every {format_duration(median_s)} (median) then"
-    if median_s > parameters.period and recording.taken_s(times[0], times[-1]) >= off_s * (
+    if median_s > parameters.period and recording.stolen_s(times[0], times[-1]) >= off_s * (
         len(times) - 1
     ):
         return Cause.to_repeat(f"{seen}, but the machine took the time")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.messages.messages import published
@@ -184,13 +184,13 @@ def _waited(
     evidence = _evidence(recording, join, before.messages, before.messages)
     begin_ns = recording.matched_ns or recording.launched_ns
     span_s = (join.joined_ns - begin_ns) / NS
-    taken_s = recording.taken_s(begin_ns, join.joined_ns)
+    stolen_s = recording.stolen_s(begin_ns, join.joined_ns)
     made_anew = _made_anew(recording, parameters, join)
     if made_anew:
         return Finding.failed(expected, f"{seen}: {made_anew}", _ONE_PUBLISHER_HINT, evidence)
     # With the time that was taken from it, the node may have come to as many as are needed.
-    if before.number * span_s > parameters.last * (span_s - taken_s):
-        return Finding.to_repeat(expected, f"{seen}; the machine took {format_duration(taken_s)}")
+    if before.number * span_s > parameters.last * (span_s - stolen_s):
+        return Finding.to_repeat(expected, f"{seen}; the machine took {format_duration(stolen_s)}")
     return Finding.failed(
         expected,
         f"{seen} in {format_duration(span_s)}",
@@ -215,7 +215,7 @@ def _made_anew(recording: Recording, parameters: LateJoiner, join: Join) -> str:
 def _why_many(
     recording: Recording, parameters: LateJoiner, history: list[Message], before: _Before
 ) -> str:
-    queues = testimony.queues(recording, Kind.PUBLISHER, parameters.topic)
+    queues = declarations.queues(recording, Kind.PUBLISHER, parameters.topic)
     if any(queue.history == "keep_all" for queue in queues):
         return ": the publisher's history is keep_all, declared by the process"
     depths = [queue.depth for queue in queues if queue.depth is not None]
@@ -266,17 +266,17 @@ def _too_few(
         destroyed = why_unpublished(recording, parameters.topic, _seen(history, before))
         if destroyed is not None:
             return destroyed.finding(expected)
-    taken_s = recording.taken_s(join.joined_ns, recording.stop_ns)
+    stolen_s = recording.stolen_s(join.joined_ns, recording.stop_ns)
     if join.matched_ns is None and publishers:
         return Finding.to_repeat(
             expected,
             f"the late joiner was not matched within "
             f"{format_duration((recording.stop_ns - join.joined_ns) / NS)}"
-            + (f"; the machine took {format_duration(taken_s)} meanwhile" if taken_s else ""),
+            + (f"; the machine took {format_duration(stolen_s)} meanwhile" if stolen_s else ""),
         )
     depths = [
         queue.depth
-        for queue in testimony.queues(recording, Kind.PUBLISHER, parameters.topic)
+        for queue in declarations.queues(recording, Kind.PUBLISHER, parameters.topic)
         if queue.depth is not None
     ]
     why = f": the publisher's depth is {depths[0]}, declared by the process" if depths else ""

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from grader.assignment.model import Durability, Reliability, TopicName
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.first_seen import endpoints_seen, first_seen
@@ -148,7 +148,7 @@ def _judge(recording: Recording, parameters: Profile, side: _Side) -> Finding:
     source = ""
     if not endpoints and set(parameters.policies) <= _DECLARED_POLICIES:
         # One that published and was destroyed before anybody could look at it.
-        profiles += testimony.profiles(recording, side.kind, parameters.topic)
+        profiles += declarations.profiles(recording, side.kind, parameters.topic)
         source = ", declared by the process"
     for node, qos in profiles:
         wrong = _wrong(qos, parameters)
@@ -282,7 +282,7 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
     cause = why_no_endpoint(recording, kind, parameters.topic)
     if cause is not None:
         return cause.finding(expected)
-    declared = testimony.queues(recording, kind, parameters.topic)
+    declared = declarations.queues(recording, kind, parameters.topic)
     own = recording.student_endpoints(kind, parameters.topic)
     seen = endpoints_seen(recording, own) or first_seen(recording, recording.on(parameters.topic))
     evidence = Evidence(moments=seen)
@@ -314,7 +314,7 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
         return Finding.error(expected, "the depth cannot be seen: the process declared no number")
     if not declared and shown is None:
         what = f"the {kind.value} on {code(parameters.topic)}"
-        return testimony.why_undeclared(recording, what).finding(expected)
+        return declarations.why_undeclared(recording, what).finding(expected)
     source = "declared by the process" if declared else "as the heartbeats of the publisher show"
     return Finding.passed(expected, f"depth {parameters.depth}, {source}")
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import endpoints_seen
@@ -156,7 +156,7 @@ def _left_open(recording: Recording, kind: Kind, endpoint: Endpoint, peer: Qos) 
     """
     if kind is not Kind.SUBSCRIPTION:
         return ()
-    open_ = testimony.left_open(recording, kind, endpoint.topic, endpoint.node)
+    open_ = declarations.left_open(recording, kind, endpoint.topic, endpoint.node)
     offered, requested = _sides(kind, endpoint, peer)
     deciding = [item.policy for item in comparisons(offered, requested) if item.compatible is False]
     return tuple(deciding) if open_.issuperset(deciding) else ()

@@ -420,7 +420,7 @@ def _missing(
 
 def _starved(recording: Recording, case: Case) -> bool:
     left_s = (recording.stop_ns - case.asked_ns) / NS
-    return left_s - recording.taken_s(case.asked_ns, recording.stop_ns) < _TIME_TO_ANSWER_S
+    return left_s - recording.stolen_s(case.asked_ns, recording.stop_ns) < _TIME_TO_ANSWER_S
 
 
 def _too_few(
@@ -453,5 +453,5 @@ def _is_slow(recording: Recording, found: Sequence[Case]) -> bool:
     if len(answered) < 2:
         return False
     begin_ns, end_ns = answered[0].asked_ns, answered[-1].asked_ns
-    own_s = (end_ns - begin_ns) / NS - recording.taken_s(begin_ns, end_ns)
+    own_s = (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
     return own_s / (len(answered) - 1) > _SLOW_S

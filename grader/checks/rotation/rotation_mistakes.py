@@ -58,7 +58,7 @@ _SIGN_HINT = (
 
 
 @dataclass(frozen=True)
-class Slip:
+class Mistake:
     """A mistake.
 
     Attributes:
@@ -74,7 +74,7 @@ class Slip:
 
 def explain(
     conversion: str, questions: Rows, answers: Rows, tolerance_rad: float
-) -> tuple[Slip, float] | None:
+) -> tuple[Mistake, float] | None:
     """The mistake that gives these answers.
 
     Args:
@@ -89,9 +89,9 @@ def explain(
     """
     if not len(questions):
         return None
-    best: tuple[Slip, float] | None = None
+    best: tuple[Mistake, float] | None = None
     right = oracle(conversion, questions)
-    for slip in SLIPS[conversion]:
+    for slip in MISTAKES[conversion]:
         with np.errstate(all="ignore"):
             given = slip.formula(questions)
         # Where the mistake does no harm, it explains nothing.
@@ -215,51 +215,53 @@ def _w_without_sign(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
 
 
 _AXIS_ANGLE = (
-    Slip(
+    Mistake(
         "the angle is not halved",
         _HALF_HINT,
         lambda rows: _turn(_axis(rows), rows[:, 3], rows[:, 3]),
     ),
-    Slip(
+    Mistake(
         "the axis is not normalized",
         _AXIS_HINT,
         lambda rows: _turn(rows[:, :3], _half(rows), _half(rows)),
     ),
-    Slip(
+    Mistake(
         "the axis is not normalized before, only the quaternion afterwards",
         _AXIS_HINT,
         lambda rows: _length(_turn(rows[:, :3], _half(rows), _half(rows))),
     ),
-    Slip(
+    Mistake(
         "the axis is not normalized and the angle is not halved",
         f"{_AXIS_HINT} {_HALF_HINT}",
         lambda rows: _turn(rows[:, :3], rows[:, 3], rows[:, 3]),
     ),
-    Slip(
+    Mistake(
         "the angle is halved in the cosine only",
         _HALF_HINT,
         lambda rows: _turn(_axis(rows), rows[:, 3], _half(rows)),
     ),
-    Slip(
+    Mistake(
         "the angle is halved in the sine only",
         _HALF_HINT,
         lambda rows: _turn(_axis(rows), _half(rows), rows[:, 3]),
     ),
-    Slip("the angle is halved twice", _HALF_HINT, _angle_scaled(0.5)),
-    Slip("the sine is halved, not the angle: sin(angle) / 2 instead of sin(angle / 2)", _HALF_HINT,
+    Mistake("the angle is halved twice", _HALF_HINT, _angle_scaled(0.5)),
+    Mistake(
+         "the sine is halved, not the angle: sin(angle) / 2 instead of sin(angle / 2)", _HALF_HINT,
          _sine_halved),
-    Slip("w has lost its sign", _SIGN_HINT, _w_without_sign(_right_quaternion)),
-    Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
+    Mistake("w has lost its sign", _SIGN_HINT, _w_without_sign(_right_quaternion)),
+    Mistake("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
          _w_first(_right_quaternion)),
     # Before the conjugate: where the angle is negative it gives the same rotation.
-    Slip("the angle has lost its sign", "A negative angle turns the other way: leave it negative, "
+    Mistake(
+         "the angle has lost its sign", "A negative angle turns the other way: leave it negative, "
          "without abs().", _angle_without_sign),
-    Slip("it is the conjugate, the inverse rotation", _INVERSE_HINT,
+    Mistake("it is the conjugate, the inverse rotation", _INVERSE_HINT,
          _conjugate(_right_quaternion)),
-    Slip("the angle is converted as if it came in degrees", _RADIANS_HINT,
+    Mistake("the angle is converted as if it came in degrees", _RADIANS_HINT,
          _angle_scaled(np.pi / 180.0)),
-    Slip("the angle is converted to degrees", _RADIANS_HINT, _angle_scaled(180.0 / np.pi)),
-    Slip("the first number is taken for the angle",
+    Mistake("the angle is converted to degrees", _RADIANS_HINT, _angle_scaled(180.0 / np.pi)),
+    Mistake("the first number is taken for the angle",
          "The message holds [x, y, z, angle]: the angle is data[3].", _angle_first),
 )  # fmt: skip
 
@@ -284,7 +286,7 @@ def _rpy_times(factors: Sequence[float]) -> Callable[[Rows], Rows]:
 def _each_angle(
     times: Callable[[Sequence[float]], Callable[[Rows], Rows]],
     mistakes: Sequence[tuple[str, float, str]],
-) -> tuple[Slip, ...]:
+) -> tuple[Mistake, ...]:
     """A factor on all three angles, or on one of them.
 
     Args:
@@ -292,7 +294,7 @@ def _each_angle(
         mistakes: What is wrong, to follow "the angles are"; the factor; what to try.
     """
     return tuple(
-        Slip(
+        Mistake(
             f"{subject} {predicate}",
             hint,
             times([factor if applies else 1.0 for applies in which]),
@@ -317,8 +319,8 @@ _SWAPPED = (
 _SWAP_HINT = "Roll turns about x, pitch about y, yaw about z, and the fields are x, y and z."
 
 _RPY = (
-    *(Slip(words, _SWAP_HINT, _mixed(order)) for words, order in _SWAPPED),
-    Slip("it turns about the axes that turn with the body (intrinsic), not about fixed ones",
+    *(Mistake(words, _SWAP_HINT, _mixed(order)) for words, order in _SWAPPED),
+    Mistake("it turns about the axes that turn with the body (intrinsic), not about fixed ones",
          _FIXED_HINT, _intrinsic),
     *_each_angle(
         _rpy_times,
@@ -329,14 +331,14 @@ _RPY = (
             ("converted to degrees", 180.0 / np.pi, _RADIANS_HINT),
         ),
     ),
-    Slip("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
+    Mistake("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
          _w_first(rotations_of_rpy)),
     # Before the conjugate: where w is negative it gives the same rotation.
-    Slip("w has lost its sign", _SIGN_HINT, _w_without_sign(rotations_of_rpy)),
-    Slip("it is the conjugate, the inverse rotation", _INVERSE_HINT,
+    Mistake("w has lost its sign", _SIGN_HINT, _w_without_sign(rotations_of_rpy)),
+    Mistake("it is the conjugate, the inverse rotation", _INVERSE_HINT,
          _conjugate(rotations_of_rpy)),
-    Slip("only the yaw is used", _SWAP_HINT, _rpy_times((0.0, 0.0, 1.0))),
-    Slip("the pitch has the wrong sign", _SWAP_HINT, _rpy_times((1.0, -1.0, 1.0))),
+    Mistake("only the yaw is used", _SWAP_HINT, _rpy_times((0.0, 0.0, 1.0))),
+    Mistake("the pitch has the wrong sign", _SWAP_HINT, _rpy_times((1.0, -1.0, 1.0))),
 )  # fmt: skip
 
 
@@ -397,28 +399,30 @@ def _folded(columns: list[int], rows: Rows) -> Rows:
 
 _TO_RPY = (
     *(
-        Slip(words, _SWAP_HINT, partial(_reordered_rpy, order))
+        Mistake(words, _SWAP_HINT, partial(_reordered_rpy, order))
         for words, order in _SWAPPED
     ),
-    Slip("the angles are those about axes that turn with the body (intrinsic), not about fixed "
+    Mistake("the angles are those about axes that turn with the body (intrinsic), not about fixed "
          "ones", _FIXED_HINT, _intrinsic_rpy),
-    Slip("the quaternion is not scaled to length 1 before", "Divide x, y, z and w by the length "
+    Mistake("the quaternion is not scaled to length 1 before", "Divide x, y, z and w by the length "
          "of the quaternion, math.sqrt(x**2 + y**2 + z**2 + w**2), before you use them.",
          rpy_of),
-    Slip("the quaternion is read with w first", _ORDER_HINT,
+    Mistake("the quaternion is read with w first", _ORDER_HINT,
          lambda rows: _right_rpy(rows[:, [1, 2, 3, 0]])),
     # Before the inverse: where w is negative it gives the same angles.
-    Slip("w is read without its sign", _SIGN_HINT,
+    Mistake("w is read without its sign", _SIGN_HINT,
          lambda rows: _right_rpy(np.column_stack((rows[:, :3], np.abs(rows[:, 3]))))),
-    Slip("it is the inverse rotation", "The conjugate of a quaternion turns backwards: look for "
+    Mistake("it is the inverse rotation", "The conjugate of a quaternion turns backwards: look for "
          "a wrong sign.", lambda rows: _right_rpy(rows * np.array([-1.0, -1.0, -1.0, 1.0]))),
-    Slip("the pitch has the wrong sign", "The pitch is asin(2 (w y - z x)).",
+    Mistake("the pitch has the wrong sign", "The pitch is asin(2 (w y - z x)).",
          _times((1.0, -1.0, 1.0))),
-    Slip("roll and yaw lose their quadrant", "Use math.atan2(a, b) and not math.atan(a / b): only "
+    Mistake(
+         "roll and yaw lose their quadrant", "Use math.atan2(a, b) and not math.atan(a / b): only "
          "the two signs tell the quadrant.", _tangent),
-    Slip("the yaw loses its quadrant", "Use math.atan2(a, b) for the yaw: math.asin and math.atan "
+    Mistake(
+         "the yaw loses its quadrant", "Use math.atan2(a, b) for the yaw: math.asin and math.atan "
          "give angles from -90 to 90 deg only.", partial(_folded, [2])),
-    Slip("the roll loses its quadrant", "Use math.atan2(a, b) for the roll: math.asin and "
+    Mistake("the roll loses its quadrant", "Use math.atan2(a, b) for the roll: math.asin and "
          "math.atan give angles from -90 to 90 deg only.", partial(_folded, [0])),
     *_each_angle(
         _times,
@@ -431,7 +435,7 @@ _TO_RPY = (
     ),
 )  # fmt: skip
 
-SLIPS = {
+MISTAKES = {
     "axis_angle_to_quaternion": _AXIS_ANGLE,
     "rpy_to_quaternion": _RPY,
     "quaternion_to_rpy": _TO_RPY,

@@ -334,14 +334,14 @@ def _why_otherwise(
         return None
     seen = f"the answers to two calls at once came {format_duration(gap_s)} apart"
     ends = (first.answered_ns or 0, second.answered_ns or 0)
-    taken_s = recording.taken_s(first.requested_ns, max(ends))
-    if (parameters.calls == "side_by_side" and gap_s - taken_s <= _TOGETHER * takes_s) or (
+    stolen_s = recording.stolen_s(first.requested_ns, max(ends))
+    if (parameters.calls == "side_by_side" and gap_s - stolen_s <= _TOGETHER * takes_s) or (
         not together and not apart
     ):
         return Cause(
             f"{seen}, so it cannot be told how they were worked on",
-            ours=taken_s > 0.0,
-            disturbed=taken_s > 0.0,
+            ours=stolen_s > 0.0,
+            disturbed=stolen_s > 0.0,
             hint=f"Each call should take {format_duration(takes_s)}.",
         )
     evidence = _evidence(recording, (first, second))

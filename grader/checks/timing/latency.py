@@ -136,18 +136,18 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
         if destroyed is not None:
             return destroyed.finding(expected)
     forgiven = [
-        max(0.0, item.seconds - _taken_s(recording, item))
+        max(0.0, item.seconds - _stolen_s(recording, item))
         for item in found
         if item.seconds is not None
     ]
-    excusable = [item for item in missing if _taken_s(recording, item, parameters.within) > 0.0]
+    excusable = [item for item in missing if _stolen_s(recording, item, parameters.within) > 0.0]
     if not _too_slow(forgiven, parameters) and (
         len(missing) - len(excusable) <= parameters.unanswered
     ):
-        taken_s = recording.taken_s(sent[0].stamp_ns, recording.stop_ns)
+        stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
         return Finding.to_repeat(
             expected,
-            f"{_figures(times)}; the machine took up to {format_duration(taken_s)} from the "
+            f"{_figures(times)}; the machine took up to {format_duration(stolen_s)} from the "
             "process meanwhile, which may explain it",
         )
     evidence = _evidence(recording, found, parameters)
@@ -170,9 +170,9 @@ def _too_slow(times: Sequence[float], parameters: Latency) -> bool:
     return over_median or (parameters.most is not None and max(times) > parameters.most)
 
 
-def _taken_s(recording: Recording, item: Reaction, within_s: float = 0.0) -> float:
+def _stolen_s(recording: Recording, item: Reaction, within_s: float = 0.0) -> float:
     end_ns = item.answer.stamp_ns if item.answer else item.sent.stamp_ns + round(within_s * NS)
-    return recording.taken_s(item.sent.stamp_ns, end_ns)
+    return recording.stolen_s(item.sent.stamp_ns, end_ns)
 
 
 def _figures(times: Sequence[float]) -> str:

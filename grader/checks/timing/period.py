@@ -160,9 +160,9 @@ def forgiven(
     for item in measured:
         deviation = item.seconds - limits.period_s
         if deviation > 0.0:
-            taken_s = recording.taken_s(item.begin_ns, item.end_ns)
-            found.append(item.seconds - min(deviation, taken_s))
+            stolen_s = recording.stolen_s(item.begin_ns, item.end_ns)
+            found.append(item.seconds - min(deviation, stolen_s))
         else:
-            taken_s = recording.taken_s(item.before_ns, item.end_ns)
-            found.append(item.seconds + min(-deviation, taken_s))
+            stolen_s = recording.stolen_s(item.before_ns, item.end_ns)
+            found.append(item.seconds + min(-deviation, stolen_s))
     return tuple(found)

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from pydantic import Field, model_validator
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
@@ -96,7 +96,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     )
     low, high = parameters.at_least, parameters.at_most
     if low is not None and found_hz < low:
-        free_s = span_s - recording.taken_s(first.stamp_ns, last.stamp_ns)
+        free_s = span_s - recording.stolen_s(first.stamp_ns, last.stamp_ns)
         if free_s <= 0.0 or number / free_s >= low:
             return Finding.to_repeat(
                 expected, f"{observed}, but the machine took time from the process"
@@ -121,7 +121,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
 
 
 def _slow_hint(recording: Recording) -> str:
-    if testimony.traced(recording) and not testimony.said(recording, "timer"):
+    if declarations.traced(recording) and not declarations.said(recording, "timer"):
         return (
             "Publish in every call of the callback: look for a counter or a condition that leaves "
             "calls out, and for a time.sleep()."
@@ -159,7 +159,7 @@ def _too_long_without(
     ended = why_ended(recording, observed)
     if ended is not None and until:
         return ended.finding(parameters.words)
-    if gap_s - recording.taken_s(begin_ns, end_ns) <= parameters.pause:
+    if gap_s - recording.stolen_s(begin_ns, end_ns) <= parameters.pause:
         return Finding.to_repeat(
             parameters.words, f"{observed}, but the machine took time from the process"
         )

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from statistics import mean
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.timing.period import Interval, Limits, Verdict, judge
 from grader.diagnosis.process.blocked_executor import long_wait
 from grader.recording.model import Kind, Recording
@@ -57,7 +57,7 @@ def explain(
         verdict: That is not good.
         limits: What was allowed.
     """
-    declared = [timer.period_s for timer in testimony.timers(recording)]
+    declared = [timer.period_s for timer in declarations.timers(recording)]
     often = _too_often(recording, topic, measured, verdict, limits, declared)
     if often:
         return often
@@ -77,7 +77,7 @@ def is_declared(recording: Recording, verdict: Verdict, limits: Limits) -> bool:
         verdict: On the intervals.
         limits: What was allowed.
     """
-    declared = [timer.period_s for timer in testimony.timers(recording)]
+    declared = [timer.period_s for timer in declarations.timers(recording)]
     right = [item for item in declared if judge([item], limits).period_good]
     return (
         not verdict.period_good
@@ -172,7 +172,7 @@ def _wrong_period(
             "in a loop around spin_once().",
         )
     if median_s < 2.0 * wanted_s and verdict.regular:
-        no_timer = testimony.traced(recording) and not testimony.said(recording, "timer")
+        no_timer = declarations.traced(recording) and not declarations.said(recording, "timer")
         beginning = "the process declared no timer: " if no_timer else ""
         return Explanation(
             f"{beginning}it looks like {wanted} of sleeping plus {longer} of work",
@@ -214,7 +214,7 @@ def _comes_round(recording: Recording, limits: Limits) -> bool:
 
 
 def _too_fast(recording: Recording, topic: str, limits: Limits) -> Explanation:
-    if testimony.timer_of_zero(recording):
+    if declarations.timer_of_zero(recording):
         return Explanation(
             "messages come too often: the process declared a timer of 0 s, which fires again and "
             "again without a pause",

@@ -91,7 +91,8 @@ def _late(recording: Recording, messages: Sequence[Message]) -> list[Message]:
         for item in messages
         if item.sequence != 1
         and abs(_way_s(item) - usual_s)
-        > _ABSOLUTE_S + recording.taken_s(item.stamp_ns - _AROUND_NS, item.received_ns + _AROUND_NS)
+        > _ABSOLUTE_S
+        + recording.stolen_s(item.stamp_ns - _AROUND_NS, item.received_ns + _AROUND_NS)
     ]
 
 

@@ -114,10 +114,10 @@ def period(recording: Recording, parameters: Period) -> Finding:
         )
     forgivable = not is_declared(recording, verdict, limits)
     if forgivable and judge(forgiven(recording, measured, limits), limits).good:
-        taken_s = recording.taken_s(measured[0].begin_ns, measured[-1].end_ns)
+        stolen_s = recording.stolen_s(measured[0].begin_ns, measured[-1].end_ns)
         return Finding.to_repeat(
             expected,
-            f"{_figures(measured, verdict)}; the machine took up to {format_duration(taken_s)} "
+            f"{_figures(measured, verdict)}; the machine took up to {format_duration(stolen_s)} "
             "from the process meanwhile, which may explain it",
         )
     explanation = explain(recording, parameters.topic, measured, verdict, limits)
@@ -147,9 +147,9 @@ def _why_ended(
         f"{counted(len(messages), 'message')} at the right period, but none in the last "
         f"{format_duration(silent_s)} of the observation"
     )
-    taken_s = recording.taken_s(last_ns, recording.stop_ns)
-    if silent_s - taken_s <= _ENDED_PERIODS * parameters.period:
-        return Cause.to_repeat(f"{seen}; the machine took {format_duration(taken_s)} of them")
+    stolen_s = recording.stolen_s(last_ns, recording.stop_ns)
+    if silent_s - stolen_s <= _ENDED_PERIODS * parameters.period:
+        return Cause.to_repeat(f"{seen}; the machine took {format_duration(stolen_s)} of them")
     return why_ended(recording, seen) or Cause(
         seen,
         ENDED_HINT,

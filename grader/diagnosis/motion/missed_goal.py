@@ -10,7 +10,7 @@ from grader.checks.first_seen import until_the_end
 from grader.checks.motion.approach import NO_SPEED_M_S, Approach
 from grader.checks.motion.contact import why_touched
 from grader.checks.motion.detour import WRAP_HINT, away
-from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.lateness import stolen_s
 from grader.checks.motion.measure import degrees, metres, point, speed, turn
 from grader.checks.motion.track import is_at_rest, turned_rad, turns_one_way
 from grader.diagnosis.cause import Cause
@@ -88,7 +88,7 @@ def _still_moving(run: Approach, position_m: float, nearest_m: float, evidence: 
     truth, recording = run.truth, run.recording
     last = truth[-1]
     left_m = run.distance_m(last)
-    lost_s = taken_s(recording, truth[0].time_ns, truth[-1].time_ns)
+    lost_s = stolen_s(recording, truth[0].time_ns, truth[-1].time_ns)
     watched_s = (truth[-1].time_ns - truth[0].time_ns) / NS
     seen = f"is still {metres(left_m)} from the goal when the observation ends"
     if lost_s > 0.25 * watched_s and recording.ending is Ending.TIMEOUT:

@@ -6,7 +6,7 @@ from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import endpoints_seen, first_seen
 from grader.checks.motion.command import Command, command_topic, commands, is_zero
 from grader.checks.motion.ground import ahead, nearest
-from grader.checks.motion.lateness import taken_s
+from grader.checks.motion.lateness import stolen_s
 from grader.checks.motion.measure import metres, speed
 from grader.checks.motion.scan import misreading
 from grader.checks.motion.track import has_moved, index_at, is_at_rest
@@ -16,7 +16,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.common_mistakes import was_integer, what_was_put
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.process_exit import cause_of_death, dead, why_ended
+from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
 from grader.recording.model import NS, Incident, Kind, Owner, Recording
 from grader.spec.unit import format_duration
 
@@ -65,13 +65,13 @@ def why_cut_short(recording: Recording) -> Cause | None:
 
     A process that ended while the robot was on its way, or commands that are not numbers.
     """
-    ended = dead(recording)
+    ended = exited(recording)
     if ended:
         exited_ns = ended[0].exited_ns or recording.stop_ns
         truth = recording.truth
         rested = bool(truth) and is_at_rest(truth[index_at(truth, exited_ns)])
         if not rested or ended[0].exit_code != 0:
-            return cause_of_death(recording, ended[0])
+            return why_it_exited(recording, ended[0])
     return why_rejected(recording)
 
 
@@ -181,7 +181,7 @@ def _in_vain(recording: Recording, sent: tuple[Command, ...]) -> Cause:
                 evidence,
             )
     begin_ns = recording.truth[0].time_ns
-    lost_s = taken_s(recording, begin_ns, recording.truth[-1].time_ns)
+    lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
     if left_s < 0.2 and lost_s > 0.0:
         return Cause.to_repeat(
             f"{_STILL} until the end, but the machine took {format_duration(lost_s)} from the run"

@@ -35,7 +35,7 @@ def why_unsteered(recording: Recording) -> Cause | None:
     ]
     begin_ns, next_ns = max(moving, key=lambda span: span[1] - span[0], default=(0, 0))
     long_s = (next_ns - begin_ns) / NS
-    if long_s - recording.taken_s(begin_ns, next_ns) < _UNSTEERED_S:
+    if long_s - recording.stolen_s(begin_ns, next_ns) < _UNSTEERED_S:
         return None
     when_s = recording.since_launch_s(begin_ns)
     until = " until the observation ended" if next_ns == end_ns else ""

@@ -74,7 +74,7 @@ _HINTS = {
 }
 
 
-def slip_hint(failure: Failure) -> str | None:
+def mistake_hint(failure: Failure) -> str | None:
     """What to try after such an exception; None if it is no known one.
 
     Args:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import until_the_end
 from grader.checks.wording import codes
@@ -71,7 +71,7 @@ def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float
 
 def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
     """Time without what the machine took of it."""
-    return (end_ns - begin_ns) / NS - recording.taken_s(begin_ns, end_ns)
+    return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
 
 
 def stuck_callback(recording: Recording) -> SourceError | None:
@@ -146,7 +146,7 @@ def where_blocked(recording: Recording, node: str, call: Call) -> tuple[str, Evi
     Returns:
         The place in words, with a space before it, or an empty text; and the evidence.
     """
-    process = testimony.process_of(recording, node)
+    process = declarations.process_of(recording, node)
     place = interrupted_place(recording, process.name) if process is not None else None
     moment = Moment("first call that was not answered", recording.since_launch_s(call.requested_ns))
     return (
@@ -173,7 +173,7 @@ def why_never_spun(
     """
     candidates = recording.processes if processes is None else processes
     process = next(
-        (item for item in candidates if testimony.never_spun(recording, item.name)), None
+        (item for item in candidates if declarations.never_spun(recording, item.name)), None
     )
     if process is None:
         return why_not_given(recording, seen, nodes, moments)
@@ -201,7 +201,7 @@ def why_not_given(
         moments: Evidence.
     """
     names = sorted(set(nodes))
-    if not names or not all(testimony.in_no_executor(recording, name) for name in names):
+    if not names or not all(declarations.in_no_executor(recording, name) for name in names):
         return None
     named = codes(names)
     return Cause(

@@ -6,11 +6,11 @@ import re
 import signal
 from collections.abc import Sequence
 
-from grader.checks import declarations as testimony
+from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.process.api_mistakes import slip_hint
+from grader.diagnosis.process.api_mistakes import mistake_hint
 from grader.diagnosis.process.missing_import import import_hint
 from grader.diagnosis.process.missing_library import lacking_package, library_hint
 from grader.diagnosis.process.newer_names import newer_name
@@ -158,14 +158,19 @@ def ended_early(recording: Recording, process: Process) -> bool:
 
 def _was_leaving(recording: Recording, process: Process) -> bool:
     """Whether it said that it ends before it was asked to."""
-    exiting_ns = testimony.exiting_ns(recording, process.name)
+    exiting_ns = declarations.exiting_ns(recording, process.name)
     return exiting_ns is not None and exiting_ns < recording.stop_ns
 
 
-def dead(recording: Recording) -> tuple[Process, ...]:
+def exited(recording: Recording) -> tuple[Process, ...]:
     """Processes that ended early; those that failed before those that just returned."""
     ended = [process for process in recording.processes if ended_early(recording, process)]
     return tuple(sorted(ended, key=lambda process: process.exit_code == 0))
+
+
+def crashed(recording: Recording) -> list[Process]:
+    """Processes that ended early with a failure."""
+    return [process for process in exited(recording) if process.exit_code != 0]
 
 
 def exit_words(exit_code: int | None) -> str:
@@ -192,12 +197,12 @@ def signal_of(exit_code: int) -> signal.Signals | None:
 
 def why_ended(recording: Recording, seen: str = "") -> Cause | None:
     """The cause if a process ended early, after what was seen of it; None if none did."""
-    ended = dead(recording)
-    cause = cause_of_death(recording, ended[0]) if ended else None
+    ended = exited(recording)
+    cause = why_it_exited(recording, ended[0]) if ended else None
     return cause.after(seen) if cause is not None and seen else cause
 
 
-def cause_of_death(recording: Recording, process: Process) -> Cause:
+def why_it_exited(recording: Recording, process: Process) -> Cause:
     """Why a process ended early, with its exception and the student's line if there is one.
 
     Args:
@@ -205,7 +210,7 @@ def cause_of_death(recording: Recording, process: Process) -> Cause:
         process: One that :func:`ended_early`.
     """
     left = process.stopped_by != "itself"
-    exited_ns = testimony.exiting_ns(recording, process.name) if left else process.exited_ns
+    exited_ns = declarations.exiting_ns(recording, process.name) if left else process.exited_ns
     when_s = recording.since_launch_s(exited_ns or recording.stop_ns)
     ended = f"the process {code(process.name)} ended {when_s:.2f} s after launch"
     evidence = Evidence(
@@ -276,7 +281,7 @@ def offence(recording: Recording) -> Cause | None:
 
 
 def _returned(recording: Recording, process: Process, ended: str, evidence: Evidence) -> Cause:
-    if testimony.broke_off(recording, process.name):
+    if declarations.broke_off(recording, process.name):
         return Cause(
             f"{ended} with exit code 0, but main() did not return: Python was broken off, as "
             "os._exit() does",
@@ -284,7 +289,7 @@ def _returned(recording: Recording, process: Process, ended: str, evidence: Evid
             "runs until rclpy.spin(node) returns, at Ctrl-C.",
             evidence,
         )
-    if testimony.traced(recording, process.name) and not testimony.said(
+    if declarations.traced(recording, process.name) and not declarations.said(
         recording, "node", process.name
     ):
         return Cause(
@@ -293,7 +298,7 @@ def _returned(recording: Recording, process: Process, ended: str, evidence: Evid
             "the node and call rclpy.spin(node).",
             evidence,
         )
-    if testimony.never_spun(recording, process.name):
+    if declarations.never_spun(recording, process.name):
         return Cause(
             f"{ended} with exit code 0: main() returned without rclpy.spin()",
             "rclpy.spin(node) keeps a node alive and runs its callbacks until Ctrl-C: call it in "
@@ -325,7 +330,7 @@ def _exception_hint(failure: Failure, recording: Recording) -> str:
             "A callback group is an object, not its class: write ReentrantCallbackGroup() and "
             "MutuallyExclusiveCallbackGroup(), with brackets."
         )
-    slip = import_hint(failure.message) if failure.type == "NameError" else slip_hint(failure)
+    slip = import_hint(failure.message) if failure.type == "NameError" else mistake_hint(failure)
     if slip is not None:
         return slip
     if _enters_init(failure):

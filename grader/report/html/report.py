@@ -176,4 +176,4 @@ def _prose(text: str) -> Markup:
 
 
 def _taken_ms(recording: Recording) -> float:
-    return recording.taken_s(recording.launched_ns, recording.end_ns) * 1e3
+    return recording.stolen_s(recording.launched_ns, recording.end_ns) * 1e3

@@ -173,7 +173,7 @@ def _scenario(recording: Recording, file: str | None, runs: int) -> ScenarioPart
         ending=recording.ending.value,
         duration_s=(end - begin) / NS,
         disturbance=DisturbancePart(
-            taken_s=recording.taken_s(begin, end),
+            taken_s=recording.stolen_s(begin, end),
             worst_late_s=max((item.late_ns for item in recording.disturbance), default=0) / NS,
         ),
         faults=recording.faults,

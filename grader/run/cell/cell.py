@@ -17,7 +17,7 @@ from grader.run.cell.exit_barrier import Leave
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
 from grader.run.cell.progress_events import tell, tell_line
-from grader.run.cell.violations import Witnesses
+from grader.run.cell.violations import ViolationWatch
 from grader.run.host.disturbance import DisturbanceMeter
 from grader.run.host.memory_shortage import Shortage
 from grader.run.host.stopwatch import Stopwatch
@@ -27,8 +27,8 @@ from grader.run.order import CellOrder, Command
 from grader.run.process.descendants import Family
 from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
+from grader.run.stimuli.context import StimulusContext
 from grader.run.stimuli.player import Player
-from grader.run.stimuli.stage import Stage
 from grader.sandbox.packet_monitor import Wire
 from grader.submission.record import SubmissionRecord
 
@@ -64,21 +64,21 @@ class Cell:
         self._wire = wire
         on_line = tell_line if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
-        self._students = StudentProcesses(self._output, order.enclosure)
+        self._students = StudentProcesses(self._output, order.process_sandbox)
         self._other_domains: tuple[int, ...] = ()
         self._graph = GraphObserver(
             probe.node,
             lambda: self._students.pids,
             self._students.refresh,
-            private=order.enclosure is not None,
+            private=order.process_sandbox is not None,
         )
         self._watchdog: Watchdog | None = None
-        if order.enclosure is not None:
+        if order.process_sandbox is not None:
             self._watchdog = Watchdog(
-                order.enclosure.limits,
+                order.process_sandbox.limits,
                 lambda: self._students.inits,
                 lambda: self._output.written_bytes,
-                Witnesses(self._students, self._output, self._graph, wire).deeds,
+                ViolationWatch(self._students, self._output, self._graph, wire).deeds,
             )
         self._meter = DisturbanceMeter(Family(os.getpid()).look)
         self._leave = Leave(self._output, self._graph, self._students)
@@ -88,7 +88,7 @@ class Cell:
             from grader.run.cell.simulator import SimulatedRobot
 
             self._robot = SimulatedRobot(probe.node, order.simulator)
-        self._stage = Stage(
+        self._context = StimulusContext(
             probe,
             self._graph,
             self._students,
@@ -97,7 +97,7 @@ class Cell:
             self._start_again,
             self._waits,
         )
-        self._player = Player(order.stimuli, self._stage)
+        self._player = Player(order.stimuli, self._context)
         self._ending = EndingConditions(probe, self._output, self._robot, self._player)
         self._faults: list[str] = []
         self._next_graph = 0.0
@@ -150,12 +150,12 @@ class Cell:
             processes=processes,
             log=tuple(log),
             declarations=self._output.declarations,
-            calls=_by_time((*self._probe.calls, *self._stage.asker.calls)),
+            calls=_by_time((*self._probe.calls, *self._context.asker.calls)),
             services=self._graph.services,
-            goals=tuple(sent.record for sent in self._stage.goals),
+            goals=tuple(sent.record for sent in self._context.goals),
             waits=tuple(self._waits),
-            joins=tuple(self._stage.joins.values()),
-            interventions=tuple(self._stage.interventions),
+            joins=tuple(self._context.joins.values()),
+            interventions=tuple(self._context.interventions),
             breaches=breaches,
             sent=dict.fromkeys(self._player.topics, ()),
             answers=self._player.answers,
@@ -186,7 +186,7 @@ class Cell:
             if self._robot is not None:
                 self._robot.start()
             ending = self._await_until()
-        if self._order.enclosure is not None:
+        if self._order.process_sandbox is not None:
             self._other_domains = tuple(d for d in joined_domains() if d != self._domain_id)
         # What arrived while the last wait ended still counts.
         self._graph.poll()
@@ -289,7 +289,7 @@ class Cell:
         return bool(matching)
 
     def _listeners(self, topic: str) -> list[Endpoint]:
-        return self._stage.endpoints(Kind.SUBSCRIPTION, topic)
+        return self._context.endpoints(Kind.SUBSCRIPTION, topic)
 
     def _await_until(self) -> Ending:
         timeout_s = self._order.limits.timeout_s

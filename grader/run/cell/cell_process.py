@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from grader.errors import GraderFault
-from grader.run.cell.middleware_hang import ENDED_BY, Stalled
-from grader.run.cell.prefork_server import Nursery
+from grader.run.cell.middleware_hang import ENDED_BY, MiddlewareHung
+from grader.run.cell.prefork_server import PreforkServer
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 from grader.run.process.descendants import kill_by_variable
 
@@ -34,7 +34,7 @@ class CellProcess:
         folder: Its own; gone after :meth:`close`.
     """
 
-    def __init__(self, nursery: Nursery, imports: Sequence[str] = ()) -> None:
+    def __init__(self, nursery: PreforkServer, imports: Sequence[str] = ()) -> None:
         """Start it; it joins the graph while the order is still being made.
 
         Args:
@@ -44,7 +44,7 @@ class CellProcess:
         Raises:
             GraderFault: The nursery has ended.
         """
-        self._nursery = nursery
+        self._server = nursery
         self._closing = threading.Lock()
         self._temporary = tempfile.TemporaryDirectory(prefix="cell-", dir=nursery.cells)
         self.folder = Path(self._temporary.name)
@@ -62,11 +62,11 @@ class CellProcess:
             Events of its progress.
 
         Raises:
-            Stalled: The student's processes kept its middleware busy.
+            MiddlewareHung: The student's processes kept its middleware busy.
             GraderFault: The cell failed, through no fault of the student's.
         """
         (self.folder / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
-        self._nursery.give(self.folder)
+        self._server.give(self.folder)
         watchdog = threading.Timer(_HANGING_S, self._forked.kill)
         watchdog.daemon = True
         watchdog.start()
@@ -81,7 +81,7 @@ class CellProcess:
                 # Killed, perhaps by the student's process: nobody has cleaned up.
                 kill_by_variable("HOME", str(self.folder / SCRATCH))
         if self._forked.returncode == -ENDED_BY:
-            raise Stalled
+            raise MiddlewareHung
         if self._forked.returncode or not self._is_recorded():
             told = self._errors.read_text(encoding="utf-8", errors="replace")
             ended = f"the cell of scenario {order.scenario!r} ended with status "

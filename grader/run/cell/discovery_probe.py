@@ -15,7 +15,7 @@ _LIMIT_S = 15.0
 
 
 @dataclass(frozen=True)
-class Meeting:
+class DiscoveryTime:
     """What came of it.
 
     Attributes:
@@ -27,7 +27,7 @@ class Meeting:
     error: str = ""
 
 
-def meet(ros: RosInstallation) -> Meeting:
+def meet(ros: RosInstallation) -> DiscoveryTime:
     """Start two nodes in two processes and wait until a publisher and a subscription match."""
     with lock_domain() as domain:
         environment = cell_environment(ros)
@@ -43,7 +43,7 @@ def meet(ros: RosInstallation) -> Meeting:
         try:
             assert first.stdout is not None
             if first.stdout.readline().strip() != "listening":
-                return Meeting(None, _last_line(first.communicate()[1]))
+                return DiscoveryTime(None, _last_line(first.communicate()[1]))
             second = subprocess.run(
                 [str(ros.python), "-m", "grader.run.cell.discovery_probe", "publish"],
                 env=environment,
@@ -57,8 +57,8 @@ def meet(ros: RosInstallation) -> Meeting:
                 first.stdin.close()
             first.wait(_LIMIT_S)
     if second.returncode != 0:
-        return Meeting(None, _last_line(second.stderr) or "the nodes did not find each other")
-    return Meeting(float(second.stdout))
+        return DiscoveryTime(None, _last_line(second.stderr) or "the nodes did not find each other")
+    return DiscoveryTime(float(second.stdout))
 
 
 def _last_line(text: str) -> str:

@@ -68,8 +68,8 @@ def main(
         order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
         if order.type_support:
             add_type_support(map(Path, order.type_support))
-        if rights is not None and order.enclosure is not None:
-            bounds = order.enclosure.limits
+        if rights is not None and order.process_sandbox is not None:
+            bounds = order.process_sandbox.limits
             rights.mounter.mount(bounds.disk_bytes, bounds.files, bounds.shared_bytes)
         wire = rights.wire if rights is not None else None
         probe.listen(order.topics, order.limits)

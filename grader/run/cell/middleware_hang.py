@@ -26,11 +26,11 @@ _BUSY_S = 5.0
 """CPU time that no run of good manners takes at a stretch."""
 
 
-class Stalled(GraderFault):
+class MiddlewareHung(GraderFault):
     """The student's processes keep the cell's middleware busy, and it was ended for it."""
 
 
-class Stall:
+class HangMonitor:
     """Looks at one cell, again and again."""
 
     def __init__(self, task: Path) -> None:
@@ -78,9 +78,7 @@ def _switches(status: bytes) -> tuple[bytes, ...]:
     return tuple(line for line in lines if b"ctxt_switches:" in line)
 
 
-def stalled_recording(
-    order: CellOrder, submission: SubmissionRecord, launched_ns: int
-) -> Recording:
+def hung_recording(order: CellOrder, submission: SubmissionRecord, launched_ns: int) -> Recording:
     """What is known of a run whose cell was ended: nothing that was sent in it.
 
     Args:

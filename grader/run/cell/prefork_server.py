@@ -32,7 +32,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.run.cell.middleware_hang import Stall
+from grader.run.cell.middleware_hang import HangMonitor
 from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
 from grader.run.host.readable import readable
 from grader.run.process.descendants import descendants, is_stopped, kill_tree, send
@@ -132,7 +132,7 @@ class ForkedCell:
         return number, cpu_s
 
 
-class Nursery:
+class PreforkServer:
     """The process, as whoever needs cells sees it."""
 
     def __init__(self, ros: RosInstallation, sandbox: Sandbox | None = None) -> None:
@@ -151,7 +151,7 @@ class Nursery:
         environment = cell_environment(ros, sandboxed=sandbox is not None)
         if sandbox is not None:
             bubblewrap.give(self._cells.path)
-            command = sandbox.nursery_command(
+            command = sandbox.server_command(
                 command,
                 ros,
                 self._cells.path,
@@ -386,7 +386,7 @@ def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool)
         folder, rights = Path(arguments[0]), None
         if private:
             # As the one that waits for it sees it: nothing of this process can while it stalls.
-            stall = Stall(Path("/proc/1"))
+            stall = HangMonitor(Path("/proc/1"))
             rights = enter(folder, stall.sentence)
             folder = CELL
         status = main(folder, tuple(map(int, arguments[1:])), rights)

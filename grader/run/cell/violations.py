@@ -16,7 +16,7 @@ _NAMES = "made a node or a topic with a name that ROS does not allow, past the c
 _GARBAGE = "sent garbage to the UDP ports of the node that watches the run"
 
 
-class Witnesses:
+class ViolationWatch:
     """The guard over system calls, the tracer's pipe, the graph and the cell's network."""
 
     def __init__(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.recording.model import NS
-from grader.sandbox.orphan_cpu import Process, Taken, Unwaited
+from grader.sandbox.orphan_cpu import OrphanCpu, Process, Taken
 
 _STAT = Path("/proc/stat")
 _TICK_NS = NS // os.sysconf("SC_CLK_TCK")
@@ -112,7 +112,7 @@ class CpuMeter:
         self._cpus = os.sched_getaffinity(0)
         # A container's stand-in (lxcfs) calls a CPU idle that another container uses.
         self._knows_idle = not os.path.ismount(_STAT)
-        self._unwaited = Unwaited()
+        self._unwaited = OrphanCpu()
 
     @property
     def cpus(self) -> int:

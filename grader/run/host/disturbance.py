@@ -73,7 +73,7 @@ class DisturbanceMeter:
         return tuple(self._samples)
 
     @property
-    def taken_s(self) -> float:
+    def stolen_s(self) -> float:
         """Everything taken so far, in seconds: run delays and lateness."""
         return self._taken_ns / NS
 

@@ -17,10 +17,10 @@ class Stopwatch:
         self._meter = meter
         self.start_ns = time.time_ns()
         self._wall_s = time.monotonic()
-        self._taken_s = meter.taken_s
+        self._stolen_s = meter.stolen_s
 
     @property
     def elapsed_s(self) -> float:
         """Undisturbed seconds; at least an eighth of the wall time, so that every wait ends."""
         wall_s = time.monotonic() - self._wall_s
-        return max(wall_s - (self._meter.taken_s - self._taken_s), wall_s / _LONGEST_STRETCH)
+        return max(wall_s - (self._meter.stolen_s - self._stolen_s), wall_s / _LONGEST_STRETCH)

@@ -104,7 +104,7 @@ class Watchdog:
         if own > _OWN_BYTES:
             words = f"{size_words(own)} of memory where messages wait"
             self._end_all("memory", words, size_words(_OWN_BYTES))
-        if self._cpu.taken_s(usages) > limits.cpu_s:
+        if self._cpu.stolen_s(usages) > limits.cpu_s:
             words = f"more than {limits.cpu_s} s of CPU time"
             self._end_all("cpu time", words, f"{limits.cpu_s} s")
         threads = sum(usage.threads for usage in usages)

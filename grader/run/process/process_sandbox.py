@@ -34,7 +34,7 @@ _FORMATS = (b"\x7fELF", b"#!")
 
 
 @dataclass(frozen=True)
-class Enclosure:
+class ProcessSandbox:
     """What a cell has to know to put a student into a sandbox.
 
     Attributes:
@@ -56,7 +56,7 @@ class Enclosure:
     folders: dict[str, str]
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Enclosure:
+    def from_dict(cls, data: dict[str, Any]) -> ProcessSandbox:
         """Read what :func:`dataclasses.asdict` made."""
         given = {**data, "arguments": tuple(data["arguments"]), "limits": Limits(**data["limits"])}
         return cls(**given)
@@ -69,12 +69,12 @@ class Enclosure:
         return Path(path)
 
 
-class EnclosedProcess(subprocess.Popen[bytes]):
+class SandboxedProcess(subprocess.Popen[bytes]):
     """A process that is started in a sandbox; its exit code is that of what was started in it."""
 
     def __init__(
         self,
-        enclosure: Enclosure,
+        process_sandbox: ProcessSandbox,
         argv: Sequence[str],
         environment: Mapping[str, str],
         pass_fds: Sequence[int],
@@ -82,7 +82,7 @@ class EnclosedProcess(subprocess.Popen[bytes]):
         """Start it.
 
         Args:
-            enclosure: The sandbox.
+            process_sandbox: The sandbox.
             argv: What to execute.
             environment: Its variables.
             pass_fds: Descriptors that it inherits.
@@ -91,25 +91,25 @@ class EnclosedProcess(subprocess.Popen[bytes]):
             OSError: It cannot be executed.
         """
         if argv[0].startswith(f"{WORKSPACE}/"):
-            _check_executable(enclosure.outside(argv[0]))
+            _check_executable(process_sandbox.outside(argv[0]))
         self._status, status = os.pipe()
         os.set_blocking(self._status, False)
         self._told = b""
         self._init: int | None = None
-        arguments = [*enclosure.arguments, "--clearenv"]
+        arguments = [*process_sandbox.arguments, "--clearenv"]
         for name, value in environment.items():
             arguments += ["--setenv", name, value]
         given = _temporary("\0".join((*arguments, "")).encode())
-        rules = os.open(enclosure.filter, os.O_RDONLY | os.O_CLOEXEC)
+        rules = os.open(process_sandbox.filter, os.O_RDONLY | os.O_CLOEXEC)
         try:
             super().__init__(
                 [
                     # The sandbox's own first process has limits as well. What is in it inherits
                     # them, but for what the kernel counts for each user namespace.
-                    *enclosure.limits.prlimit(_AROUND),
+                    *process_sandbox.limits.prlimit(_AROUND),
                     *("bwrap", "--args", str(given), "--json-status-fd", str(status)),
                     *("--seccomp", str(rules), "--"),
-                    *("prlimit", f"--nproc={enclosure.limits.processes}", "--", *argv),
+                    *("prlimit", f"--nproc={process_sandbox.limits.processes}", "--", *argv),
                 ],
                 cwd="/",
                 env={"PATH": "/usr/bin:/bin"},

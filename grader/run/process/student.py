@@ -26,7 +26,7 @@ from grader.run.process.descendants import (
 )
 from grader.run.process.guard import Guard
 from grader.run.process.output import OutputReader
-from grader.run.process.process_sandbox import EnclosedProcess, Enclosure
+from grader.run.process.process_sandbox import ProcessSandbox, SandboxedProcess
 from grader.run.process.shared_memory import remove_orphaned_segments
 
 _AFTERMATH_S = 0.5
@@ -62,13 +62,13 @@ class _Running:
 
     def _own_pids(self) -> Iterable[int]:
         """Its processes, as far as they are found without looking at all of the machine's."""
-        init = self.popen.init if isinstance(self.popen, EnclosedProcess) else None
+        init = self.popen.init if isinstance(self.popen, SandboxedProcess) else None
         return (self.popen.pid, *([] if init is None else (init, *descendants(init))))
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to its process group, if that is still there."""
         with contextlib.suppress(ProcessLookupError):
-            if isinstance(self.popen, EnclosedProcess):
+            if isinstance(self.popen, SandboxedProcess):
                 self.popen.signal_group(number)
             else:
                 os.killpg(self.popen.pid, number)
@@ -78,7 +78,7 @@ class _Running:
         """As in :mod:`subprocess`; of a process that was stopped, SIGSTOP ended it."""
         if self.is_ended:
             return -signal.SIGSTOP
-        if isinstance(self.popen, EnclosedProcess):
+        if isinstance(self.popen, SandboxedProcess):
             return self.popen.exit_code
         return self.popen.returncode
 
@@ -89,25 +89,25 @@ class StudentProcesses:
     def __init__(
         self,
         output: OutputReader,
-        enclosure: Enclosure | None = None,
+        process_sandbox: ProcessSandbox | None = None,
     ) -> None:
         """Prepare; nothing is started yet.
 
         Args:
             output: Reads what they write.
-            enclosure: The sandbox that each of them gets, or None.
+            process_sandbox: The sandbox that each of them gets, or None.
 
         Raises:
             OSError: Nobody can watch over a sandbox here.
         """
         self._output = output
-        self._enclosure = enclosure
+        self._sandbox = process_sandbox
         self._guard: Guard | None = None
-        if enclosure is not None:
-            program, unheard = Path(enclosure.guard), Path(enclosure.unheard)
-            self._guard = Guard(program.read_bytes(), enclosure.calls, unheard.read_bytes())
+        if process_sandbox is not None:
+            program, unheard = Path(process_sandbox.guard), Path(process_sandbox.unheard)
+            self._guard = Guard(program.read_bytes(), process_sandbox.calls, unheard.read_bytes())
             if not self._guard.is_heard:
-                self._enclosure = replace(enclosure, guard=enclosure.unheard)
+                self._sandbox = replace(process_sandbox, guard=process_sandbox.unheard)
         self._running: list[_Running] = []
         self._pids: frozenset[int] = frozenset()
         self._survivors: tuple[str, ...] = ()
@@ -167,9 +167,9 @@ class StudentProcesses:
         pass_fds: tuple[int, int],
     ) -> subprocess.Popen[bytes]:
         variables = {**environment, **of_run}
-        if self._enclosure is not None and self._guard is not None:
+        if self._sandbox is not None and self._guard is not None:
             return self._guard.start(
-                partial(EnclosedProcess, self._enclosure, argv, variables, pass_fds)
+                partial(SandboxedProcess, self._sandbox, argv, variables, pass_fds)
             )
         return subprocess.Popen(
             argv,
@@ -188,7 +188,7 @@ class StudentProcesses:
         inits = [
             process.popen.init
             for process in self._running
-            if isinstance(process.popen, EnclosedProcess) and process.exited_ns is None
+            if isinstance(process.popen, SandboxedProcess) and process.exited_ns is None
         ]
         return tuple(init for init in inits if init is not None)
 
@@ -309,7 +309,7 @@ class StudentProcesses:
             f"the sandbox of {process.name} could not be set up: "
             f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'it said nothing'}"
             for process in self._running
-            if isinstance(process.popen, EnclosedProcess)
+            if isinstance(process.popen, SandboxedProcess)
             and process.stopped_by == "itself"
             and not process.is_ended
             and not process.popen.was_set_up
@@ -325,7 +325,7 @@ class StudentProcesses:
             breaches: Limits that the processes passed, for which they were ended by us.
         """
         # A sandbox's own processes end with the status of what was started in it.
-        started = [item.popen for item in self._running if isinstance(item.popen, EnclosedProcess)]
+        started = [item.popen for item in self._running if isinstance(item.popen, SandboxedProcess)]
         ours = {pid for popen in started for pid in (popen.pid, popen.init)}
         if breaches or self._guard is None or self._guard.can_have_ended(ours):
             return None

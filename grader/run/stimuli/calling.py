@@ -7,8 +7,8 @@ import time
 from grader.recording.model import NS, Wait
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.asking import NO_SERVER, Asked
+from grader.run.stimuli.context import Playing, StimulusContext
 from grader.run.stimuli.orders import CallOrder, GoalOrder, ParametersOrder
-from grader.run.stimuli.stage import Playing, Stage
 
 _POLL_S = 0.02
 # The server may match the client, for its answers, a moment later than the client the server.
@@ -22,23 +22,23 @@ _UNCALLABLE_S = 1.0
 MARGIN_S = 0.25
 """What is waited for is waited for a little longer, so that its time has passed in every clock."""
 
-AskingOrder = CallOrder | ParametersOrder | GoalOrder
+RequestOrder = CallOrder | ParametersOrder | GoalOrder
 
 
 class Readiness:
     """Waits until a server of the student's is there and its node spins, or in vain."""
 
-    def __init__(self, what: str, service: str, stage: Stage) -> None:
+    def __init__(self, what: str, service: str, context: StimulusContext) -> None:
         """Nothing is waited for yet.
 
         Args:
             what: Such as ``a service /add``, for the recording.
             service: Fully qualified name of a service that the server has.
-            stage: Knows how calm the graph is.
+            context: Knows how calm the graph is.
         """
         self._what = what
         self._service = service
-        self._stage = stage
+        self._context = context
         self._began_ns = 0
         self._there: Stopwatch | None = None
         self.there_ns = 0
@@ -52,13 +52,13 @@ class Readiness:
     @property
     def never_answered(self) -> bool:
         """Whether it is there, but its node never answered what it answers while it spins."""
-        node = self._stage.server(self._service) if self._there is not None else None
-        return node is not None and self._stage.probe.answers(node) is False
+        node = self._context.server(self._service) if self._there is not None else None
+        return node is not None and self._context.probe.answers(node) is False
 
     @property
     def is_missing(self) -> bool:
         """Whether it is not there, and probably will not come."""
-        return self._there is None and self._stage.calm_s > _MISSING_S
+        return self._there is None and self._context.calm_s > _MISSING_S
 
     def met(self, is_there: bool) -> bool:
         """Whether it can be asked.
@@ -73,18 +73,18 @@ class Readiness:
         self._began_ns = self._began_ns or time.time_ns()
         if not is_there:
             self._there = None
-            settle_s = self._stage.limits.settle_s
-            if not self.given_up and self._stage.calm_s > settle_s:
+            settle_s = self._context.limits.settle_s
+            if not self.given_up and self._context.calm_s > settle_s:
                 self.given_up = True
-                self._stage.waits.append(Wait(self._what, settle_s, self._began_ns))
+                self._context.waits.append(Wait(self._what, settle_s, self._began_ns))
             return False
         self.given_up = False
         if self._there is None:
-            self._there, self.there_ns = Stopwatch(self._stage.meter), time.time_ns()
+            self._there, self.there_ns = Stopwatch(self._context.meter), time.time_ns()
         if self._there.elapsed_s < _GRACE_S:
             return False
         spins = self.look()
-        limit_s = _UNCALLABLE_S if spins is None else self._stage.limits.discovery_s
+        limit_s = _UNCALLABLE_S if spins is None else self._context.limits.discovery_s
         return bool(spins) or self._there.elapsed_s > limit_s
 
     def look(self) -> bool | None:
@@ -93,34 +93,36 @@ class Readiness:
         Returns:
             Whether it has ever answered that; None if it cannot be asked.
         """
-        node = self._stage.server(self._service)
+        node = self._context.server(self._service)
         if node is None:
             return None
-        if time.time_ns() - self._stage.probe.last_called_ns(node) > _LOOK_NS:
-            self._stage.call_executor(node)
-        return self._stage.probe.answers(node)
+        if time.time_ns() - self._context.probe.last_called_ns(node) > _LOOK_NS:
+            self._context.call_executor(node)
+        return self._context.probe.answers(node)
 
 
 class Asking(Playing):
     """A stimulus that asks something of a server, when what is asked before it was answered."""
 
-    def __init__(self, order: AskingOrder, what: str, service: str, stage: Stage) -> None:
+    def __init__(
+        self, order: RequestOrder, what: str, service: str, context: StimulusContext
+    ) -> None:
         """Take a place in the order of what is asked.
 
         Args:
             order: When it is due, and how long to wait for an answer.
             what: Of the server, in words.
             service: Fully qualified name of a service that it has.
-            stage: Knows the others.
+            context: Knows the others.
         """
         self.after_s = order.after_s
         self._within_s = order.within_s
-        self._stage = stage
-        self._ready = Readiness(what, service, stage)
+        self._context = context
+        self._ready = Readiness(what, service, context)
         self._since_asked: Stopwatch | None = None
         self._now_s = 0.0
-        self._place = len(stage.asking)
-        stage.asking.append(self)
+        self._place = len(context.asking)
+        context.asking.append(self)
 
     @property
     def asks(self) -> bool:
@@ -151,11 +153,11 @@ class Asking(Playing):
 
     @property
     def _is_turn(self) -> bool:
-        return not any(item.holds_up(self) for item in self._stage.asking)
+        return not any(item.holds_up(self) for item in self._context.asking)
 
     def _wait_for_answer(self) -> None:
         """Begin to wait; what the machine takes meanwhile does not count."""
-        self._since_asked = Stopwatch(self._stage.meter)
+        self._since_asked = Stopwatch(self._context.meter)
 
     @property
     def _waits(self) -> bool:
@@ -174,9 +176,9 @@ class Asking(Playing):
 class Calling(Asking):
     """Requests to one service, one after another or several at once."""
 
-    def __init__(self, order: CallOrder, stage: Stage) -> None:
+    def __init__(self, order: CallOrder, context: StimulusContext) -> None:
         """Nothing is called yet."""
-        super().__init__(order, f"a service {order.service}", order.service, stage)
+        super().__init__(order, f"a service {order.service}", order.service, context)
         self._order = order
         self._started = False
         self._sent = 0
@@ -212,7 +214,7 @@ class Calling(Asking):
         self._go_on(elapsed_s)
         if not self._started:
             try:
-                there = self._stage.asker.is_ready(order.service, order.type)
+                there = self._context.asker.is_ready(order.service, order.type)
             except ImportError as error:
                 self._failed = f"the interface {order.type} is not installed ({error})"
                 return
@@ -223,7 +225,8 @@ class Calling(Asking):
             return
         request = order.requests[self._sent]
         self._round = [
-            self._stage.asker.ask(order.service, order.type, request) for _ in range(order.at_once)
+            self._context.asker.ask(order.service, order.type, request)
+            for _ in range(order.at_once)
         ]
         self._sent += 1
         self._sent_s = elapsed_s
@@ -234,10 +237,10 @@ class Calling(Asking):
         order = self._order
         if self._failed is not None or self._ready.is_in_vain:
             error = self._failed or NO_SERVER
-            self._stage.asker.fail(order.service, order.type, order.requests[self._sent], error)
+            self._context.asker.fail(order.service, order.type, order.requests[self._sent], error)
         elif self._ready.never_answered and not self._started:
             request = order.requests[0]
-            self._stage.asker.wait(order.service, order.type, request, self._ready.there_ns)
+            self._context.asker.wait(order.service, order.type, request, self._ready.there_ns)
 
     def _is_next_due(self) -> bool:
         if self._order.every_s is not None:

@@ -11,9 +11,9 @@ from grader.recording.interaction import Feedback, Goal
 from grader.run.cell.probe import import_interface
 from grader.run.stimuli.asking import NO_SERVER
 from grader.run.stimuli.calling import Asking
+from grader.run.stimuli.context import StimulusContext
 from grader.run.stimuli.filling import filled, plain
 from grader.run.stimuli.orders import GoalOrder
-from grader.run.stimuli.stage import Stage
 
 _MOST_FEEDBACK = 5000
 _ACCEPT_S = 1.0
@@ -71,16 +71,16 @@ class SentGoal:
 class SendingGoal(Asking):
     """One goal, from its sending to its result."""
 
-    def __init__(self, order: GoalOrder, stage: Stage) -> None:
+    def __init__(self, order: GoalOrder, context: StimulusContext) -> None:
         """Nothing is sent yet."""
         super().__init__(
-            order, f"an action {order.action}", f"{order.action}/_action/send_goal", stage
+            order, f"an action {order.action}", f"{order.action}/_action/send_goal", context
         )
         self._order = order
         # Those of the orders before it are there already, and are waited for.
         self._before = [
             item
-            for item in stage.asking
+            for item in context.asking
             if isinstance(item, SendingGoal) and item._order.action == order.action
         ][:-1]
         self._client: Any = None
@@ -135,7 +135,7 @@ class SendingGoal(Asking):
             except ImportError as error:
                 self._failed = f"the interface {self._order.type} is not installed ({error})"
                 return False
-            node = self._stage.probe.node
+            node = self._context.probe.node
             self._client = ActionClient(node, interface, self._order.action)
         return self._ready.met(bool(self._client.server_is_ready()))
 
@@ -159,17 +159,17 @@ class SendingGoal(Asking):
         self._wait_for_answer()
 
         def take(message: Any) -> None:
-            if self._stage.probe.recording and len(sent.feedback) < _MOST_FEEDBACK:
+            if self._context.probe.recording and len(sent.feedback) < _MOST_FEEDBACK:
                 sent.feedback.append(Feedback(time.time_ns(), plain(message.feedback)))
 
         future = self._client.send_goal_async(message, feedback_callback=take)
         future.add_done_callback(lambda done: self._answer(sent, done))
 
     def _note(self, sent: SentGoal) -> None:
-        self._stage.goals.append(sent)
+        self._context.goals.append(sent)
 
     def _answer(self, sent: SentGoal, future: Any) -> None:
-        if not self._stage.probe.recording:
+        if not self._context.probe.recording:
             return
         handle = future.result()
         sent.accepted, sent.answered_ns = bool(handle.accepted), time.time_ns()
@@ -178,7 +178,7 @@ class SendingGoal(Asking):
             handle.get_result_async().add_done_callback(lambda done: self._end(sent, done))
 
     def _end(self, sent: SentGoal, future: Any) -> None:
-        if not self._stage.probe.recording:
+        if not self._context.probe.recording:
             return
         answer = future.result()
         sent.result_ns = time.time_ns()
@@ -205,6 +205,6 @@ class SendingGoal(Asking):
             )
 
     def _cancel(self, sent: SentGoal, future: Any) -> None:
-        if self._stage.probe.recording:
+        if self._context.probe.recording:
             sent.cancel_answered_ns = time.time_ns()
             sent.cancel_accepted = bool(future.result().goals_canceling)

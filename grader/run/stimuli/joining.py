@@ -8,8 +8,8 @@ from typing import Any
 
 from grader.recording.model import Join, Qos
 from grader.run.cell.probe import qos_profile
+from grader.run.stimuli.context import Playing, StimulusContext
 from grader.run.stimuli.orders import JoinOrder
-from grader.run.stimuli.stage import Playing, Stage
 
 # What a publisher keeps for late joiners arrives within this of the match.
 _HISTORY_S = 0.5
@@ -19,10 +19,10 @@ _POLL_S = 0.02
 class Joining(Playing):
     """A late joiner."""
 
-    def __init__(self, order: JoinOrder, stage: Stage) -> None:
+    def __init__(self, order: JoinOrder, context: StimulusContext) -> None:
         """Nothing is subscribed to yet."""
         self._order = order
-        self._stage = stage
+        self._context = context
         self._subscription: Any = None
         self._joined_s = 0.0
         self._matched_s: float | None = None
@@ -42,7 +42,7 @@ class Joining(Playing):
             return False
         if self._matched_s is not None:
             return self._now_s - self._matched_s > _HISTORY_S
-        return self._now_s - self._joined_s > self._stage.limits.settle_s
+        return self._now_s - self._joined_s > self._context.limits.settle_s
 
     def tick(self, elapsed_s: float | None) -> None:
         """Join when it is due; then note the match."""
@@ -53,13 +53,13 @@ class Joining(Playing):
             self._join(elapsed_s)
         elif self._matched_s is None and self._subscription.get_publisher_count():
             self._matched_s = elapsed_s
-            joins, name = self._stage.joins, self._order.name
+            joins, name = self._context.joins, self._order.name
             joins[name] = replace(joins[name], matched_ns=time.time_ns())
 
     def _join(self, elapsed_s: float) -> None:
         order = self._order
         self._joined_s = elapsed_s
-        self._stage.joins[order.name] = Join(
+        self._context.joins[order.name] = Join(
             name=order.name,
             topic=order.topic,
             type=order.type,
@@ -72,4 +72,4 @@ class Joining(Playing):
             joined_ns=time.time_ns(),
         )
         profile = qos_profile(order.reliability, order.durability, order.depth)
-        self._subscription = self._stage.probe.join(order.name, order.topic, order.type, profile)
+        self._subscription = self._context.probe.join(order.name, order.topic, order.type, profile)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import time
 
 from grader.recording.model import Owner
+from grader.run.stimuli.context import Playing, StimulusContext
 from grader.run.stimuli.orders import ListParametersOrder
-from grader.run.stimuli.stage import Playing, Stage
 
 
 class ListingParameters(Playing):
     """Calls ``list_parameters`` of every node, or what stands in for it; it has no end."""
 
-    def __init__(self, order: ListParametersOrder, stage: Stage) -> None:
+    def __init__(self, order: ListParametersOrder, context: StimulusContext) -> None:
         """Nothing is called yet."""
         self._every_s = order.every_s
-        self._stage = stage
+        self._context = context
         self._next = 0.0
         self._due_s: float | None = None
 
@@ -27,7 +27,7 @@ class ListingParameters(Playing):
     def tick(self, elapsed_s: float | None) -> None:
         """Call when it is due; also before the first match, since a node may be blocked."""
         now = time.monotonic()
-        if now >= self._next and self._stage.is_set_up:
+        if now >= self._next and self._context.is_set_up:
             self._next = now + self._every_s
             self._call()
         self._due_s = None
@@ -35,6 +35,6 @@ class ListingParameters(Playing):
             self._due_s = elapsed_s + self._next - now
 
     def _call(self) -> None:
-        there = (node for node in self._stage.graph.nodes if node.vanished_ns is None)
+        there = (node for node in self._context.graph.nodes if node.vanished_ns is None)
         for name in dict.fromkeys(node.name for node in there if node.owner is Owner.STUDENT):
-            self._stage.call_executor(name)
+            self._context.call_executor(name)

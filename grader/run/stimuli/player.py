@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from grader.run.stimuli.calling import Calling
+from grader.run.stimuli.context import Playing, StimulusContext
 from grader.run.stimuli.goal_sending import SendingGoal
 from grader.run.stimuli.joining import Joining
 from grader.run.stimuli.orders import (
@@ -23,7 +24,6 @@ from grader.run.stimuli.parameters import ListingParameters
 from grader.run.stimuli.processes import Killing, Restarting
 from grader.run.stimuli.publishing import Publishing
 from grader.run.stimuli.setting import SettingParameters
-from grader.run.stimuli.stage import Playing, Stage
 
 _KINDS: dict[type, Callable[..., Playing]] = {
     PublishOrder: Publishing,
@@ -40,14 +40,14 @@ _KINDS: dict[type, Callable[..., Playing]] = {
 class Player:
     """Plays every stimulus of a run at its time."""
 
-    def __init__(self, orders: Sequence[StimulusOrder], stage: Stage) -> None:
+    def __init__(self, orders: Sequence[StimulusOrder], context: StimulusContext) -> None:
         """Prepare what has to be there before anything of the student's is launched.
 
         Args:
             orders: What to play.
-            stage: What to act on.
+            context: What to act on.
         """
-        self._playing = [_KINDS[type(order)](order, stage) for order in orders]
+        self._playing = [_KINDS[type(order)](order, context) for order in orders]
         self._answers = {
             order.topic: order.answer
             for order in orders

@@ -7,17 +7,17 @@ import time
 
 from grader.recording.model import Intervention
 from grader.run.host.stopwatch import Stopwatch
+from grader.run.stimuli.context import Playing, StimulusContext
 from grader.run.stimuli.orders import KillOrder, RestartOrder
-from grader.run.stimuli.stage import Playing, Stage
 
 
 class Killing(Playing):
     """Sends a signal to a process."""
 
-    def __init__(self, order: KillOrder, stage: Stage) -> None:
+    def __init__(self, order: KillOrder, context: StimulusContext) -> None:
         """Nothing is sent yet."""
         self._order = order
-        self._stage = stage
+        self._context = context
         self._sent = False
 
     @property
@@ -33,7 +33,7 @@ class Killing(Playing):
     @property
     def keeps_run(self) -> bool:
         """What the scenario ends is meant to be gone."""
-        return self._stage.students.was_killed(self._order.process)
+        return self._context.students.was_killed(self._order.process)
 
     def tick(self, elapsed_s: float | None) -> None:
         """Send the signal when it is due."""
@@ -41,8 +41,8 @@ class Killing(Playing):
             return
         self._sent = True
         order = self._order
-        if self._stage.students.kill(order.process, signal.Signals[order.signal]):
-            self._stage.interventions.append(
+        if self._context.students.kill(order.process, signal.Signals[order.signal]):
+            self._context.interventions.append(
                 Intervention(time.time_ns(), order.process, "kill", order.signal)
             )
 
@@ -50,10 +50,10 @@ class Killing(Playing):
 class Restarting(Playing):
     """Ends a process if it still runs, in steps, and starts it again."""
 
-    def __init__(self, order: RestartOrder, stage: Stage) -> None:
+    def __init__(self, order: RestartOrder, context: StimulusContext) -> None:
         """Nothing is done yet."""
         self._order = order
-        self._stage = stage
+        self._context = context
         self._steps = [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
         self._since: Stopwatch | None = None
         self._done = False
@@ -77,19 +77,19 @@ class Restarting(Playing):
         """End it and start it again when it is due."""
         if self._done or elapsed_s is None or elapsed_s < self._order.after_s:
             return
-        stage, process = self._stage, self._order.process
-        limits = stage.limits
-        if stage.students.is_running(process):
+        context, process = self._context, self._order.process
+        limits = context.limits
+        if context.students.is_running(process):
             patience_s = limits.shutdown_s if len(self._steps) == 2 else limits.terminate_s
             waiting = self._since is not None and self._since.elapsed_s <= patience_s
             if not waiting and self._steps:
                 number = self._steps.pop(0)
-                stage.students.kill(process, number)
-                self._since = Stopwatch(stage.meter)
-                stage.interventions.append(
+                context.students.kill(process, number)
+                self._since = Stopwatch(context.meter)
+                context.interventions.append(
                     Intervention(time.time_ns(), process, "kill", number.name)
                 )
             return
         self._done = True
-        stage.start(process)
-        stage.interventions.append(Intervention(time.time_ns(), process, "restart"))
+        context.start(process)
+        context.interventions.append(Intervention(time.time_ns(), process, "restart"))

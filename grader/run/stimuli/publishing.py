@@ -13,9 +13,9 @@ from grader.recording.model import Kind, Qos, Wait
 from grader.run.cell.probe import import_interface, qos_profile
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.answers import Answers
+from grader.run.stimuli.context import Playing, StimulusContext
 from grader.run.stimuli.filling import filled
 from grader.run.stimuli.orders import PublishOrder
-from grader.run.stimuli.stage import Playing, Stage
 
 _POLL_S = 0.02
 # Of a node that declares nothing to us, the writer that answers may match a moment later.
@@ -25,7 +25,7 @@ _GRACE_S = 0.1
 class Publishing(Playing):
     """A publisher of the probe with its messages."""
 
-    def __init__(self, order: PublishOrder, stage: Stage) -> None:
+    def __init__(self, order: PublishOrder, context: StimulusContext) -> None:
         """Create the publisher, and publish what is to be there before the student's launch.
 
         Raises:
@@ -33,10 +33,10 @@ class Publishing(Playing):
         """
         self.topic = order.topic
         self._order = order
-        self._stage = stage
+        self._context = context
         self._class = import_interface(order.type)
         self._qos = Qos(reliability=order.reliability, durability=order.durability)
-        self._publisher: Any = stage.probe.node.create_publisher(
+        self._publisher: Any = context.probe.node.create_publisher(
             self._class,
             order.topic,
             qos_profile(order.reliability, order.durability, order.depth),
@@ -46,7 +46,7 @@ class Publishing(Playing):
         self._ready_s: float | None = None
         self._next_s: float | None = None
         self._answers = Answers(order.within_s)
-        self._since_sent = Stopwatch(stage.meter)
+        self._since_sent = Stopwatch(context.meter)
         self._read = 0
         self._now_s = 0.0
         self._given_up = False
@@ -87,7 +87,7 @@ class Publishing(Playing):
             if self._order.answer is not None:
                 self._answers.ask()
             self._publish()
-            self._since_sent = Stopwatch(self._stage.meter)
+            self._since_sent = Stopwatch(self._context.meter)
             # A late cell must not make up for it with a burst.
             self._next_s = max(self._next_s, elapsed_s - self._gap_s()) + self._gap_s()
 
@@ -106,11 +106,11 @@ class Publishing(Playing):
             self._began_ns = time.time_ns()
         if not self._is_listened_to():
             self._ready_s = None
-            settle_s = self._stage.limits.settle_s
-            if not self._given_up and self._stage.calm_s > settle_s:
+            settle_s = self._context.limits.settle_s
+            if not self._given_up and self._context.calm_s > settle_s:
                 self._given_up = True
                 what = f"a subscription on {self._order.topic}"
-                self._stage.waits.append(Wait(what, settle_s, self._began_ns))
+                self._context.waits.append(Wait(what, settle_s, self._began_ns))
             return
         self._given_up = False
         if self._ready_s is None:
@@ -122,17 +122,17 @@ class Publishing(Playing):
         """Whether every subscription of the student's that can match has, and there is one."""
         able = [
             item
-            for item in self._stage.endpoints(Kind.SUBSCRIPTION, self._order.topic)
+            for item in self._context.endpoints(Kind.SUBSCRIPTION, self._order.topic)
             if item.type == self._order.type and not refusals(self._qos, item.qos)
         ]
         matched = self._publisher.get_subscription_count()
-        return bool(able) and matched >= len(able) and self._stage.is_heard
+        return bool(able) and matched >= len(able) and self._context.is_heard
 
     def _listen(self) -> None:
         """Take note of the answers that came since the last time."""
         if self._order.answer is None:
             return
-        messages = self._stage.probe.messages
+        messages = self._context.probe.messages
         for message in messages[self._read :]:
             if message.topic == self._order.answer and not (message.is_sent or message.join):
                 self._answers.hear(message.cdr, self._since_sent.elapsed_s)
@@ -148,7 +148,7 @@ class Publishing(Playing):
         self._sent += 1
         if order.repeat_s is None:
             self.last_ns = stamp_ns
-        self._stage.probe.messages.append(
+        self._context.probe.messages.append(
             RawMessage(
                 topic=order.topic,
                 type=order.type,

@@ -7,8 +7,8 @@ from typing import Any
 
 from grader.run.stimuli.asking import NO_SERVER, Asked
 from grader.run.stimuli.calling import Asking
+from grader.run.stimuli.context import StimulusContext
 from grader.run.stimuli.orders import ParametersOrder
-from grader.run.stimuli.stage import Stage
 
 _EVERY: Mapping[str, Any] = {"prefixes": [], "depth": 0}
 _TYPES = {
@@ -22,10 +22,10 @@ _TYPES = {
 class SettingParameters(Asking):
     """One round of calls to the parameter services of a node; each waits for the one before."""
 
-    def __init__(self, order: ParametersOrder, stage: Stage) -> None:
+    def __init__(self, order: ParametersOrder, context: StimulusContext) -> None:
         """Nothing is asked yet."""
         what = f"parameter services of {order.node}"
-        super().__init__(order, what, f"{order.node}/list_parameters", stage)
+        super().__init__(order, what, f"{order.node}/list_parameters", context)
         self._order = order
         self._steps: Iterator[Asked] | None = None
         self._asked: Asked | None = None
@@ -43,7 +43,7 @@ class SettingParameters(Asking):
         self._go_on(elapsed_s)
         if self._steps is None:
             there = all(
-                self._stage.asker.is_ready(f"{self._order.node}/{service}", interface)
+                self._context.asker.is_ready(f"{self._order.node}/{service}", interface)
                 for service, interface in _TYPES.items()
             )
             if not self._ready.met(there) or not self._is_turn:
@@ -61,9 +61,9 @@ class SettingParameters(Asking):
         """Note that nothing could be asked, unless it was not due yet."""
         service, type = f"{self._order.node}/list_parameters", _TYPES["list_parameters"]
         if self._ready.is_in_vain:
-            self._stage.asker.fail(service, type, _EVERY, NO_SERVER)
+            self._context.asker.fail(service, type, _EVERY, NO_SERVER)
         elif self._ready.never_answered and self._steps is None:
-            self._stage.asker.wait(service, type, _EVERY, self._ready.there_ns)
+            self._context.asker.wait(service, type, _EVERY, self._ready.there_ns)
 
     def _conversation(self) -> Iterator[Asked]:
         listed = self._ask("list_parameters", _EVERY)
@@ -90,7 +90,7 @@ class SettingParameters(Asking):
 
     def _ask(self, service: str, request: Mapping[str, Any]) -> Asked:
         name = f"{self._order.node}/{service}"
-        return self._stage.asker.ask(name, _TYPES[service], request)
+        return self._context.asker.ask(name, _TYPES[service], request)
 
 
 def _names(listed: Asked) -> list[str]:

@@ -25,7 +25,7 @@ from grader.submission.build import build_log as buildlog
 from grader.submission.build import standalone_build as apart
 from grader.submission.build.bounded import Outcome
 from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
-from grader.submission.build.build_error_location import Sources, find_culprit, last_started
+from grader.submission.build.build_error_location import Sources, find_build_error, last_started
 from grader.submission.build.build_key import build_key
 from grader.submission.build.build_limits import BuildLimits
 from grader.submission.build.colcon import COMPILE_S, STOPPED, Colcon
@@ -266,7 +266,7 @@ class _Workshop:
         succeeded = outcome.status == 0 and not failed and problem is None
         culprit = None
         if not succeeded:
-            culprit = find_culprit(log, failed, self.sources)
+            culprit = find_build_error(log, failed, self.sources)
             culprit = culprit or last_started(log, self.sources, problem)
         if problem is not None:
             log += f"\n[rosgrade: {problem}]\n"

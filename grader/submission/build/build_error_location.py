@@ -69,7 +69,7 @@ class Sources:
     manifest_errors: Mapping[str, SourceError] = field(default_factory=dict)
 
 
-def find_culprit(log: str, failed: Collection[str], sources: Sources) -> SourceError | None:
+def find_build_error(log: str, failed: Collection[str], sources: Sources) -> SourceError | None:
     """Find the first place in the student's own files that a cleaned log blames.
 
     Args:
@@ -99,7 +99,7 @@ def last_started(log: str, sources: Sources, problem: str | None) -> SourceError
     """Blame the build file of the package that was being built when the log ends.
 
     Args:
-        log: As for :func:`find_culprit`.
+        log: As for :func:`find_build_error`.
         sources: The submission.
         problem: Why the build ended, or None where only the log tells.
     """

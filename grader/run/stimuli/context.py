@@ -30,7 +30,7 @@ _SETTLED_NS = NS // 2
 
 
 @dataclass
-class Stage:
+class StimulusContext:
     """What a stimulus acts on.
 
     Attributes:

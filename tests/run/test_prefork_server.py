@@ -14,7 +14,7 @@ from grader import ros
 from grader.errors import GraderFault
 from grader.recording.mcap_reader import read_recording
 from grader.run.cell.cell_process import CellProcess
-from grader.run.cell.prefork_server import Nursery
+from grader.run.cell.prefork_server import PreforkServer
 from grader.run.process.descendants import descendants
 from grader.run.runner import Runner
 from grader.sandbox import bubblewrap
@@ -27,8 +27,8 @@ from tests.run.conftest import SUBMISSION, RunNode, assignment, install
 pytestmark = pytest.mark.ros
 
 
-def nurseries() -> set[int]:
-    """The nurseries among this process's children; their forks are their own children."""
+def prefork_servers() -> set[int]:
+    """The prefork servers among this process's children; their forks are their own children."""
     return {
         pid
         for pid, command in descendants(os.getpid()).items()
@@ -41,11 +41,11 @@ def test_a_run_whose_nursery_is_killed_is_a_fault_and_the_next_one_is_not(tmp_pa
     course = assignment(until={"messages": 3})
     scenario = course.scenarios[0]
     space = install(tmp_path, nodes.timed())
-    before = nurseries()
+    before = prefork_servers()
 
     def kill(_scenario: str, event: object) -> None:
         if isinstance(event, dict) and event["event"] == "launching":
-            (own,) = nurseries() - before
+            (own,) = prefork_servers() - before
             os.kill(own, signal.SIGKILL)
 
     with Runner(ros.find(), progress=kill) as runner:
@@ -62,7 +62,7 @@ def test_a_cell_that_hangs_keeps_nobody_waiting_for_the_end(boxed: bool, tmp_pat
     found = try_sandbox()
     if boxed and found.problem:
         pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
-    nursery = Nursery(ros.find(), Sandbox(tmp_path / "cache") if boxed else None)
+    nursery = PreforkServer(ros.find(), Sandbox(tmp_path / "cache") if boxed else None)
     cell = CellProcess(nursery)
     cell._forked._await_fork(timeout=None)
     usages = usage_of([nursery._popen.pid])
@@ -78,7 +78,7 @@ def test_a_cell_that_hangs_keeps_nobody_waiting_for_the_end(boxed: bool, tmp_pat
 
 @pytest.mark.slow
 def test_a_cell_that_hangs_does_not_outlive_long_whoever_could_kill_it() -> None:
-    nursery = Nursery(ros.find())
+    nursery = PreforkServer(ros.find())
     cell = CellProcess(nursery)
     cell._forked._await_fork(timeout=None)
     (hung,) = {usage.pid for usage in usage_of([nursery._popen.pid])} - {nursery._popen.pid}
@@ -96,7 +96,7 @@ def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(tmp_pat
     if found.problem:
         pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
     sandbox = Sandbox(tmp_path / "cache")
-    nursery = Nursery(ros.find(), sandbox)
+    nursery = PreforkServer(ros.find(), sandbox)
     check = sandbox.watched()
     check()
     assert nursery.is_alive
