@@ -209,6 +209,8 @@ def check_markdown(check: Check) -> str:
         parts.append("A check of what was handed in: it has no `scenarios`.")
     if check.parameters.model_fields:
         parts.append(_fields_table(check.parameters))
+    if check.parameters.needs:
+        parts.append(f"Needs {'; '.join(map(str, check.parameters.needs))}.")
     return "\n\n".join(parts)
 
 

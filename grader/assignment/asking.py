@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from grader.checks.node.node_name import node_name
-from grader.spec.name import InterfaceName, TopicName
+from grader.spec.name import InterfaceName, QualifiedNodeName, TopicName
 from grader.spec.quantity import Duration, DurationOrZero
 from grader.spec.source import Model
 
 MOST_CALLS = 1000
 
-QualifiedNode = Annotated[str, AfterValidator(node_name)]
 _After = Annotated[
     DurationOrZero,
     Field(
@@ -87,7 +85,7 @@ class CallService(Model):
 class ReadParameters(Model):
     """Read every parameter of a node: its descriptor and its value."""
 
-    read_parameters: QualifiedNode = Field(
+    read_parameters: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
     after: _After = 0.0
@@ -103,7 +101,7 @@ class SetParameters(Model):
     set_parameters: dict[str, Any] = Field(
         min_length=1, description="Name -> value; all are set in one call."
     )
-    node: QualifiedNode = Field(
+    node: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
     after: _After = 0.0

@@ -52,6 +52,10 @@ class Draft:
         """
         return [_name(entry, name) for entry in self.source.entries(key)]
 
+    def package(self, name: str) -> Package | None:
+        """The package of a name, if it could be read."""
+        return next((one for one in self.packages if one is not None and one.name == name), None)
+
     def scenarios_of(self, spec: CheckSpec) -> list[Scenario] | None:
         """The scenarios that a check judges, or None where one of them has a mistake."""
         wanted = [

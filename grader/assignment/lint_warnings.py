@@ -10,9 +10,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, Scenario, Visibility
 from grader.assignment.mutant import Mutant
 from grader.assignment.stimulus import Join, Publish
-from grader.checks.messages.messages import Count
-from grader.checks.motion.drive import Drives
-from grader.checks.timing.timing import Period
+from grader.checks.need import Recorded
 from grader.checks.tolerance import TimeTolerance
 from grader.checks.wording import percent
 from grader.spec.nearest_name import did_you_mean
@@ -63,13 +61,11 @@ def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
 def _short_runs(loaded: LoadedAssignment) -> Iterator[str]:
     """Runs that end before there can be as many messages as a check needs."""
     for bound in loaded.checks:
-        period_s = 0.0
-        if isinstance(bound.parameters, Period):
-            period_s, needed = bound.parameters.period, bound.parameters.at_least + 1
-        elif isinstance(bound.parameters, Count):
-            needed = bound.parameters.exactly or bound.parameters.at_least or 0
-        else:
+        number = next((n for n in bound.parameters.needs if isinstance(n, Recorded)), Recorded())
+        if number.at_least is None:
             continue
+        needed = getattr(bound.parameters, number.at_least)
+        period_s = getattr(bound.parameters, number.period) if number.period else 0.0
         for scenario in loaded.scenarios_of(bound):
             ends = ""
             if scenario.until.model_fields_set == {"messages"} and len(scenario.record) == 1:
@@ -94,7 +90,7 @@ def _tolerances(loaded: LoadedAssignment) -> Iterator[str]:
         for key in sorted(bound.parameters.model_fields_set):
             share = _share(bound.parameters, key)
             told = f"the check {bound.spec.id!r} has {key!r} {percent(share or 0.0)}"
-            if share == 0.0 and not isinstance(bound.parameters, Drives):
+            if share == 0.0:
                 yield f"{told}: what is measured is never exact, so right programs fail it"
             elif share is not None and share >= 1.0:
                 yield f"{told}: so wide that even next to 0 is near enough"

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from grader.assignment.asking_rules import asking_problems
 from grader.assignment.binding import BoundCheck
 from grader.assignment.draft import Draft
-from grader.assignment.model import Launch, Package, Scenario
-from grader.assignment.stimulus import Join, Publish
+from grader.assignment.model import Launch, Scenario
+from grader.assignment.needs import need_problems, no_executable, no_package
 from grader.assignment.withheld import SHOWN_FROM
 from grader.checks.check import Subject
 from grader.errors import Problem
 from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.unit import format_duration
-
-_MESSAGE_FAMILIES = ("messages", "timing", "callbacks", "rotation", "parameter")
-"""Families that judge received messages: what is not recorded looks like silence to them."""
 
 
 def problems(draft: Draft, bound: Sequence[BoundCheck | None]) -> Iterator[Problem]:
@@ -91,30 +87,15 @@ def _launch(draft: Draft, place: Place, launch: Launch) -> Iterator[Problem]:
         text = f"the key 'package' is missing: there is not exactly one package ({listed})"
         yield draft.source.problem(place, text)
         return
-    package = _package(draft, launch.package or names[0])
+    package = draft.package(launch.package or names[0])
     if launch.package is not None and launch.package not in names:
-        yield draft.source.problem((*place, "package"), _no_package(launch.package, names))
+        yield draft.source.problem((*place, "package"), no_package(launch.package, names))
     elif package is None or launch.executable is None:
         return
     elif launch.executable not in package.executables:
         yield draft.source.problem(
-            (*place, "executable"), _no_executable(launch.executable, package)
+            (*place, "executable"), no_executable(launch.executable, package)
         )
-
-
-def _package(draft: Draft, name: str) -> Package | None:
-    return next((one for one in draft.packages if one is not None and one.name == name), None)
-
-
-def _no_package(name: str, names: Sequence[str]) -> str:
-    listed = f" The packages are: {', '.join(names) or 'none'}."
-    return f"{name!r} is not among 'packages'." + (did_you_mean(name, names) or listed)
-
-
-def _no_executable(name: str, package: Package) -> str:
-    listed = f" It has: {', '.join(package.executables) or 'none'}."
-    advice = did_you_mean(name, package.executables) or listed
-    return f"the package {package.name!r} has no executable {name!r} in 'packages'.{advice}"
 
 
 def _requirements(draft: Draft) -> Iterator[Problem]:
@@ -210,11 +191,7 @@ def _check(draft: Draft, index: int, bound: BoundCheck) -> Iterator[Problem]:
                 listed = f" The scenarios are: {', '.join(known)}."
                 yield problem((*place, "scenarios", number), text + (advice or listed))
         yield from _unnamed(draft, place, bound)
-        yield from _robot(draft, place, bound)
-        yield from _topic(draft, place, bound)
-        yield from _stimulus(draft, place, bound)
-    yield from asking_problems(draft, place, bound)
-    yield from _package_of(draft, place, bound)
+    yield from need_problems(draft, place, bound)
 
 
 def _unnamed(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
@@ -241,71 +218,3 @@ def _program(launch: Launch) -> str:
     renamed = [*launch.remap.items(), ("__node", launch.name), ("__ns", launch.namespace)]
     rules = ", ".join(f"{old}:={new}" for old, new in renamed if new is not None)
     return f"'{launch.program}'" + (f" ({rules})" if rules else "")
-
-
-def _robot(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
-    """A check of the robot's motion needs a robot in each of its scenarios."""
-    if not bound.check.name.startswith("motion."):
-        return
-    for scenario in draft.scenarios_of(bound.spec) or ():
-        if scenario.world is None:
-            text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
-            yield draft.source.problem((*place, "uses"), text)
-
-
-def _topic(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
-    """A check of messages needs its topics recorded, by each of its scenarios, as their type."""
-    family = bound.check.name.partition(".")[0]
-    interface = getattr(bound.parameters, "type", None)
-    if family not in _MESSAGE_FAMILIES and interface is None:
-        return
-    if getattr(bound.parameters, "kind", None) == "subscription":
-        # What a student subscribes to is there to be sent by us, not to be recorded.
-        return
-    for key in ("topic", "source"):
-        topic = getattr(bound.parameters, key, None)
-        if not isinstance(topic, str):
-            continue
-        for scenario in draft.scenarios_of(bound.spec) or ():
-            recorded = scenario.recorded_types
-            if topic not in recorded:
-                advice = did_you_mean(topic, recorded)
-                listed = f" It records: {', '.join(recorded) or 'nothing'}."
-                text = f"the scenario {scenario.id!r} does not record {topic!r}."
-                yield draft.source.problem((*place, "with", key), text + (advice or listed))
-            elif key == "topic" and interface not in (None, recorded[topic]):
-                text = f"the scenario {scenario.id!r} records {topic!r} as {recorded[topic]!r}"
-                yield draft.source.problem((*place, "with", "type"), text)
-
-
-def _stimulus(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
-    """A check of what a stimulus does needs it in each of its scenarios."""
-    for key, kind, does in (("stimulus", Publish, "publish on"), ("joiner", Join, "have a join")):
-        wanted = getattr(bound.parameters, key, None)
-        if not isinstance(wanted, str):
-            continue
-        for scenario in draft.scenarios_of(bound.spec) or ():
-            names = [
-                one.publish if isinstance(one, Publish) else one.name
-                for one in scenario.stimuli
-                if isinstance(one, Publish | Join) and isinstance(one, kind)
-            ]
-            if wanted not in names:
-                advice = did_you_mean(wanted, names) or f" There are: {', '.join(names) or 'none'}."
-                text = f"the stimuli of the scenario {scenario.id!r} do not {does} {wanted!r}."
-                yield draft.source.problem((*place, "with", key), text + advice)
-
-
-def _package_of(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
-    """A check of a package must name one that is handed in."""
-    name = getattr(bound.parameters, "package", None)
-    if not isinstance(name, str):
-        return
-    names = [one for one in draft.names("packages", "name") if one is not None]
-    package = _package(draft, name)
-    executable = getattr(bound.parameters, "executable", None)
-    if name not in names:
-        yield draft.source.problem((*place, "with", "package"), _no_package(name, names))
-    elif package and isinstance(executable, str) and executable not in package.executables:
-        text = _no_executable(executable, package)
-        yield draft.source.problem((*place, "with", "executable"), text)

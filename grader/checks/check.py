@@ -6,9 +6,10 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, ClassVar
 
 from grader.checks.finding import Finding
+from grader.checks.need import Doubt, Need
 from grader.checks.value import EXACT, Tolerance
 from grader.spec.source import Model
 
@@ -43,6 +44,10 @@ class NamedFields:
 
 class Parameters(Model):
     """Base of every check's parameters (the ``with`` of the YAML)."""
+
+    needs: ClassVar[tuple[Need, ...]] = ()
+    doubt: ClassVar[Doubt | None] = None
+    """A failure in a run that was disturbed so must happen twice to count."""
 
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields that the check names, so that a misspelt one is found before any run."""

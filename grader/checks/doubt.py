@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 
 from grader.checks.motion.lateness import stolen_s
+from grader.checks.need import Doubt
 from grader.recording.model import NS, Recording
 
 # As long as a timer of 10 Hz makes a command wait anyway; tolerances are made for that.
@@ -13,22 +14,20 @@ _STALL_WINDOW_NS = NS // 2
 _HELD_UP_S = 0.1
 # What is announced is announced again and again.
 _LOST_S = 0.5
-_CONTROL = ("motion",)
-_ASKING = ("executor", "service", "action", "parameter", "lifecycle")
 
 
-def is_doubtful(family: str, recording: Recording) -> bool:
-    """Whether a failure may be an accident.
+def is_doubtful(recording: Recording, doubt: Doubt | None) -> bool:
+    """Whether the failure of a check may be an accident of its run.
 
     Args:
-        family: Of the check that failed: the first part of its name.
         recording: The run.
+        doubt: What makes the check's failure doubtful, beside a process that was killed.
     """
-    if _was_signalled(recording):
-        return True
-    if family in _CONTROL:
-        return _was_out_of_hand(recording)
-    return family in _ASKING and _did_not_meet(recording)
+    return _was_signalled(recording) or (
+        _was_out_of_hand(recording)
+        if doubt is Doubt.STEERING_HELD_UP
+        else doubt is Doubt.ANSWER_MISSED and _did_not_meet(recording)
+    )
 
 
 def _was_signalled(recording: Recording) -> bool:

@@ -184,6 +184,11 @@ def same(wanted: Any, observed: Any, tolerance: float) -> bool:
     return observed == _as_float32(wanted)
 
 
+def same_value(wanted: Any, observed: Any) -> bool:
+    """Whether two values of parameters are the same: ``true`` is not 1."""
+    return isinstance(wanted, bool) == isinstance(observed, bool) and same(wanted, observed, EXACT)
+
+
 def _as_float32(number: float) -> float:
     if abs(number) > FLOAT32_MAX:
         return number

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 from pydantic import Field
 
-from grader.assignment.model import TopicName
 from grader.checks.callbacks.callback_run import Reports, spans
 from grader.checks.check import Parameters
 from grader.checks.finding import Evidence, Moment
+from grader.checks.need import Need, Recorded
 from grader.checks.wording import code, codes, counted, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording
+from grader.spec.name import TopicName
 from grader.spec.nearest_name import nearest
 from grader.spec.unit import format_duration
 
@@ -27,6 +29,8 @@ SECONDS_HINT = "time.sleep and create_timer take seconds: 0.4 is 400 ms."
 
 class Reported(Parameters):
     """Parameters of every check of reported callbacks."""
+
+    needs: ClassVar[tuple[Need, ...]] = (Recorded(),)
 
     topic: TopicName = Field(
         description="Topic of std_msgs/msg/String on which callbacks report `<callback> start` "

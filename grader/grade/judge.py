@@ -197,7 +197,7 @@ def _judge(
             not misuse
             and finding.status is Status.FAILED
             and isinstance(subject, Recording)
-            and is_doubtful(bound.check.family, subject)
+            and is_doubtful(subject, bound.parameters.doubt)
         ):
             finding = replace(finding, disturbed=True)
     except Exception as error:

@@ -70,6 +70,18 @@ def node_name(name: str) -> str:
     return name
 
 
+def qualified_node_name(name: str) -> str:
+    """A node name with its namespace: ``bot`` is ``/bot``.
+
+    Raises:
+        ValueError: It is not the name of a node.
+    """
+    full = name if name.startswith("/") else f"/{name}"
+    if not re.fullmatch(rf"(/{NODE})+", full):
+        raise ValueError(f"{name!r} is not a node name: letters, digits, '_' and '/'")
+    return full
+
+
 def namespace(name: str) -> str:
     """A namespace, which begins with a slash; ``/`` is the root.
 
@@ -116,6 +128,7 @@ def _form(pattern: str, words: str) -> WithJsonSchema:
 Id = Annotated[str, AfterValidator(check_id), _form(ID, "id, such as `period_2`")]
 PackageName = Annotated[str, AfterValidator(package_name), _form(ID, "package name")]
 NodeName = Annotated[str, AfterValidator(node_name), _form(NODE, "node name")]
+QualifiedNodeName = Annotated[str, AfterValidator(qualified_node_name)]
 Namespace = Annotated[
     str, AfterValidator(namespace), _form(rf"(/|{TOPIC})", "namespace, such as `/robot`")
 ]

@@ -11,6 +11,7 @@ import pytest
 from grader.assignment.model import InterfaceName, TopicName
 from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.checks.finding import Finding
+from grader.checks.need import Recorded, Submitted
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.spec.quantity import Duration
@@ -18,10 +19,14 @@ from tests.assignment.lessons import GOOD
 
 
 class _Package(Parameters):
+    needs = (Submitted(),)
+
     package: str
 
 
 class _Executable(Parameters):
+    needs = (Submitted(executable="executable"),)
+
     package: str
     executable: str
 
@@ -30,13 +35,21 @@ class _Topic(Parameters):
     topic: TopicName
 
 
+class _Messages(_Topic):
+    needs = (Recorded(),)
+
+
 class _Type(Parameters):
+    needs = (Recorded(type="type", kind="kind"),)
+
     topic: TopicName
     type: InterfaceName
     kind: Literal["publisher", "subscription"] = "publisher"
 
 
 class _Period(Parameters):
+    needs = (Recorded(),)
+
     topic: TopicName
     period: Duration
 
@@ -56,7 +69,7 @@ _SMALL = (
     _check("node.alive", Subject.RECORDING),
     _check("topic.published", Subject.RECORDING, _Topic),
     _check("topic.type", Subject.RECORDING, _Type),
-    _check("messages.count", Subject.RECORDING, _Topic),
+    _check("messages.count", Subject.RECORDING, _Messages),
     _check("timing.period", Subject.RECORDING, _Period),
 )
 

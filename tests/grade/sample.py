@@ -10,7 +10,7 @@ from typing import Any
 from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, CheckSpec, Launch, Package, Scenario
-from grader.checks.check import Check, NoParameters, Subject
+from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.checks.finding import Finding
 from grader.recording.model import NS, Ending, Process, Recording
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
@@ -39,6 +39,7 @@ class Told:
     hint: str = ""
     visibility: str = "visible"
     uses: str = "told.told"
+    parameters: Parameters = field(default_factory=NoParameters)
     asked: list[Any] = field(default_factory=list, compare=False)
 
     def bound(self) -> BoundCheck:
@@ -54,11 +55,10 @@ class Told:
                 "visibility": self.visibility,
             }
         )
-        return BoundCheck(
-            spec, Check(self.uses, self.subject, NoParameters, self._judge), NoParameters()
-        )
+        check = Check(self.uses, self.subject, NoParameters, self._judge)
+        return BoundCheck(spec, check, self.parameters)
 
-    def _judge(self, subject: Any, parameters: NoParameters) -> Any:
+    def _judge(self, subject: Any, parameters: Parameters) -> Any:
         self.asked.append(subject)
         says = self.says[subject.scenario] if isinstance(self.says, dict) else self.says
         if isinstance(says, Exception):

@@ -5,8 +5,9 @@ from dataclasses import replace
 import pytest
 
 from grader.assignment.model import Launch
-from grader.checks.check import Subject
+from grader.checks.check import NoParameters, Subject
 from grader.checks.finding import Evidence, Finding, Moment, Status
+from grader.checks.motion.robot_check import RobotParameters
 from grader.errors import GraderFault
 from grader.grade import grade
 from grader.recording.model import NS, Disturbance, Ending, Truth
@@ -276,25 +277,29 @@ class TestOurFaults:
             Told("node", {"a": PASS, "b": Finding.error("", "broken"), "c": disturbed}),
             scenarios=("a", "b", "c"),
         )
-        assert result.disturbed_scenarios(Status.ERROR) == ("a", "c")
+        (("parameters", "waited_s", "every_s", "again"),)
         assert result.disturbed_scenarios(Status.FAILED) == ()
 
     @pytest.mark.parametrize(
-        ("uses", "waited_s", "every_s", "again"),
+        ("judged", "waited_s", "every_s", "again"),
         [
-            pytest.param("motion.reaches", 0.3, 9.0, True, id="held up once for long"),
-            pytest.param("motion.reaches", 0.01, 0.2, False, id="many short waits"),
-            pytest.param("motion.reaches", 0.0, 9.0, False, id="left alone"),
-            pytest.param("node.exists", 0.3, 9.0, False, id="not about a control loop"),
+            pytest.param(RobotParameters(), 0.3, 9.0, True, id="held up once for long"),
+            pytest.param(RobotParameters(), 0.01, 0.2, False, id="many short waits"),
+            pytest.param(RobotParameters(), 0.0, 9.0, False, id="left alone"),
+            pytest.param(NoParameters(), 0.3, 9.0, False, id="not about a control loop"),
         ],
     )
-    def test_where_a_held_up_robot_went_is_worth_a_second_run(self, uses, waited_s, every_s, again):
+    def test_where_a_held_up_robot_went_is_worth_a_second_run(
+        self, parameters, waited_s, every_s, again
+    ):
         waits = [
             Disturbance(LAUNCHED_NS + round(k * every_s * NS), 0, round(waited_s * NS))
             for k in range(1, round(20 / every_s))
         ]
         run = make_recording("a", truth=drive(20), disturbance=tuple(waits))
-        result = judge(Told("goal", FAIL, uses=uses), scenarios=("a",), recordings={"a": run})
+        result = judge(
+            Told("goal", FAIL, parameters=parameters), scenarios=("a",), recordings={"a": run}
+        )
         assert result.result("goal").status is Status.FAILED
         assert result.disturbed_scenarios(Status.FAILED) == (("a",) if again else ())
 

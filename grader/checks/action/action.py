@@ -7,7 +7,6 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from grader.assignment.model import InterfaceName, TopicName
 from grader.checks.action.goals import (
     evidence,
     judged_goals,
@@ -25,6 +24,7 @@ from grader.checks.fields import (
 )
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Plot
+from grader.checks.need import Doubt, GoalSent
 from grader.checks.value import EXACT, NoSuchField
 from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
@@ -32,12 +32,15 @@ from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_server import ACTION, is_offered
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
+from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration, Frequency, Ratio
 from grader.spec.unit import format_duration
 
 
 class Exists(Parameters):
     """Parameters of action.exists."""
+
+    doubt = Doubt.ANSWER_MISSED
 
     action: TopicName = Field(description="Fully qualified action name.")
     type: InterfaceName | None = Field(
@@ -59,6 +62,9 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
 
 class OfGoals(Parameters):
     """Part of the parameters of every check of goals."""
+
+    needs = (GoalSent(),)
+    doubt = Doubt.ANSWER_MISSED
 
     action: TopicName = Field(description="Action that a `send_goal` of the scenario sends to.")
     goal: dict[str, Any] = Field(
@@ -239,6 +245,8 @@ def _other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf, rate_h
 
 class Result(OfGoals):
     """Parameters of action.result."""
+
+    needs = (GoalSent(within="within"),)
 
     result: dict[str, Any] = Field(
         default_factory=dict,

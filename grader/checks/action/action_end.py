@@ -14,6 +14,7 @@ from grader.checks.action.goals import (
 from grader.checks.check import Subject, check
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Finding
+from grader.checks.need import GoalSent
 from grader.checks.value import NoSuchField
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_one_cpu, why_raised, why_taken, why_unanswered
@@ -33,6 +34,8 @@ _TWO_THREADS = (
 
 class Cancels(OfGoals):
     """Parameters of action.cancels."""
+
+    needs = (GoalSent(having="cancel_after"),)
 
     within: Duration = Field(
         1.0,
@@ -181,6 +184,8 @@ def _why_other_end(recording: Recording, goal: Goal, within_s: float) -> Cause:
 
 class Preempts(OfGoals):
     """Parameters of action.preempts."""
+
+    needs = (GoalSent(having="preempt"),)
 
     within: Duration = Field(
         1.0,

@@ -9,11 +9,11 @@ from statistics import median
 
 from pydantic import Field, model_validator
 
-from grader.assignment.model import TopicName
 from grader.checks import declarations
 from grader.checks.callbacks.callback_run import Reports, read_reports, spans
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding
+from grader.checks.need import Published, Recorded
 from grader.checks.timing.period import Interval, Limits, forgiven, judge
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, codes, counted, listing
@@ -22,6 +22,7 @@ from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.missing_reports import SECONDS_HINT, Reported, why_reports_are_missing
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording
+from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
@@ -37,6 +38,8 @@ _GAINED = 0.25
 
 class Runs(Reported):
     """Parameters of callbacks.run."""
+
+    needs = (Recorded(), Published())
 
     period: Duration | None = Field(
         None, description="Expected time between two starts of each callback."

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from statistics import median
-from typing import Annotated
 
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import Field, field_validator
 
 from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.first_seen import nodes_seen
-from grader.checks.node.node_name import node_name
+from grader.checks.need import Doubt
 from grader.checks.node.target_nodes import target_nodes
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
@@ -23,6 +22,7 @@ from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it
 from grader.diagnosis.process.raised import interrupted_place
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Process, Recording
+from grader.spec.name import QualifiedNodeName
 from grader.spec.quantity import Duration, Ratio
 from grader.spec.unit import format_duration
 
@@ -37,6 +37,8 @@ _MOST_HELD_NS = 3 * NS
 class Responsive(Parameters):
     """Parameters of executor.responsive."""
 
+    doubt = Doubt.ANSWER_MISSED
+
     within: Duration = Field(1.0, description="How long an answer may take, by default 1 s.")
     share: Ratio = Field(
         0.9,
@@ -47,7 +49,7 @@ class Responsive(Parameters):
         None,
         description="How long the median of the answers may take; by default it does not matter.",
     )
-    node: Annotated[str, AfterValidator(node_name)] | None = Field(
+    node: QualifiedNodeName | None = Field(
         None,
         description="Name of the node; by default every node of the student that has an endpoint "
         "on a recorded topic, or every node if none has.",

@@ -8,6 +8,7 @@ from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
+from grader.checks.need import Doubt
 from grader.checks.wording import code, counted
 from grader.diagnosis.no_messages import why_silent
 from grader.recording.model import Recording
@@ -26,6 +27,8 @@ _HINT = (
 
 class Timer(Parameters):
     """Parameters of executor.timer."""
+
+    doubt = Doubt.ANSWER_MISSED
 
     topic: TopicName = Field(description="Topic on which the callback of a timer publishes.")
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.first_seen import nodes_seen
-from grader.checks.node.node_name import node_name
+from grader.checks.need import Called, Doubt
 from grader.checks.service.service import judged_calls, why_late
 from grader.checks.wording import code, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_not_node
 from grader.recording.model import Call, Recording
+from grader.spec.name import QualifiedNodeName
 
 _ANSWER_S = 1.0
 
@@ -22,7 +23,10 @@ _ANSWER_S = 1.0
 class State(Parameters):
     """Parameters of lifecycle.state."""
 
-    node: Annotated[str, AfterValidator(node_name)] = Field(
+    needs = (Called("node", suffix="/get_state", count="states"),)
+    doubt = Doubt.ANSWER_MISSED
+
+    node: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
     states: tuple[str, ...] = Field(

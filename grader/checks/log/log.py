@@ -8,7 +8,6 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.assignment.model import TopicName
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
@@ -21,6 +20,7 @@ from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.process.blocked_executor import why_slow
 from grader.recording.model import NS, Kind, Message, Recording
+from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 

@@ -13,6 +13,7 @@ from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.checks.first_seen import endpoints_seen
 from grader.checks.messages.derived_messages import MadeOf, Sample
 from grader.checks.messages.source_value import SourceText, SourceValue, mistakes, spread
+from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.no_messages import why_few, why_silent
@@ -34,6 +35,8 @@ _ALWAYS_THE_SAME = "always the same"
 
 class Follows(Parameters):
     """Parameters of messages.follows."""
+
+    needs = (Recorded(), Recorded("source"))
 
     topic: TopicName = Field(description="Topic of the messages that are judged.")
     source: TopicName = Field(description="Recorded topic that their values come from.")

@@ -7,10 +7,10 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from grader.assignment.model import TopicName
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.fields import FieldTolerance, toleranced
 from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.need import Published, Recorded
 from grader.checks.value import (
     EXACT,
     Difference,
@@ -26,6 +26,7 @@ from grader.diagnosis import common_mistakes
 from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.no_messages import why_few, why_silent, why_unreadable
 from grader.recording.model import Kind, Message, Recording
+from grader.spec.name import TopicName
 
 _MOST_FIELDS = 8
 _ANSWER_HINT = (
@@ -38,6 +39,8 @@ _SEQUENCE_LIMIT = 2**62
 
 class Count(Parameters):
     """Parameters of messages.count."""
+
+    needs = (Recorded(at_least="needed"), Published())
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     exactly: int | None = Field(None, ge=0, description="So many messages, no more, no fewer.")
@@ -59,6 +62,11 @@ class Count(Parameters):
         if high is not None and low > high:
             raise ValueError(f"at_least ({low}) is more than at_most ({high})")
         return self
+
+    @property
+    def needed(self) -> int:
+        """How many messages must come for it to pass."""
+        return self.bounds[0]
 
     @property
     def bounds(self) -> tuple[int, int | None]:
@@ -149,6 +157,8 @@ def _many_hint(high: int) -> str:
 
 class Equal(Parameters):
     """Parameters of messages.equal."""
+
+    needs = (Recorded(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     value: dict[str, Any] = Field(

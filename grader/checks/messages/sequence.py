@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField, same
 from grader.checks.wording import code, counted, value_text
 from grader.diagnosis.no_messages import why_few, why_silent
@@ -23,6 +24,8 @@ _SHOWN = 12
 
 class Series(Parameters):
     """Parameters of messages.sequence."""
+
+    needs = (Recorded(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     field: FieldPath = Field(description="The field that changes, such as `data`.")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.motion.command import commands, is_zero, scans
 from grader.checks.motion.measure import metres, speed, turn
+from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.motion.scan import newest
 from grader.checks.motion.track import has_moved, is_at_rest, speed_plot, way_m
 from grader.checks.wording import code, counted
@@ -62,7 +63,7 @@ _BLIND_NS = NS
 _RESTED_NS = NS // 5
 
 
-class NoContact(Parameters):
+class NoContact(RobotParameters):
     """Parameters of motion.no_contact."""
 
     moving: bool = Field(

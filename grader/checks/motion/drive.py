@@ -8,13 +8,14 @@ from statistics import median
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.contact import why_touched
 from grader.checks.motion.ground import ahead, nearest
 from grader.checks.motion.lateness import stolen_s
 from grader.checks.motion.measure import metres, speed
+from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.motion.scan import misreading
 from grader.checks.motion.track import (
     MOVED_M,
@@ -47,7 +48,7 @@ _IN_BETWEEN_HINT = (
 _BACKWARDS_HINT = "Forward is a positive linear.x (REP-103)."
 
 
-class Drives(Parameters):
+class Drives(RobotParameters):
     """Parameters of motion.drives."""
 
     speed: Speed = Field(description="Expected speed ahead.")
@@ -182,7 +183,7 @@ def _wrong_speed(
     return words, _SPEED_HINT
 
 
-class KeepsDriving(Parameters):
+class KeepsDriving(RobotParameters):
     """Parameters of motion.keeps_driving."""
 
     distance: PositiveLength = Field(

@@ -7,13 +7,14 @@ from itertools import pairwise
 
 from pydantic import Field, model_validator
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.approach import Approach, approach
 from grader.checks.motion.contact import why_touched
 from grader.checks.motion.lateness import stolen_s
 from grader.checks.motion.measure import degrees, metres, point, speed, turn
+from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.checks.reference import GoalPose
 from grader.checks.wording import percent
@@ -30,7 +31,7 @@ _ASTRAY_RAD = math.radians(45.0)
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 
 
-class Reaches(Parameters):
+class Reaches(RobotParameters):
     """Parameters of motion.reaches."""
 
     goal: GoalPose = Field(description=_GOAL)
@@ -92,7 +93,7 @@ def _restless(run: Approach) -> Cause:
     )
 
 
-class Settles(Parameters):
+class Settles(RobotParameters):
     """Parameters of motion.settles."""
 
     within: Duration = Field(
@@ -155,7 +156,7 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     )
 
 
-class PathLength(Parameters):
+class PathLength(RobotParameters):
     """Parameters of motion.path_length."""
 
     goal: GoalPose = Field(description=_GOAL)
@@ -240,7 +241,7 @@ def _longer(ratio: float) -> str:
     return f"{percent(round(ratio - 1.0, 3))} longer" if ratio >= 1.0 else "no longer"
 
 
-class Overshoot(Parameters):
+class Overshoot(RobotParameters):
     """Parameters of motion.overshoot."""
 
     goal: GoalPose = Field(description=_GOAL)

@@ -6,10 +6,11 @@ import math
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.motion.command import Command, command_topic, commands
 from grader.checks.motion.measure import speed, turn
+from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_judged, why_rejected
@@ -22,7 +23,7 @@ _ROUNDING = 1.001
 _MOST_POINTS = 400
 
 
-class WithinLimits(Parameters):
+class WithinLimits(RobotParameters):
     """Parameters of motion.within_limits."""
 
     share: Ratio = Field(0.0, description="Share of the commands that may be beyond a limit.")

@@ -10,13 +10,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.motion.answer import MOST_BEHIND, answers
 from grader.checks.motion.approach import Approach, approach
 from grader.checks.motion.command import command_topic, commands
 from grader.checks.motion.control_law import Law, Sample, Verdict, examine
 from grader.checks.motion.measure import metres
+from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.motion.steering import LEAST_SAMPLES, at_the_goal, on_the_way
 from grader.checks.reference import GoalPose
 from grader.checks.wording import counted, percent
@@ -38,7 +39,7 @@ _WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
 _FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
 
 
-class Proportional(Parameters):
+class Proportional(RobotParameters):
     """Parameters of motion.proportional."""
 
     goal: GoalPose = Field(description=_GOAL)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.command import commands, scans
@@ -15,6 +15,7 @@ from grader.checks.motion.contact import why_touched
 from grader.checks.motion.ground import Sight, ahead, edge_m, nearest
 from grader.checks.motion.lateness import stolen_s
 from grader.checks.motion.measure import metres, speed
+from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.motion.scan import misreading
 from grader.checks.motion.track import REST_M_S, first_rest, over_time, speed_plot, way_m
 from grader.checks.wording import code, counted
@@ -40,7 +41,7 @@ _OTHER_LIMIT_HINT = (
 _ANSWERED = 3
 
 
-class Stops(Parameters):
+class Stops(RobotParameters):
     """Parameters of motion.stops."""
 
     distance: PositiveLength = Field(
@@ -205,7 +206,7 @@ def _distance_plot(recording: Recording, scene: Scene, band: tuple[float, float]
     )
 
 
-class StaysAtRest(Parameters):
+class StaysAtRest(RobotParameters):
     """Parameters of motion.stays_at_rest."""
 
     after: Literal["start", "stop"] = Field(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.motion.measure import degrees, turn
+from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.motion.track import headings, over_time
 from grader.checks.wording import percent
 from grader.diagnosis.motion.no_motion import why_not_moved
@@ -14,7 +15,7 @@ from grader.recording.model import Recording
 from grader.spec.quantity import Angle, AngularSpeed
 
 
-class Straight(Parameters):
+class Straight(RobotParameters):
     """Parameters of motion.straight."""
 
     tolerance: AngularSpeed = Field(

@@ -8,11 +8,12 @@ from itertools import pairwise
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.motion.approach import Approach, approach
 from grader.checks.motion.detour import WRAP_HINT, Detour, away
 from grader.checks.motion.measure import degrees, metres, speed
+from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.motion.track import speed_plot
 from grader.checks.reference import GoalPose
 from grader.checks.wording import counted
@@ -32,7 +33,7 @@ _STRAIGHT_RAD_S = 0.01
 _PAUSE_NS = NS // 5
 
 
-class TwoPhases(Parameters):
+class TwoPhases(RobotParameters):
     """Parameters of motion.two_phases."""
 
     goal: GoalPose = Field(description=_GOAL)
@@ -118,7 +119,7 @@ def _way_m(before: Truth, after: Truth) -> float:
     return math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
 
 
-class ShortWay(Parameters):
+class ShortWay(RobotParameters):
     """Parameters of motion.short_way."""
 
     goal: GoalPose = Field(description=_GOAL)

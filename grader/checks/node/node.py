@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pydantic import Field
 
-from pydantic import AfterValidator, Field
-
-from grader.assignment.model import TopicName
 from grader.checks import declarations
 from grader.checks.check import NoParameters, Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import endpoints_seen
-from grader.checks.node.node_name import node_name
 from grader.checks.node.target_nodes import target_nodes
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.cause import Cause
@@ -24,10 +20,9 @@ from grader.diagnosis.process.process_exit import (
     why_it_exited,
 )
 from grader.recording.model import NS, Kind, Node, Process, Recording
+from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
-
-NodeName = Annotated[str, AfterValidator(node_name)]
 
 
 @check("node.starts", Subject.RECORDING)
@@ -56,7 +51,7 @@ def starts(recording: Recording, parameters: NoParameters) -> Finding:
 class Exists(Parameters):
     """Parameters of node.exists."""
 
-    name: NodeName = Field(
+    name: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
     publishes: TopicName | None = Field(
@@ -107,7 +102,7 @@ def _other_publisher(recording: Recording, parameters: Exists) -> Cause | None:
 class Alive(Parameters):
     """Parameters of node.alive."""
 
-    name: NodeName | None = Field(
+    name: QualifiedNodeName | None = Field(
         None, description="Name of the node; by default everything that was launched."
     )
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.assignment.model import PackageName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Table
+from grader.checks.need import Submitted
 from grader.checks.wording import code, codes
 from grader.diagnosis.not_built import existing_package, why_no_manifest, why_too_new
+from grader.spec.name import PackageName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant
 from grader.submission.record import (
@@ -33,6 +34,8 @@ _IDLE = {
 
 class Dependencies(Parameters):
     """Parameters of package.dependencies."""
+
+    needs = (Submitted(),)
 
     package: PackageName = Field(description="Name in package.xml.")
 

@@ -8,18 +8,21 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.assignment.model import PackageName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
+from grader.checks.need import Submitted
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_manifest, why_not_built
+from grader.spec.name import PackageName
 from grader.spec.nearest_name import nearest
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 
 
 class Found(Parameters):
     """Parameters of package.found."""
+
+    needs = (Submitted(),)
 
     package: PackageName = Field(description="Name in package.xml.")
     build_type: Literal["ament_python", "ament_cmake"] | None = Field(
@@ -58,6 +61,8 @@ def found(submission: SubmissionRecord, parameters: Found) -> Finding:
 
 class Builds(Parameters):
     """Parameters of package.builds."""
+
+    needs = (Submitted(),)
 
     package: PackageName = Field(description="Name in package.xml.")
 
@@ -118,6 +123,8 @@ _FILE = re.compile(r"[\w.-]+(/[\w.-]+)+")
 
 class Executable(Parameters):
     """Parameters of package.executable."""
+
+    needs = (Submitted(executable="executable"),)
 
     package: PackageName = Field(description="Name in package.xml.")
     executable: str = Field(min_length=1, description="Name that `ros2 run` is given.")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
-from grader.checks.node.node_name import node_name
+from grader.checks.need import Doubt, ParameterSet, ParametersRead
 from grader.checks.parameter.parameter_calls import (
     Descriptor,
     Range,
@@ -20,7 +20,7 @@ from grader.checks.parameter.parameter_calls import (
     readings,
     settings,
 )
-from grader.checks.value import same
+from grader.checks.value import same, same_value
 from grader.checks.wording import code, codes, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
@@ -29,6 +29,7 @@ from grader.diagnosis.no_node import why_not_node
 from grader.diagnosis.no_server import SERVICE, offered
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Call, Recording
+from grader.spec.name import QualifiedNodeName
 from grader.spec.nearest_name import nearest
 from grader.spec.unit import format_duration
 
@@ -44,7 +45,9 @@ Type = Literal[
 class OfParameter(Parameters):
     """Part of the parameters of every check of parameters."""
 
-    node: Annotated[str, AfterValidator(node_name)] = Field(
+    doubt = Doubt.ANSWER_MISSED
+
+    node: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
     )
     name: str = Field(min_length=1, description="Name of the parameter.")
@@ -52,6 +55,8 @@ class OfParameter(Parameters):
 
 class Declared(OfParameter):
     """Parameters of parameter.declared."""
+
+    needs = (ParametersRead(),)
 
     type: Type | None = Field(None, description="Its type; by default any.")
     default: Any = Field(
@@ -279,13 +284,6 @@ def _why_other_default(
     )
 
 
-def same_value(wanted: Any, observed: Any) -> bool:
-    """Whether two values of parameters are the same; a truth is no number."""
-    if isinstance(wanted, bool) != isinstance(observed, bool):
-        return False
-    return same(wanted, observed, _TOLERANCE)
-
-
 def _evidence(
     recording: Recording, node: str, found: Descriptor, values: tuple[Reading, ...]
 ) -> Evidence:
@@ -321,6 +319,8 @@ def _answered(recording: Recording, calls: tuple[Call, ...]) -> tuple[Moment, ..
 
 class Set(OfParameter):
     """Parameters of parameter.set."""
+
+    needs = (ParameterSet(),)
 
     value: Any = Field(description="What a `set_parameters` of the scenario sets it to.")
     accepted: bool = Field(True, description="Whether the node must accept it, or refuse it.")

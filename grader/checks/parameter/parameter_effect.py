@@ -9,7 +9,6 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from grader.assignment.model import TopicName
 from grader.checks.check import NamedFields, Subject, check
 from grader.checks.fields import (
     FieldTolerance,
@@ -20,21 +19,22 @@ from grader.checks.fields import (
 )
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.need import ParameterSet, Recorded
 from grader.checks.parameter.parameter import (
     OfParameter,
-    same_value,
     why_not_asked,
     why_not_declared,
     why_services_silent,
 )
 from grader.checks.parameter.parameter_calls import Setting, settings
-from grader.checks.value import EXACT, Difference, NoSuchField
+from grader.checks.value import EXACT, Difference, NoSuchField, same_value
 from grader.checks.wording import code, counted, percent, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Message, Recording
+from grader.spec.name import TopicName
 from grader.spec.quantity import Duration, Ratio
 from grader.spec.unit import format_duration
 
@@ -43,6 +43,8 @@ _LEAST_PERIODS = 3
 
 class TakesEffect(OfParameter):
     """Parameters of parameter.takes_effect."""
+
+    needs = (ParameterSet(), Recorded())
 
     value: Any = Field(description="What a `set_parameters` of the scenario sets it to.")
     topic: TopicName = Field(description="Recorded topic on which the effect shows.")

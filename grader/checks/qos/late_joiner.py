@@ -11,6 +11,7 @@ from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.messages.messages import published
+from grader.checks.need import Joined
 from grader.checks.qos.compatibility import compatibility_table, refusals
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
@@ -29,6 +30,8 @@ _ONE_PUBLISHER_HINT = (
 
 class LateJoiner(Parameters):
     """Parameters of qos.late_joiner."""
+
+    needs = (Joined(),)
 
     topic: TopicName = Field(
         description="Fully qualified topic name. Where the scenario does not record it, the late "

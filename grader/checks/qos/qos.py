@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from grader.assignment.model import Durability, Reliability, TopicName
 from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
@@ -18,6 +17,7 @@ from grader.checks.qos.compatibility import Comparison, comparisons, duration_wo
 from grader.checks.wording import code, counted
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.recording.model import NS, Kind, Qos, Recording
+from grader.spec.name import Durability, Reliability, TopicName
 from grader.spec.quantity import Duration
 
 # Messages that tell whether a queue was always full.

@@ -10,6 +10,7 @@ from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import endpoints_seen
+from grader.checks.need import Joined
 from grader.checks.qos.compatibility import comparisons, compatibility_table, refusals
 from grader.checks.wording import code
 from grader.diagnosis.destroyed_endpoint import why_unpublished
@@ -23,6 +24,8 @@ _DEFAULT = Qos(reliability="reliable", durability="volatile", liveliness="automa
 
 class Compatible(Parameters):
     """Parameters of qos.compatible."""
+
+    needs = (Joined(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     kind: Literal["publisher", "subscription"] = Field(

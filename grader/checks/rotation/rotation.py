@@ -10,11 +10,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from grader.assignment.model import TopicName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
 from grader.checks.messages.messages import published
+from grader.checks.need import Published, Recorded
 from grader.checks.rotation.conversion import (
     CONVERSIONS,
     Group,
@@ -34,6 +34,7 @@ from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording
+from grader.spec.name import TopicName
 from grader.spec.quantity import QuantityOf
 from grader.spec.unit import Dimension
 
@@ -59,6 +60,8 @@ Tolerance = Annotated[float, QuantityOf(Dimension.ANGLE, minimum=0.0, exclusive=
 
 class Answers(Parameters):
     """Parameters of rotation.answers."""
+
+    needs = (Recorded(), Published())
 
     stimulus: TopicName = Field(description="Topic on which the probe sends what to convert.")
     topic: TopicName = Field(description="Topic on which the node answers.")

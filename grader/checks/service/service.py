@@ -8,7 +8,6 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from grader.assignment.model import InterfaceName, TopicName
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.fields import (
     FieldTolerance,
@@ -22,6 +21,7 @@ from grader.checks.fields import (
 )
 from grader.checks.fields import words as fields_words
 from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.need import Called, Doubt
 from grader.checks.value import EXACT, NoSuchField
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
@@ -29,6 +29,7 @@ from grader.diagnosis.no_answer import why_one_cpu, why_taken, why_unanswered
 from grader.diagnosis.no_server import SERVICE, is_offered, why_not_met, why_not_offered
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Call, Recording
+from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
@@ -39,6 +40,8 @@ _TOGETHER, _APART = 0.5, 0.75
 
 class Exists(Parameters):
     """Parameters of service.exists."""
+
+    doubt = Doubt.ANSWER_MISSED
 
     service: TopicName = Field(description="Fully qualified service name.")
     type: InterfaceName | None = Field(
@@ -60,6 +63,9 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
 
 class Responds(Parameters):
     """Parameters of service.responds."""
+
+    needs = (Called(request="request", within="within"),)
+    doubt = Doubt.ANSWER_MISSED
 
     service: TopicName = Field(description="Service that a `call` of the scenario calls.")
     request: dict[str, Any] = Field(
@@ -264,6 +270,9 @@ def _evidence(recording: Recording, calls: tuple[Call, ...]) -> Evidence:
 
 class Concurrent(Parameters):
     """Parameters of service.concurrent."""
+
+    needs = (Called(at_once=2),)
+    doubt = Doubt.ANSWER_MISSED
 
     service: TopicName = Field(
         description="Service that a `call` of the scenario calls with `at_once: 2`."

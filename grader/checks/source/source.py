@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, field_validator
 
-from grader.assignment.model import PackageName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
+from grader.checks.need import Need, RuffRules, Submitted
 from grader.checks.source.inheritance import NODE, Family, Found, Kinship
 from grader.checks.wording import code, codes, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
+from grader.spec.name import PackageName
 from grader.spec.nearest_name import nearest
 from grader.spec.quantity import Ratio
 from grader.submission.read.code_facts import LintFinding, SourceFile, SourceFunction
@@ -32,6 +33,8 @@ _RULE = re.compile(r"[A-Z]+[0-9]*")
 
 class Source(Parameters):
     """Parameters of source.no_print, and part of those of the other checks of the source."""
+
+    needs: ClassVar[tuple[Need, ...]] = (Submitted(),)
 
     package: PackageName = Field(description="Name in package.xml.")
 
@@ -353,6 +356,8 @@ def _rule(text: str) -> str:
 
 class Ruff(Source):
     """Parameters of source.ruff."""
+
+    needs = (Submitted(), RuffRules())
 
     rules: tuple[Annotated[str, AfterValidator(_rule)], ...] = Field(
         min_length=1,

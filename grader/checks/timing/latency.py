@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.need import Published, Recorded
 from grader.checks.wording import code, counted
 from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
@@ -71,6 +72,8 @@ def reactions(
 
 class Latency(Parameters):
     """Parameters of timing.latency."""
+
+    needs = (Recorded(), Published())
 
     stimulus: TopicName = Field(description="Topic that a stimulus publishes on.")
     topic: TopicName = Field(description="Topic that the node answers on.")

@@ -10,6 +10,7 @@ from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
+from grader.checks.need import Recorded
 from grader.checks.timing.stamps import why_not_believed
 from grader.checks.wording import code, counted
 from grader.diagnosis.no_messages import why_few
@@ -24,6 +25,8 @@ _SEQUENCE_LIMIT = 2**62
 
 class Rate(Parameters):
     """Parameters of timing.rate."""
+
+    needs = (Recorded(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     at_least: Frequency | None = Field(None, description="Lowest rate.")

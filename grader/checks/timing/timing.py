@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.assignment.model import TopicName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.need import Recorded
 from grader.checks.timing.period import (
     MOST_INTERVALS,
     Interval,
@@ -24,6 +24,7 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import ENDED_HINT, why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Message, Recording
+from grader.spec.name import TopicName
 from grader.spec.quantity import Duration, Ratio
 from grader.spec.unit import format_duration
 
@@ -34,6 +35,8 @@ _ENDED_PERIODS = 3.0
 
 class Period(Parameters):
     """Parameters of timing.period."""
+
+    needs = (Recorded(at_least="needed", period="period"),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     period: Duration = Field(description="Expected time between two messages.")
@@ -53,6 +56,11 @@ class Period(Parameters):
         "least, unless it is 0 %.",
     )
     at_least: int = Field(5, ge=1, description="Intervals that are needed to judge.")
+
+    @property
+    def needed(self) -> int:
+        """How many messages must come to judge."""
+        return self.at_least + 1
 
     @property
     def limits(self) -> Limits:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.assignment.model import TopicName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import nodes_seen
 from grader.checks.wording import code, codes
 from grader.diagnosis.no_node import why_no_node
 from grader.recording.model import Kind, Recording
+from grader.spec.name import TopicName
 
 PROBE = "rosgrade_probe"
 """Name of the node through which a run is watched."""

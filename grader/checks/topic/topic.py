@@ -7,13 +7,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.assignment.model import InterfaceName, TopicName
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Status
+from grader.checks.need import Recorded
 from grader.checks.wording import code, codes
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
 from grader.diagnosis.type_confusion import explain
 from grader.recording.model import Endpoint, Kind, Recording
+from grader.spec.name import InterfaceName, TopicName
 
 
 class _Named(Parameters):
@@ -101,6 +102,8 @@ def _absence(
 
 class Type(_Named):
     """Parameters of topic.type."""
+
+    needs = (Recorded(type="type", kind="kind"),)
 
     type: InterfaceName = Field(description="Interface, such as geometry_msgs/msg/Twist.")
     kind: Literal["publisher", "subscription"] = Field(

@@ -1,0 +1,141 @@
+"""What a check needs of the assignment that uses it.
+
+The model of a check's parameters lists its needs: ``needs = (Recorded("topic"),)`` says that each
+scenario which the check judges records the topic that the parameter ``topic`` names. Validation
+reads the list before any run, and so does the documentation of the check.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import ClassVar
+
+
+@dataclass(frozen=True)
+class Need:
+    """Something that must be there for a check to judge anything.
+
+    Names of parameters are keys below ``with``; a parameter that is None needs nothing.
+    """
+
+    words: ClassVar[str]
+    """For the documentation; ``{name}`` stands for the name of a parameter."""
+
+    def __str__(self) -> str:
+        return self.words.format(**vars(self))
+
+
+@dataclass(frozen=True)
+class SimulatedRobot(Need):
+    """A ``world`` in each scenario."""
+
+    words = "a `world` with the simulated robot"
+
+
+@dataclass(frozen=True)
+class Recorded(Need):
+    """A topic that each scenario records."""
+
+    words = "`{topic}` among the topics of `record`"
+    topic: str = "topic"
+    type: str | None = None
+    """Parameter with its type, if the check expects one."""
+    kind: str | None = None
+    """Parameter with the student's end: messages to a subscription need not be recorded."""
+    at_least: str | None = None
+    """Attribute with the number of messages that the check needs."""
+    period: str | None = None
+    """Parameter with the time between them, in seconds."""
+
+
+@dataclass(frozen=True)
+class Published(Need):
+    """A topic that a stimulus publishes on."""
+
+    words = "a stimulus that publishes on `{topic}`"
+    topic: str = "stimulus"
+
+
+@dataclass(frozen=True)
+class Joined(Need):
+    """A late joiner among the stimuli."""
+
+    words = "a `join` among the stimuli with the name `{name}`"
+    name: str = "joiner"
+
+
+@dataclass(frozen=True)
+class Called(Need):
+    """A service that a stimulus calls."""
+
+    words = "a stimulus that calls `{service}`"
+    service: str = "service"
+    suffix: str = ""
+    """Added to the parameter to get the name of the service."""
+    request: str | None = None
+    """Parameter with fields of the requests that are judged."""
+    within: str | None = None
+    """Parameter with how long an answer may take: the stimulus must wait as long."""
+    count: str | None = None
+    """Parameter with an entry for each call."""
+    at_once: int = 1
+    """How many calls must be sent at once."""
+
+
+@dataclass(frozen=True)
+class GoalSent(Need):
+    """An action that a stimulus sends a goal to."""
+
+    words = "a stimulus that sends a goal to `{action}`"
+    action: str = "action"
+    goal: str = "goal"
+    """Parameter with fields of the goals that are judged."""
+    within: str | None = None
+    """Parameter with how long the result may take: the stimulus must wait as long."""
+    having: str | None = None
+    """Key that one of the goals must have."""
+
+
+@dataclass(frozen=True)
+class ParametersRead(Need):
+    """A node whose parameters a stimulus reads or sets."""
+
+    words = "a stimulus that reads or sets the parameters of `{node}`"
+    node: str = "node"
+
+
+@dataclass(frozen=True)
+class ParameterSet(Need):
+    """A parameter that a stimulus sets to a value."""
+
+    words = "a stimulus that sets the parameter `{name}` of `{node}` to `{value}`"
+    node: str = "node"
+    name: str = "name"
+    value: str = "value"
+
+
+@dataclass(frozen=True)
+class Submitted(Need):
+    """A package of ``packages``, and perhaps one of its executables."""
+
+    words = "`{package}` among `packages`"
+    package: str = "package"
+    executable: str | None = None
+
+
+@dataclass(frozen=True)
+class RuffRules(Need):
+    """Rules that ruff has: others are never broken."""
+
+    words = "rules of ruff as `{rules}`"
+    rules: str = "rules"
+
+
+class Doubt(str, Enum):
+    """What a busy machine may do to a run, so that a failure must happen twice to count."""
+
+    STEERING_HELD_UP = "steering held up"
+    """It holds up the node while the robot drives, which then goes another way."""
+    ANSWER_MISSED = "answer missed"
+    """It keeps a client and a server from discovering each other, or holds up an answer."""
