@@ -277,7 +277,7 @@ class TestOurFaults:
             Told("node", {"a": PASS, "b": Finding.error("", "broken"), "c": disturbed}),
             scenarios=("a", "b", "c"),
         )
-        (("parameters", "waited_s", "every_s", "again"),)
+        assert result.disturbed_scenarios(Status.ERROR) == ("a", "c")
         assert result.disturbed_scenarios(Status.FAILED) == ()
 
     @pytest.mark.parametrize(
