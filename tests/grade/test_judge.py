@@ -290,7 +290,7 @@ class TestOurFaults:
         ],
     )
     def test_where_a_held_up_robot_went_is_worth_a_second_run(
-        self, parameters, waited_s, every_s, again
+        self, judged, waited_s, every_s, again
     ):
         waits = [
             Disturbance(LAUNCHED_NS + round(k * every_s * NS), 0, round(waited_s * NS))
@@ -298,7 +298,7 @@ class TestOurFaults:
         ]
         run = make_recording("a", truth=drive(20), disturbance=tuple(waits))
         result = judge(
-            Told("goal", FAIL, parameters=parameters), scenarios=("a",), recordings={"a": run}
+            Told("goal", FAIL, parameters=judged), scenarios=("a",), recordings={"a": run}
         )
         assert result.result("goal").status is Status.FAILED
         assert result.disturbed_scenarios(Status.FAILED) == (("a",) if again else ())
