@@ -49,7 +49,6 @@ class Plan(NamedTuple):
 
     Attributes:
         ros: `wheels` from the package index, or the `system`'s, which was sourced.
-        interpreter: The Python that the environment is made from.
     """
 
     ros: str
@@ -60,8 +59,6 @@ class Locked(NamedTuple):
     """One entry of the lock.
 
     Attributes:
-        name: The distribution's name as the lock spells it.
-        text: Its lines, with hashes and annotations.
         parents: What it was locked for: names of the lock, or of a file for rosgrade's own needs.
     """
 
@@ -79,9 +76,7 @@ def plan(
     """Decide whose ROS is used, and which Python.
 
     Args:
-        environ: The environment variables of the shell.
         interpreters: The Pythons of the machine, the preferred first; read only as far as needed.
-        platform: As `sysconfig.get_platform()` names it.
         ros_python: The Python version that the sourced ROS was built for; None if nothing is
             sourced.
 

@@ -327,7 +327,6 @@ def _default(schema: Mapping[str, Any], value: Any) -> str:
     """A default as an author would write it.
 
     Args:
-        schema: Of the key.
         value: The default itself.
     """
     default = schema.get("default")
@@ -385,11 +384,7 @@ def stale(folder: Path) -> list[str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Write the files, or with ``--check`` only compare them.
-
-    Returns:
-        0, or 1 where ``--check`` found a stale file.
-    """
+    """Write the files, or with ``--check`` only compare them."""
     parser = argparse.ArgumentParser(prog="python -m grader.docs", description=__doc__)
     parser.add_argument("--check", action="store_true", help="only compare; 1 if one is stale")
     parser.add_argument("--folder", type=Path, default=resources.root() / "docs")

@@ -42,7 +42,6 @@ class Problem:
     """One mistake in a file.
 
     Attributes:
-        message: What is wrong and what is allowed.
         line: Line in the file, counted from 1, or None where no line can be named.
         where: The place in the document, such as ``checks[2].points``.
     """
@@ -59,7 +58,6 @@ class AssignmentError(RosgradeError):
         """Keep the problems as data and make the text from them.
 
         Args:
-            file: The file they were found in.
             problems: At least one problem.
         """
         self.file = file
@@ -87,7 +85,6 @@ def machine_fault(error: OSError, place: Path | None = None) -> GraderFault | No
     """Say what this machine lacks and what to do about it; None where that is not the reason.
 
     Args:
-        error: Of the operating system.
         place: What was written, where the error does not name it.
     """
     if error.errno not in _OF_MACHINE:

@@ -27,12 +27,7 @@ _ACTION = re.compile(r"(\./\S+|[\w.-]+/[\w./-]+@[\w./-]+)")
 
 @dataclass(frozen=True)
 class Member:
-    """A file of an export.
-
-    Attributes:
-        content: All of it.
-        executable: Whether it is a program.
-    """
+    """A file of an export."""
 
     content: bytes
     executable: bool = False
@@ -40,13 +35,6 @@ class Member:
 
 def gradescope(loaded: LoadedAssignment, out: Path) -> Path:
     """Write the autograder that is uploaded to Gradescope.
-
-    Args:
-        loaded: The assignment.
-        out: Folder for it.
-
-    Returns:
-        The zip: ``setup.sh`` and ``run_autograder`` at its top, rosgrade with the assignment.
 
     Raises:
         UsageError: It cannot be written, or this is no checkout of rosgrade.
@@ -67,9 +55,6 @@ def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
 
     Its files can be found by whoever knows the classroom's address, so it holds no hidden check.
 
-    Returns:
-        The folder: ``autograder.py``, and rosgrade with the assignment.
-
     Raises:
         UsageError: It cannot be written, the assignment has hidden checks, or this is no
             checkout of rosgrade.
@@ -89,14 +74,6 @@ def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
     """Write the workflow that goes into a template repository.
 
     An assignment that is not one of rosgrade's own is copied beside it, without its solution.
-
-    Args:
-        loaded: The assignment.
-        out: The repository.
-        action: Where rosgrade's ``action.yml`` is, as ``uses:`` has it.
-
-    Returns:
-        The workflow.
 
     Raises:
         UsageError: It cannot be written, the action is none, or an assignment that would have

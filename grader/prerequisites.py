@@ -19,15 +19,7 @@ from grader.spec.unit import format_duration
 
 @dataclass(frozen=True)
 class Part:
-    """One thing that grading needs or profits from.
-
-    Attributes:
-        name: What it is.
-        present: Whether it is there and works.
-        found: What was found.
-        remedy: How to get it, where it is missing.
-        required: Nothing can be graded without it.
-    """
+    """One thing that grading needs or profits from."""
 
     name: str
     present: bool

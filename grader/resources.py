@@ -17,9 +17,6 @@ PACKAGE = Path(__file__).resolve().parent
 def root(package: Path = PACKAGE) -> Path:
     """The folder that holds ``assignments/``, ``reference/`` and ``templates/``.
 
-    Args:
-        package: Folder of the import package.
-
     Raises:
         GraderFault: It is in neither place: the installation is not complete.
     """

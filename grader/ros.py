@@ -26,8 +26,6 @@ class RosInstallation:
 
     Attributes:
         source: ``wheels`` or ``sourced``.
-        python: Interpreter that imports rclpy.
-        prefixes: ament prefixes, the first wins.
         inherited: Variables that a sourced installation needs, taken from the environment.
         underlays: Install spaces of ours (merged layout) with packages that it lacks; see
             :mod:`grader.submission.build.underlay`.
@@ -73,7 +71,6 @@ class RosInstallation:
         """Variables for a child process that uses this ROS, and nothing else of the caller's.
 
         Args:
-            environ: The caller's environment, of which only locale and home are kept.
             overlays: Install spaces (merged layout) in front of ROS, as after sourcing
                 their ``local_setup.bash``.
         """
@@ -130,11 +127,6 @@ def find(
     executable: Path = Path(sys.executable),
 ) -> RosInstallation:
     """Choose the ROS installation: a sourced Jazzy wins over the wheels.
-
-    Args:
-        environ: The environment to decide by.
-        prefix: Prefix of the Python environment that would hold the wheels.
-        executable: Its interpreter.
 
     Raises:
         GraderFault: Another distribution is sourced, or there is none at all.

@@ -20,13 +20,6 @@ from grader.submission.read.rosdistro import PACKAGES
 def write_assignment(name: str, folder: Path) -> Path:
     """Write a new assignment with a handout, a reference solution and mutants.
 
-    Args:
-        name: Its id, which is also the name of its folder and of its package.
-        folder: Where its folder goes.
-
-    Returns:
-        Its folder.
-
     Raises:
         UsageError: That is no id, the folder is there already, or it cannot be written.
     """
@@ -52,14 +45,7 @@ def write_assignment(name: str, folder: Path) -> Path:
 
 
 def assignment_files(name: str) -> dict[str, str]:
-    """Make the files of a new assignment.
-
-    Args:
-        name: Its id.
-
-    Returns:
-        Contents by path in its folder.
-    """
+    """Make the files of a new assignment."""
     package = Package(name=name, depends=("rclpy", "std_msgs"), executables=(name,))
     (program,) = programs(package)
     solution = {name: rendered("new/node.py", id=name, program=program)}

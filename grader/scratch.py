@@ -28,11 +28,7 @@ class Scratch:
     """
 
     def __init__(self, kind: str) -> None:
-        """Make it, and remove what earlier ones left behind.
-
-        Args:
-            kind: A word for its name.
-        """
+        """Make it, and remove what earlier ones left behind."""
         # rosidl's generators cannot build interfaces below a folder with other letters.
         place = tempfile.gettempdir() if tempfile.gettempdir().isascii() else _ASCII_PLACE
         remove_stale(Path(place))
@@ -72,7 +68,6 @@ def remove_stale(folder: Path, age_s: float = _STALE_S) -> None:
     """Remove scratch folders that nobody holds.
 
     Args:
-        folder: That they are in.
         age_s: How long ago the last thing must have been made in one.
     """
     now_s = time.time()

@@ -53,7 +53,6 @@ class Interface:
     """A definition that the student writes.
 
     Attributes:
-        kind: msg, srv or action.
         name: Such as ``BotStatus``.
     """
 
@@ -78,13 +77,6 @@ class Interface:
 
 def write_starter(loaded: LoadedAssignment, folder: Path) -> tuple[Path, ...]:
     """Write the starter packages of an assignment.
-
-    Args:
-        loaded: The assignment.
-        folder: Where the packages' folders go, such as the ``src`` of a workspace.
-
-    Returns:
-        The packages' folders.
 
     Raises:
         UsageError: A folder of that name is there already, or it cannot be written.
@@ -123,17 +115,7 @@ def starter_files(loaded: LoadedAssignment) -> dict[str, str]:
 def package_files(
     package: Package, description: str, nodes: Mapping[str, str], interfaces: tuple[Interface, ...]
 ) -> dict[str, str]:
-    """Make a package around what its programs do.
-
-    Args:
-        package: What it is called, how it is built, what it needs.
-        description: One line for its manifest.
-        nodes: Code by executable: C++ where :func:`is_cpp`, else Python.
-        interfaces: Definitions in it.
-
-    Returns:
-        Contents by path inside the package, without the definitions.
-    """
+    """Make a package around what its programs do."""
     cpp = is_cpp(package)
     if cpp and "rclcpp" not in package.depends:
         package = package.model_copy(update={"depends": ("rclcpp", *package.depends)})
@@ -225,12 +207,7 @@ def _interfaces(assignment: Assignment, package: Package) -> Iterator[Interface]
 
 
 def rendered(name: str, **values: object) -> str:
-    """Fill in a template of a file that is no page.
-
-    Args:
-        name: Of the file below ``templates/``, without ``.j2``.
-        values: What stands in it.
-    """
+    """Fill in a template of a file that is no page."""
     return _environment().get_template(f"{name}.j2").render(values)
 
 

@@ -51,12 +51,6 @@ def cut_deep(folder: Path) -> bool:
     """Remove what lies too deep in a folder, and let its owner read all else.
 
     Whoever filled it may have taken the right to do so from himself, and so from us.
-
-    Args:
-        folder: Nobody writes to it any more.
-
-    Returns:
-        Whether anything was too deep.
     """
     found = False
     ahead = [(os.fsencode(folder), 0)]

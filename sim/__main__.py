@@ -11,11 +11,7 @@ from grader.errors import RosgradeError, UsageError
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Read the command line and simulate until Ctrl-C.
-
-    Returns:
-        0 at the end, 2 for wrong use or a bad file.
-    """
+    """Read the command line and simulate until Ctrl-C."""
     parser = argparse.ArgumentParser(
         prog="python -m sim", description="Simulate a TurtleBot3 in a world, for your own nodes."
     )

@@ -57,8 +57,6 @@ def share_of_core(segments: int, duration_s: float = 10.0, domain_id: int | None
     middleware; everything that this process does meanwhile is counted.
 
     Args:
-        segments: Walls in the world.
-        duration_s: How long to measure.
         domain_id: ROS domain, or None for ROS_DOMAIN_ID.
     """
     import rclpy

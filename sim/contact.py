@@ -56,7 +56,6 @@ class ContactFinder:
         """Prepare the world for a robot.
 
         Args:
-            world: What can be touched.
             radius_m: Radius of the robot's footprint.
         """
         self._radius_m = radius_m
@@ -75,10 +74,6 @@ class ContactFinder:
         """Look for the first contact of one step.
 
         Args:
-            pose: Where the step begins.
-            linear_m_s: Velocity during it.
-            angular_rad_s: Angular velocity during it.
-            dt_s: Its length.
             end_ns: Simulated time at its end; moving obstacles are already there.
         """
         travel_m = abs(linear_m_s) * dt_s

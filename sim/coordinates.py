@@ -94,7 +94,6 @@ class Entries:
 
     Attributes:
         names: What each entry is; one called ``yaw`` is an angle, all others are lengths.
-        make: Makes the value from the entries.
         optional: So many entries at the end may be left out; they are then zero.
         positive: Whether every length must be more than zero.
     """

@@ -37,7 +37,6 @@ class Scan:
     """One turn of the LiDAR, as it is reported.
 
     Attributes:
-        time_ns: Simulated time of all its beams.
         ranges_m: Shape (beams,), float32. What a beam without a distance holds is set by
             :class:`~sim.description.NoReturn`.
     """
@@ -56,12 +55,7 @@ class Lidar:
     """A LiDAR in a world."""
 
     def __init__(self, world: World, options: LidarOptions) -> None:
-        """Prepare the world's walls.
-
-        Args:
-            world: What can be seen.
-            options: What the LiDAR is like.
-        """
+        """Prepare the world's walls."""
         self.options = options
         self.angle_min_rad = 0.0 if options.layout is Layout.FROM_ZERO else -math.pi
         self.angle_increment_rad = math.tau / options.beams
@@ -77,7 +71,6 @@ class Lidar:
 
         Args:
             pose: Of the robot, in the world's frame.
-            time_ns: Simulated time, for what moves.
 
         Returns:
             Shape (beams,), metres, in the order of the beams; inf where nothing is within
@@ -96,7 +89,6 @@ class Lidar:
 
         Args:
             pose: Of the robot, in the world's frame.
-            time_ns: Simulated time.
             noise: Where noise is drawn from: one number for each beam, whatever is seen, so
                 that a scan does not change the noise of the next; none without noise.
         """

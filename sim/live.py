@@ -41,13 +41,8 @@ def run(
     """Simulate in real time until Ctrl-C.
 
     Args:
-        world_file: The world.
         options_file: Robot, sensors and topics; if left out, the defaults.
-        robot: ``burger`` or ``waffle``, instead of what the options say.
-        pose: Start such as ``"1, 0.5, 90 deg"``, instead of what options and world say.
-        seed: Of noise and drift.
         domain_id: ROS domain; if left out, ROS_DOMAIN_ID.
-        values: For the ``$names`` of the world.
         duration_s: End after so much simulated time, or None.
         output: Where to write; if it is no terminal, one line in a second.
 

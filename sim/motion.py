@@ -33,7 +33,6 @@ class Twist:
     """A velocity in the robot's own frame; also what a command asks for.
 
     Attributes:
-        linear_m_s: Along the robot's x axis, forward is positive.
         angular_rad_s: Counter-clockwise is positive.
     """
 
@@ -68,15 +67,6 @@ def integrate(pose: Pose, linear_m_s: float, angular_rad_s: float, duration_s: f
     ``h = w t / 2``. This form has no difference of nearly equal numbers, so that it is as
     exact for a tiny angular velocity as for a large one, and it needs no series: the
     quotient ``sin(h) / h`` is right to the last bit down to the smallest ``h`` but zero.
-
-    Args:
-        pose: Where the motion begins.
-        linear_m_s: Forward speed.
-        angular_rad_s: Angular velocity.
-        duration_s: How long.
-
-    Returns:
-        Where it ends. Without velocity that is ``pose`` to the last bit.
     """
     half_rad = 0.5 * angular_rad_s * duration_s
     chord_m = linear_m_s * duration_s

@@ -49,12 +49,7 @@ class Sink(Protocol):
     """
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
-        """A step was done.
-
-        Args:
-            step: The truth.
-            stamp_ns: ROS time of its end, the same as in the headers of its messages.
-        """
+        """A step was done."""
 
     def on_late(self, lateness: Lateness) -> None:
         """Steps are late; they are done right after this call."""
@@ -95,10 +90,7 @@ class RosSimulator:
 
         Args:
             node: Where; stays the caller's.
-            simulation: What is simulated.
             options: Topics and frames; the rest of it is already in the simulation.
-            sink: Who wants to know the truth.
-            steady_ns: The clock that paces the steps.
         """
         self._node, self._simulation, self._sink = node, simulation, sink
         self._steady_ns = steady_ns
@@ -131,11 +123,7 @@ class RosSimulator:
         self.step: Step | None = None
 
     def start(self) -> int:
-        """Let simulated time begin now.
-
-        Returns:
-            Reading of the steady clock at which the first step is to be done.
-        """
+        """Let simulated time begin now."""
         self._pacer = Pacer(self._steady_ns())
         self._stamp_ns = self._node.get_clock().now().nanoseconds
         if self.transforms is not None:

@@ -23,9 +23,7 @@ class OdometrySample:
     """What odometry says at a moment.
 
     Attributes:
-        time_ns: Simulated time.
         pose: Of base_footprint in the frame ``odom``.
-        twist: In base_footprint.
     """
 
     time_ns: int
@@ -48,8 +46,6 @@ class WheelOdometry:
         Args:
             options: Its errors and where the frame ``odom`` is.
             start: True pose of the robot at the beginning, in the world's frame.
-            wheel_separation_m: True distance between the wheels.
-            random: Where its errors are drawn from.
         """
         self._origin = ORIGIN if options.origin is OdometryOrigin.WORLD else start
         self._is_exact = options.drift.is_off
@@ -68,7 +64,6 @@ class WheelOdometry:
         """Take a step of the true motion into account.
 
         Args:
-            way_m: Length of the arc, negative backwards.
             turn_rad: Change of heading, counter-clockwise.
         """
         if self._is_exact or (way_m == 0.0 and turn_rad == 0.0):
@@ -82,9 +77,7 @@ class WheelOdometry:
         """What odometry says now.
 
         Args:
-            time_ns: Simulated time.
             pose: The true pose in the world's frame, which exact odometry reports.
-            twist: The true velocity.
         """
         if not self._is_exact:
             return OdometrySample(time_ns, self._belief, twist)

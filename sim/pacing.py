@@ -18,13 +18,7 @@ MAX_AHEAD = 5
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Steps that the host did not let us do in time.
-
-    Attributes:
-        index: First of them (see :attr:`sim.simulation.Step.index`).
-        steps: How many are done together.
-        late_ns: How much later than planned.
-    """
+    """Steps that the host did not let us do in time."""
 
     index: int
     steps: int
@@ -39,11 +33,7 @@ class Pacer:
     """
 
     def __init__(self, begin_ns: int) -> None:
-        """Begin.
-
-        Args:
-            begin_ns: Reading of a steady clock at simulated time 0.
-        """
+        """Begin."""
         self.begin_ns = begin_ns
         self._done = 0
         self._planned = 1

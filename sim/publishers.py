@@ -58,12 +58,7 @@ class OdometryPublisher:
         self.publisher = _publisher(node, Odometry, topic.topic, qos_profile(topic))
 
     def publish(self, sample: OdometrySample, stamp_ns: int) -> None:
-        """Publish a sample.
-
-        Args:
-            sample: What odometry says.
-            stamp_ns: ROS time of it.
-        """
+        """Publish a sample."""
         message = self._message
         _set_time(message.header.stamp, stamp_ns)
         message.pose.pose.position.x = sample.pose.x_m
@@ -97,12 +92,7 @@ class ScanPublisher:
         self.publisher = _publisher(node, LaserScan, topic.topic, qos_profile(topic))
 
     def publish(self, scan: Scan, stamp_ns: int) -> None:
-        """Publish a scan.
-
-        Args:
-            scan: What was measured.
-            stamp_ns: ROS time of it.
-        """
+        """Publish a scan."""
         _set_time(self._message.header.stamp, stamp_ns)
         # An array('f') is taken over as it is; a list would be checked number by number.
         self._message.ranges = array("f", scan.ranges_m.tobytes())
@@ -134,11 +124,7 @@ class TransformPublisher:
         """Create the publishers.
 
         Args:
-            node: Of whom.
             topic: Names and QoS; the static transform is always transient-local.
-            odometry: Names of the frames.
-            lidar: Where it sits.
-            tf: The type tf2_msgs/msg/TFMessage (see :func:`transform_type`).
         """
         self._moving = TransformStamped()
         self._moving.header.frame_id = odometry.frame

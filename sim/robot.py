@@ -27,14 +27,7 @@ from sim.motion import NS, REST, Pose, Twist, integrate
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the drive can do, the same forwards and backwards.
-
-    Attributes:
-        speed_m_s: Greatest speed.
-        angular_speed_rad_s: Greatest angular speed.
-        acceleration_m_s2: Greatest change of speed, speeding up or braking.
-        angular_acceleration_rad_s2: Greatest change of angular speed.
-    """
+    """What the drive can do, the same forwards and backwards."""
 
     speed_m_s: float
     angular_speed_rad_s: float
@@ -48,9 +41,7 @@ class RobotModel:
 
     Attributes:
         name: As in TURTLEBOT3_MODEL.
-        limits: What its drive can do.
         radius_m: Radius of its circular footprint around base_footprint.
-        wheel_separation_m: Distance between its wheels.
     """
 
     name: str
@@ -69,7 +60,6 @@ class Robot:
     """A robot and where it starts.
 
     Attributes:
-        model: Its limits and measures.
         start: Where it starts, at rest, in the world's frame.
         command_timeout_ns: It stops when no command came for so long, or None.
         drives: Commands that it gets by itself, with the simulated time of each, in order.
@@ -89,7 +79,6 @@ class State:
 
     Attributes:
         pose: In the world's frame.
-        twist: The velocity of its wheels in the step that led here.
     """
 
     pose: Pose
@@ -100,9 +89,7 @@ def velocity(twist: Twist, command: Twist, dt_s: float, limits: Limits) -> Twist
     """The velocity during the next step: as near to the command as the limits allow.
 
     Args:
-        twist: The velocity now.
         command: What is asked for; must be finite.
-        dt_s: Length of the step.
         limits: What the drive can do; linear and angular are limited one by one, as
             Gazebo's DiffDrive does.
     """
@@ -129,10 +116,7 @@ def step(state: State, command: Twist, dt_s: float, limits: Limits) -> State:
     is an exact arc.
 
     Args:
-        state: Before the step.
         command: What is asked for; must be finite.
-        dt_s: Length of the step.
-        limits: What the drive can do.
 
     Returns:
         The state after it. A robot at rest that is asked for nothing is returned as it is.

@@ -19,7 +19,6 @@ class Schedule:
 
         Args:
             rate_hz: How often in a second.
-            starts_ns: What is due before this time is left out.
             stops_ns: What is due at this time or later is left out, or None.
         """
         period = NS / Fraction(rate_hz).limit_denominator(1_000_000)

@@ -18,7 +18,6 @@ class Waypoint:
     """A place on the way.
 
     Attributes:
-        at_ns: Simulated time of being there.
         pose: In the world's frame.
     """
 
@@ -36,10 +35,7 @@ class MovingObstacle:
         size_m: Length and width of a box, or None.
         path: At least one waypoint, times increasing. Before the first it stands there, after
             the last it stays (or starts over, if ``repeat``).
-        appears_ns: It is there from this time on.
         disappears_ns: It is gone from this time on, or None.
-        repeat: Whether the path starts over after its last waypoint.
-        line: Line in the file.
     """
 
     label: str

@@ -23,7 +23,6 @@ class Shape:
     Attributes:
         label: Where it is in the YAML, such as ``boxes[2]``.
         line: Its line in the file, or None for a shape that was not read from one.
-        capsules: Its outline.
         corners: Corners of the area that it fills, in order; empty for a wall without an
             inside and for a circle.
     """
@@ -71,8 +70,6 @@ def box(label: str, pose: Pose, size_m: tuple[float, float], line: int | None = 
 
     Args:
         label: See :class:`Shape`.
-        pose: Its centre and the direction of its length.
-        size_m: Length (along x at yaw 0) and width.
         line: See :class:`Shape`.
     """
     half_x, half_y = 0.5 * size_m[0], 0.5 * size_m[1]

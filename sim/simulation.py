@@ -41,12 +41,7 @@ class EventKind(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened in a step.
-
-    Attributes:
-        kind: What.
-        text: For people: what was touched, or what was commanded.
-    """
+    """Something that happened in a step."""
 
     kind: EventKind
     text: str
@@ -63,7 +58,6 @@ class Step:
         twist: True velocity at its end, in the robot's frame.
         command: What was asked for, before any limit; zero after a rejected command.
         contact: What the robot touches, such as ``boxes[2]``, or None.
-        events: What happened.
         scan: The scan that was taken at its end, or None if none was due.
         odometry: The odometry at its end, or None if none was due.
     """
@@ -94,9 +88,6 @@ class Simulation:
         """Begin at simulated time 0, at rest.
 
         Args:
-            world: Where.
-            robot: Who.
-            sensors: What it sees.
             seed: Of the noise of the LiDAR and the drift of odometry, which are drawn
                 independently of each other.
         """
@@ -151,9 +142,6 @@ class Simulation:
         Args:
             command: A command that arrived since the last step, or None. It holds until the
                 next, unless the robot has a command timeout.
-
-        Returns:
-            The truth at the end of the step, with the sensors' data that are due.
         """
         events: list[Event] = []
         if self._drives and self._drives[0][0] <= self.time_ns:
@@ -251,11 +239,6 @@ class Simulation:
 
 def make_simulation(world: World, options: SimulatorOptions, seed: int = 0) -> Simulation:
     """Put together what the YAML describes.
-
-    Args:
-        world: Where.
-        options: The robot and its sensors.
-        seed: See :class:`Simulation`.
 
     Raises:
         AssignmentError: The robot would start inside a wall.

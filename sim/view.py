@@ -53,8 +53,6 @@ class Map:
 
         Args:
             extent_m: x_min, y_min, x_max, y_max that must be visible.
-            columns: Characters in a line.
-            rows: Lines.
         """
         x_min, y_min, x_max, y_max = extent_m
         width_m = max(x_max - x_min + 2 * _MARGIN_M, _LEAST_M)
@@ -130,12 +128,7 @@ class Drawing:
     """Draws a world with its robot again and again; what stands still is drawn once."""
 
     def __init__(self, world: World, radius_m: float) -> None:
-        """Prepare.
-
-        Args:
-            world: What stands and moves in it.
-            radius_m: Of the robot's footprint.
-        """
+        """Prepare."""
         self._world, self._radius_m = world, radius_m
         self._extent_m = world.extent()
         self._base: tuple[object, Map] | None = None
@@ -151,14 +144,7 @@ class Drawing:
         """Draw it.
 
         Args:
-            pose: Of the robot.
-            time_ns: Simulated time, for what moves.
-            columns: Characters in a line.
-            rows: Lines.
             hits: What the LiDAR sees, in the world's frame (see :func:`hit_points`).
-
-        Returns:
-            The map, line by line from the top.
         """
         canvas = self._walls(self._visible(pose), columns, rows).copy()
         for capsule in obstacles_at(self._world.moving, time_ns):
@@ -193,13 +179,7 @@ class Drawing:
 
 
 def hit_points(lidar: Lidar, scan: Scan, pose: Pose) -> list[tuple[float, float]]:
-    """Where the beams of a scan ended, in the world's frame.
-
-    Args:
-        lidar: Which took it.
-        scan: The scan.
-        pose: Of the robot when it was taken.
-    """
+    """Where the beams of a scan ended, in the world's frame."""
     sensor = compose(pose, lidar.options.pose)
     found = []
     for index, range_m in enumerate(scan.ranges_m.tolist()):

@@ -51,12 +51,8 @@ class World:
     """Everything that the robot can see and touch.
 
     Attributes:
-        shapes: What stands still.
-        moving: What moves on a script.
         bounds: x_min, y_min, x_max, y_max of the wall around it, or None for an open world.
             Its four walls are among the shapes.
-        start: Where the robot starts if nobody says else.
-        file: Where it was read from.
     """
 
     shapes: tuple[Shape, ...] = ()
@@ -66,11 +62,7 @@ class World:
     file: Path = Path("world.yaml")
 
     def extent(self, *points: tuple[float, float]) -> tuple[float, float, float, float]:
-        """The smallest upright rectangle around everything, as x_min, y_min, x_max, y_max.
-
-        Args:
-            points: Further points to include.
-        """
+        """The smallest upright rectangle around everything, as x_min, y_min, x_max, y_max."""
         xs, ys = [x for x, _ in points], [y for _, y in points]
         for shape in self.shapes:
             for x1, y1, x2, y2, radius in shape.capsules:
@@ -88,9 +80,7 @@ class World:
         """What keeps a robot from standing at a pose.
 
         Args:
-            pose: Centre of the robot.
             radius_m: Radius of its circular footprint.
-            time_ns: Simulated time, for what moves.
 
         Returns:
             A problem with the line of the shape that is in the way, or None if it fits.
@@ -126,10 +116,6 @@ class World:
 
 def read_world(file: Path, values: Values | None = None) -> World:
     """Read a world file.
-
-    Args:
-        file: The YAML file.
-        values: What to write in place of ``$name``, instead of the file's own ``values``.
 
     Raises:
         UsageError: The file cannot be read.

@@ -19,8 +19,6 @@ class BoundCheck:
     """A check of an assignment, ready to judge.
 
     Attributes:
-        spec: The entry in the YAML.
-        check: What it uses: of the catalogue, or the author's own.
         parameters: Its ``with``, validated by the check's own model.
         about: What tells it apart from checks of the same title, such as its topic; or nothing.
     """
@@ -64,13 +62,6 @@ def bind(
     source: Source, index: int, spec: CheckSpec, catalogue: Mapping[str, Check], folder: Path
 ) -> tuple[BoundCheck | None, list[Problem]]:
     """Find the check that an entry uses, and read its parameters.
-
-    Args:
-        source: The document.
-        index: Of the entry in ``checks``.
-        spec: The entry.
-        catalogue: Checks by name.
-        folder: Where own checks lie.
 
     Returns:
         The bound check and no problem, or None and at least one.

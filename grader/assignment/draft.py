@@ -13,10 +13,7 @@ class Draft:
     """The parts of an assignment, each read alone.
 
     Attributes:
-        source: The document.
         packages: One per entry; None where the entry itself has a mistake.
-        scenarios: Likewise.
-        checks: Likewise.
     """
 
     source: Source
@@ -44,12 +41,7 @@ class Draft:
         )
 
     def names(self, key: str, name: str = "id") -> list[str | None]:
-        """What each entry of a list calls itself, also where the entry has a mistake.
-
-        Args:
-            key: ``packages``, ``scenarios`` or ``checks``.
-            name: The key of the entry that holds its name.
-        """
+        """What each entry of a list calls itself, also where the entry has a mistake."""
         return [_name(entry, name) for entry in self.source.entries(key)]
 
     def package(self, name: str) -> Package | None:

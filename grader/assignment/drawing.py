@@ -14,15 +14,7 @@ _DECIMALS = 3
 
 
 def draw_values(scenario: Scenario, seed: int) -> dict[str, float]:
-    """Draw the random values of a scenario.
-
-    Args:
-        scenario: With its ``random``.
-        seed: The same seed gives the same values, whatever else the scenario names.
-
-    Returns:
-        Values by name in SI units, rounded to three decimals.
-    """
+    """Draw the random values of a scenario."""
     return {
         name: round(random.Random(f"{seed}/{name}").uniform(bounds.low, bounds.high), _DECIMALS)
         for name, bounds in scenario.random.items()
@@ -38,10 +30,6 @@ def world_values(scenario: Scenario, values: dict[str, float]) -> dict[str, str]
 
 def fill_in(value: Any, values: dict[str, float]) -> Any:
     """A launch parameter with ``$name`` and quantities replaced by numbers in SI units.
-
-    Args:
-        value: As in YAML: ``$goal_x``, ``170 deg``, a number, any other text, or a list.
-        values: Random values by name.
 
     Raises:
         UsageError: There is no random value of that name.

@@ -33,10 +33,7 @@ def problems(
     """Find fields that the messages do not have; where a definition is not at hand, none.
 
     Args:
-        source: The document.
-        assignment: What was read from it.
         checks: Its checks, in order.
-        known: Definitions at hand.
     """
     for index, bound in enumerate(checks):
         for named in bound.parameters.named_fields():
@@ -104,11 +101,6 @@ def _lack(named: NamedFields, message: dict[str, Any]) -> str:
 
 def _sample(interface: str, find: Find, around: tuple[str, ...] = ()) -> dict[str, Any]:
     """A message of a type, with one value in each of its arrays.
-
-    Args:
-        interface: The type.
-        find: Finds definitions.
-        around: Types that it stands in.
 
     Raises:
         KeyError: A definition is missing, or is of a message that holds itself, of which

@@ -41,11 +41,7 @@ class Interfaces:
 
     @classmethod
     def of(cls, folder: Path) -> Interfaces:
-        """Look around.
-
-        Args:
-            folder: Of the assignment.
-        """
+        """Look around."""
         files = [*resources.carried_interfaces().glob(f"*/{_MANIFEST}")]
         files += sorted((folder / FOLDER).rglob(_MANIFEST))
         try:
@@ -56,9 +52,6 @@ class Interfaces:
 
     def find(self, interface: str) -> str:
         """The text of a definition.
-
-        Args:
-            interface: Such as ``geometry_msgs/msg/Twist``.
 
         Raises:
             KeyError: There is none at hand.
@@ -104,10 +97,7 @@ def problems(
     well have it: another machine will tell.
 
     Args:
-        source: The document.
-        assignment: What was read from it.
         checks: Its checks, in order.
-        known: Definitions at hand.
     """
     handed_in = {package.name for package in assignment.packages}
     elsewhere = {name for package in assignment.packages for name in package.depends} | PACKAGES
@@ -154,8 +144,6 @@ def _circle(way: tuple[str, ...], known: Interfaces, seen: set[str]) -> tuple[st
     """The way from an interface through its fields until one comes again; nothing if none does.
 
     Args:
-        way: Interfaces, of which each has a field of the next.
-        known: Definitions at hand.
         seen: Those that lead to no circle; more are added.
     """
     try:

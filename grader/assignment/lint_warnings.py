@@ -23,7 +23,6 @@ def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterat
     """Find what an author should look at once more.
 
     Args:
-        loaded: The assignment.
         mutants: Its mutants, or None where it has no such file.
     """
     yield from _unknown_topics(loaded)

@@ -40,11 +40,8 @@ class LoadedAssignment:
     """An assignment, ready to run and to judge.
 
     Attributes:
-        assignment: The models of the YAML.
-        file: Its YAML file.
         sha256: Hash over the paths and contents of the files in its folder, as hex.
         checks: One per entry of ``checks``, in the author's order.
-        withheld: What was left out because a student does not get to see it yet.
     """
 
     assignment: Assignment
@@ -86,7 +83,6 @@ def find_assignment(name: str | Path, folder: Path | None = None) -> Path:
     """Find the YAML file of an assignment.
 
     Args:
-        name: Its id, its folder, or its YAML file.
         folder: Where ids are looked up, by default rosgrade's own assignments.
 
     Raises:
@@ -131,8 +127,6 @@ def load_assignment(
     """Load an assignment.
 
     Args:
-        name: Its id, its folder, or its YAML file.
-        catalogue: Checks by name.
         folder: Where ids are looked up, by default rosgrade's own assignments.
 
     Raises:
@@ -191,10 +185,6 @@ def _folder_name(source: Source) -> list[Problem]:
 
 def folder_sha256(folder: Path, besides: Path | None = None) -> str:
     """Hash the paths and contents of all files in a folder, hidden ones and caches left out.
-
-    Args:
-        folder: The folder.
-        besides: Whatever is below this is left out as well.
 
     Raises:
         UsageError: A file cannot be read.

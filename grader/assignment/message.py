@@ -26,11 +26,7 @@ Find = Callable[[str], str]
 
 
 class MessageError(ValueError):
-    """A value does not fit the message.
-
-    Attributes:
-        place: Steps from the message to the value.
-    """
+    """A value does not fit the message."""
 
     def __init__(self, text: str, place: Place = ()) -> None:
         """Keep where it is."""
@@ -49,12 +45,6 @@ def read_message(
 
     Args:
         value: Fields by name, nested or by path (``linear.x``, ``data[0]``).
-        interface: Such as ``geometry_msgs/msg/Twist``.
-        find: Finds definitions.
-        drawn: Random values by name, which ``$name`` stands for.
-
-    Returns:
-        Fields by name, nested, with numbers in SI units.
 
     Raises:
         MessageError: A field does not exist, or its value does not fit.

@@ -22,11 +22,7 @@ class Given:
     """A message as it was given.
 
     Attributes:
-        value: Its fields as written.
-        place: Where in the entry of the YAML it stands.
         label: Where else, such as ``cases.csv:3``; empty for the YAML itself.
-        heading: Where the names of its fields stand, if that is elsewhere.
-        time_s: When it is due after the first, where the source tells.
     """
 
     value: Mapping[str, Any]
@@ -38,23 +34,14 @@ class Given:
 
 @dataclass(frozen=True)
 class Due:
-    """A message that is to be published.
-
-    Attributes:
-        value: Its fields, checked.
-        time_s: When it is due after the first.
-    """
+    """A message that is to be published."""
 
     value: dict[str, Any]
     time_s: float
 
 
 class StimulusError(ValueError):
-    """Something about the messages of a stimulus is wrong.
-
-    Attributes:
-        place: Where in the entry of the YAML.
-    """
+    """Something about the messages of a stimulus is wrong."""
 
     def __init__(self, text: str, place: Place) -> None:
         """Keep where it is."""
@@ -66,13 +53,6 @@ def messages_of(
     publish: Publish, folder: Path, find: Find, seed: int, drawn: Mapping[str, float]
 ) -> tuple[Due, ...]:
     """Read the messages of a stimulus; one that is repeated without end is there once.
-
-    Args:
-        publish: The entry of the YAML.
-        folder: Of the assignment: files are beside its YAML.
-        find: Finds message definitions.
-        seed: Of the scenario, for an own function.
-        drawn: Random values of the scenario.
 
     Raises:
         StimulusError: A file or function is wrong, or a value does not fit the message.

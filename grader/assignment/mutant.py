@@ -89,15 +89,7 @@ class MutantFile(Model):
 def mutate(
     change: Change, files: Mapping[str, bytes]
 ) -> tuple[dict[str, bytes], list[tuple[Place, str]]]:
-    """Change the files of a reference.
-
-    Args:
-        change: A mutant or a variant.
-        files: Content by path, with forward slashes.
-
-    Returns:
-        The changed files, and what could not be changed: the place in the change and why.
-    """
+    """Change the files of a reference."""
     result = dict(files)
     problems = [
         *_edit(change, result),
@@ -157,11 +149,6 @@ def expected_statuses(
 ) -> dict[str, Status]:
     """How each check must end for a mutant or a variant.
 
-    Args:
-        assignment: With valid ``requires``.
-        change: What was changed.
-        put_right: Ids of checks that failed by a wrong name which the runs put right.
-
     Returns:
         By id of the check, in the author's order: ``failed`` for those that the mutant names,
         ``skipped`` for those that require one of them, directly or not, else ``passed``. What
@@ -195,7 +182,6 @@ class Difference:
     """A check that ended otherwise than it must.
 
     Attributes:
-        check: Its id.
         expected: How it must end.
         actual: How it ended; None where it has no result.
     """

@@ -23,14 +23,7 @@ _LEFT_OUT = {"__pycache__", "build", "install", "log"}
 
 @dataclass(frozen=True)
 class Mutants:
-    """The mutants and variants of an assignment, all of which apply to its reference.
-
-    Attributes:
-        file: The YAML file.
-        reference: Folder of the reference solution.
-        mutants: Mistakes.
-        variants: Right solutions in another style.
-    """
+    """The mutants and variants of an assignment, all of which apply to its reference."""
 
     file: Path
     reference: Path
@@ -40,10 +33,6 @@ class Mutants:
 
 def reference_of(assignment: str, folder: Path | None = None) -> Path:
     """The folder of an assignment's reference solution.
-
-    Args:
-        assignment: Its id.
-        folder: The assignment's own, which may hold a folder ``reference``.
 
     Raises:
         UsageError: It has none.
@@ -62,8 +51,6 @@ def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = 
     """Read and check the mutants of an assignment.
 
     Args:
-        assignment: Whose checks they name.
-        folder: The assignment's folder.
         reference: Folder of the reference solution, by default the one in the assignment's
             folder or rosgrade's own.
 
@@ -89,8 +76,6 @@ def apply(change: Change, reference: Path, target: Path) -> None:
     """Write a changed copy of the reference.
 
     Args:
-        change: A mutant or a variant.
-        reference: Folder of the reference solution.
         target: Folder to write; it may exist, but must be empty.
 
     Raises:

@@ -52,13 +52,7 @@ class _User:
 
 
 def need_problems(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
-    """Find what a check needs and the assignment lacks.
-
-    Args:
-        draft: The document, as far as it could be read.
-        place: Of the check.
-        bound: The check.
-    """
+    """Find what a check needs and the assignment lacks."""
     user = _User(bound, draft, draft.scenarios_of(bound.spec) or ())
     for need in bound.parameters.needs:
         for key, text in _lacks(need, user):

@@ -38,13 +38,6 @@ _FORM = re.compile(r"([A-Za-z_]\w*\.py):([A-Za-z_]\w*)")
 def load_own_check(text: str, folder: Path) -> Check:
     """Load the function that ``python:`` names.
 
-    Args:
-        text: ``file.py:function``.
-        folder: The assignment's folder.
-
-    Returns:
-        A check whose parameters are the function's arguments after the first.
-
     Raises:
         ValueError: With a message for the author, when the text has another form, the file
             is missing or fails, or the function is missing or takes other arguments.
@@ -54,10 +47,6 @@ def load_own_check(text: str, folder: Path) -> Check:
 
 def load_function(text: str, folder: Path) -> Callable[..., Any]:
     """Load a function of the author's, without looking at its arguments.
-
-    Args:
-        text: ``file.py:function``.
-        folder: The assignment's folder.
 
     Raises:
         ValueError: With a message for the author, when the text has another form, the file

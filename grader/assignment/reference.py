@@ -16,11 +16,7 @@ from grader.submission.read.manifest import MANIFEST, read_manifest
 
 
 def reference_problems(loaded: LoadedAssignment) -> Iterator[Problem]:
-    """Find what the reference lacks; nothing where there is no reference.
-
-    Args:
-        loaded: The assignment.
-    """
+    """Find what the reference lacks; nothing where there is no reference."""
     try:
         reference = reference_of(loaded.assignment.id, loaded.folder)
     except UsageError:

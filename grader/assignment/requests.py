@@ -22,11 +22,6 @@ def requests_of(
 ) -> tuple[dict[str, Any], ...]:
     """The requests of a call, in order.
 
-    Args:
-        call: The entry of the YAML.
-        find: Finds definitions.
-        drawn: Random values of the scenario.
-
     Raises:
         StimulusError: A value does not fit the request.
         KeyError: A definition is missing.
@@ -41,11 +36,6 @@ def requests_of(
 def goal_of(goal: SendGoal, find: Find, drawn: Mapping[str, float]) -> dict[str, Any]:
     """The fields of a goal.
 
-    Args:
-        goal: The entry of the YAML.
-        find: Finds definitions.
-        drawn: Random values of the scenario.
-
     Raises:
         StimulusError: A value does not fit the goal.
         KeyError: A definition is missing.
@@ -56,10 +46,6 @@ def goal_of(goal: SendGoal, find: Find, drawn: Mapping[str, float]) -> dict[str,
 def values_of(settings: SetParameters, drawn: Mapping[str, float]) -> dict[str, Any]:
     """The values that parameters are set to.
 
-    Args:
-        settings: The entry of the YAML.
-        drawn: Random values of the scenario.
-
     Raises:
         StimulusError: A value is none that a parameter can have.
     """
@@ -69,16 +55,7 @@ def values_of(settings: SetParameters, drawn: Mapping[str, float]) -> dict[str, 
 
 
 def mistakes(item: Asking, find: Find, drawn: Mapping[str, float]) -> Iterator[tuple[Place, str]]:
-    """What does not fit in a stimulus, as far as it can be told here.
-
-    Args:
-        item: The entry of the YAML.
-        find: Finds definitions.
-        drawn: Random values of the scenario.
-
-    Yields:
-        Places in the entry, with what is wrong.
-    """
+    """What does not fit in a stimulus, as far as it can be told here."""
     folders = {CallService: "srv", SendGoal: "action"}
     folder = folders.get(type(item))
     if folder is not None and f"/{folder}/" not in getattr(item, "type", ""):

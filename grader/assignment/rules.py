@@ -20,7 +20,6 @@ def problems(draft: Draft, bound: Sequence[BoundCheck | None]) -> Iterator[Probl
     """Find everything that does not fit together.
 
     Args:
-        draft: The document, as far as it could be read.
         bound: One per entry of ``checks``; None where it could not be bound.
     """
     yield from _duplicates(draft, "packages", "name")

@@ -22,11 +22,7 @@ _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, Any]:
-    """The schema of ``assignment.yaml``, with the parameters of every check.
-
-    Args:
-        catalogue: Checks by name.
-    """
+    """The schema of ``assignment.yaml``, with the parameters of every check."""
     models: list[type[Model]] = [Assignment, CheckSpec]
     models += [check.parameters for check in catalogue.values()]
     references, schema = _schemas(models)

@@ -19,7 +19,6 @@ def select(
     """Leave out what was not asked for.
 
     Args:
-        loaded: The whole assignment.
         checks: Judge only these and what they require; none means all.
         scenarios: Run only these; none means all that the checks need. A check whose
             scenarios are all left out is left out itself.

@@ -18,10 +18,6 @@ _TRIED_SEEDS = range(20)
 def read_scenario_world(file: Path, values: dict[str, str]) -> World:
     """Read a world; a scenario may have random values that its world does not use.
 
-    Args:
-        file: The world file.
-        values: Random values of the scenario, as a world file wants them.
-
     Raises:
         UsageError: The file cannot be read.
         AssignmentError: It says something that it must not.
@@ -31,12 +27,7 @@ def read_scenario_world(file: Path, values: dict[str, str]) -> World:
 
 
 def problems(source: Source, assignment: Assignment) -> Iterator[Problem]:
-    """Find what does not fit; worlds are tried with the values of several seeds.
-
-    Args:
-        source: The document.
-        assignment: What was read from it.
-    """
+    """Find what does not fit; worlds are tried with the values of several seeds."""
     told: set[str] = set()
     for index, scenario in enumerate(assignment.scenarios):
         place: Place = ("scenarios", index)

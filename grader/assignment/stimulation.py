@@ -23,11 +23,6 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
     """Find what does not fit; functions are tried with the seed 0.
 
     Fields of messages are checked where the definitions are at hand.
-
-    Args:
-        source: The document.
-        assignment: What was read from it.
-        known: Definitions at hand.
     """
     for index, scenario in enumerate(assignment.scenarios):
         names: set[str] = set()

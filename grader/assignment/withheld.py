@@ -12,12 +12,7 @@ SHOWN_FROM = tuple(Visibility)
 
 @dataclass(frozen=True)
 class Withheld:
-    """Checks that are left out, and nothing else about them.
-
-    Attributes:
-        checks: How many.
-        points: What they give together.
-    """
+    """Checks that are left out, and nothing else about them."""
 
     checks: int = 0
     points: float = 0.0

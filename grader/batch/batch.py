@@ -39,9 +39,7 @@ class Done:
     """A row that is finished.
 
     Attributes:
-        entry: The row.
         result: Its result; None where nothing could be graded.
-        fresh: Whether it was graded now, and not by an earlier batch.
     """
 
     entry: Entry
@@ -54,8 +52,6 @@ class Batch:
     """Grades the rows of a class into a folder.
 
     Attributes:
-        loaded: The assignment.
-        ledger: The folder, opened.
         retry: Keys to grade again, or ``all``, or ``errors``.
     """
 
@@ -69,13 +65,6 @@ class Batch:
         self, rows: Sequence[HandedIn], on_read: Callable[[str], None] = lambda _: None
     ) -> tuple[list[Entry], dict[str, Path]]:
         """Read what was handed in, and find the same among it.
-
-        Args:
-            rows: The class.
-            on_read: Told the key of each row.
-
-        Returns:
-            The rows, and what is to be graded by key: of the same submissions only the first.
 
         Raises:
             UsageError: A key to grade again is not there, or results are of another assignment.
@@ -112,7 +101,6 @@ class Batch:
         """Grade, and put each result into place as soon as it is there.
 
         Args:
-            to_do: What to grade, by key.
             executor: Who does it; needed where there is anything to do.
 
         Yields:
@@ -143,11 +131,7 @@ class Batch:
             self._write()
 
     def left(self, done: Iterable[Done]) -> list[Done]:
-        """What an interrupted batch has not come to, each with the grade that it still has.
-
-        Args:
-            done: What it has.
-        """
+        """What an interrupted batch has not come to, each with the grade that it still has."""
         finished = {item.entry.key for item in done}
         return [self._left(entry) for entry in self._entries.values() if entry.key not in finished]
 

@@ -27,24 +27,13 @@ _LONGEST_WHY = 200
 
 
 def notes(done: Sequence[Done]) -> dict[str, str]:
-    """What an instructor should know of each row, in a few words; empty for an ordinary one.
-
-    Args:
-        done: Every row.
-
-    Returns:
-        By key.
-    """
+    """What an instructor should know of each row, in a few words; empty for an ordinary one."""
     same = _same(done)
     return {item.entry.key: _note(item, same.get(_original(item.entry), ())) for item in done}
 
 
 def copies(done: Sequence[Done]) -> int:
-    """How many submissions are the same as another one; what a team shares is one.
-
-    Args:
-        done: Every row.
-    """
+    """How many submissions are the same as another one; what a team shares is one."""
     return sum(len({_hand(entry) for entry in same}) - 1 for same in _same(done).values())
 
 
@@ -71,7 +60,6 @@ def _note(done: Done, same: Sequence[Entry]) -> str:
     """What to say of a row.
 
     Args:
-        done: The row.
         same: All rows that have the same submission, itself and its team among them; or none.
     """
     parts = [done.entry.fault or done.entry.problem]
@@ -110,7 +98,6 @@ def class_rows(done: Sequence[Done], ledger: Ledger | None = None) -> list[Class
     """What is shown of a class, sorted by key.
 
     Args:
-        done: Every row.
         ledger: The folder of the batch, for links to reports; None where there is none.
     """
     said = notes(done)
@@ -136,15 +123,7 @@ def _report(done: Done, ledger: Ledger | None) -> str | None:
 
 
 def write_class(done: Sequence[Done], ledger: Ledger) -> Path:
-    """Write the gradebook and the overview.
-
-    Args:
-        done: Every row.
-        ledger: Where to.
-
-    Returns:
-        The overview.
-    """
+    """Write the gradebook and the overview."""
     rows = class_rows(done, ledger)
     write_whole(ledger.out / GRADES_FILE, grades_csv(rows))
     overview = ledger.out / OVERVIEW_FILE

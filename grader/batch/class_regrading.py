@@ -22,9 +22,7 @@ class Regraded:
     """A row that was judged again.
 
     Attributes:
-        done: The row with its result as it is now.
         before: Its result until now, or None.
-        changes: What changed, a line each.
         problem: Why it was not judged again although it was handed in, or empty.
     """
 
@@ -57,13 +55,8 @@ def regrade_class(
     A result that changes is kept beside the new one, in ``earlier/``.
 
     Args:
-        loaded: The assignment.
-        ledger: The batch, opened.
         only: Folder of a row's report: only that one is judged, and what is the same as it; or
             None for all.
-
-    Yields:
-        Every row.
 
     Raises:
         UsageError: The grades are of another assignment.

@@ -44,12 +44,7 @@ class LocalExecutor:
     """Threads of this process; the cells and builds below them are what takes the CPUs."""
 
     def __init__(self, grading: Grading, jobs: int) -> None:
-        """Start.
-
-        Args:
-            grading: Of the assignment.
-            jobs: Submissions at once.
-        """
+        """Start."""
         self.capacity = jobs
         self._grading = grading
         self._pool = ThreadPoolExecutor(max_workers=jobs, thread_name_prefix="submission")
@@ -103,10 +98,6 @@ class DaskExecutor:
 
     def __init__(self, address: str, order: Order) -> None:
         """Connect.
-
-        Args:
-            address: Of the scheduler, such as ``tcp://host:8786``.
-            order: What workers need to know.
 
         Raises:
             UsageError: Dask is not installed, or no scheduler answers.

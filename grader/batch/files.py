@@ -30,7 +30,6 @@ class Written:
     """What was written of a grade.
 
     Attributes:
-        report: The HTML report.
         result: What ``result.json`` says.
     """
 
@@ -44,9 +43,6 @@ def write_graded(
     """Write report and result of a submission.
 
     Args:
-        graded: What was graded.
-        folder: For ``report.html`` and ``result.json``.
-        clock: Started when grading began.
         json_file: One more place for the result, or None.
     """
     first = next(iter(graded.recordings.values()), None)
@@ -70,14 +66,6 @@ def write_report(graded: Graded, folder: Path, facts: RunFacts) -> Path:
     """Write ``report.html``, and a Foxglove layout beside the recordings.
 
     Where checks are hidden, the copy that a student may see is written too.
-
-    Args:
-        graded: What was graded.
-        folder: Of the report.
-        facts: How the grade came about.
-
-    Returns:
-        The report.
     """
     if graded.recordings and (folder / RECORDINGS_FOLDER).is_dir():
         layout = render_layout(graded.recordings.values())
@@ -101,10 +89,6 @@ def _write_student_copy(graded: Graded, file: Path, facts: RunFacts) -> None:
 def refuse_foreign(folder: Path, *, keep: bool) -> None:
     """Let no report replace recordings, or an install space, that are not of an earlier report.
 
-    Args:
-        folder: For the report.
-        keep: Whether the install space will be kept in it.
-
     Raises:
         UsageError: It would.
     """
@@ -118,10 +102,6 @@ def refuse_foreign(folder: Path, *, keep: bool) -> None:
 
 def keep_install(graded: Graded, folder: Path) -> Path | None:
     """Copy what colcon installed, so that it can be looked at and sourced.
-
-    Args:
-        graded: What was graded.
-        folder: Of the report.
 
     Returns:
         The copy, or None where nothing was built.

@@ -45,13 +45,7 @@ class Graded:
     """A graded submission with all that its grade rests on.
 
     Attributes:
-        grade: The grade.
-        prepared: The submission, built.
-        recordings: By scenario.
-        files: Recording files by scenario.
-        runs: How often each scenario was run.
         faults: Why a scenario has no recording, by scenario; ours or the machine's.
-        references: Replays of the reference solution by scenario, for the report.
     """
 
     grade: Grade
@@ -75,12 +69,6 @@ class Grading:
         seed: int | None = None,
     ) -> None:
         """Set up.
-
-        Args:
-            loaded: The assignment.
-            runner: Runs the cells.
-            cache: Folder of cached builds.
-            seed: Base of all seeds instead of the submission's hash.
 
         Raises:
             GraderFault: A library that the assignment allows is not installed here.
@@ -107,11 +95,7 @@ class Grading:
         """Grade one submission.
 
         Args:
-            path: What was handed in.
-            folder: Where the recordings go, ``<scenario>.mcap``.
-            on_build: Told the progress of the build.
             name: What to call the submission; by default after its folder or archive.
-            on_output: Told each line of the build's log.
 
         Raises:
             UsageError: There is nothing at ``path``.
@@ -176,11 +160,7 @@ class Grading:
         self._runner.close()
 
     def cancel(self) -> Runner:
-        """End every build and cell that runs, as :meth:`close` does.
-
-        Returns:
-            A runner for what is graded next, with what was warm.
-        """
+        """End every build and cell that runs, as :meth:`close` does."""
         self._stop.set()
         return self._runner.successor()
 
@@ -188,7 +168,6 @@ class Grading:
         """Run and judge a submission that is built already.
 
         Args:
-            prepared: The submission.
             folder: Where the recordings and the submission's facts go; recordings of an
                 earlier run are removed.
 

@@ -53,9 +53,7 @@ class HandedIn:
         key: What the student is called in results; unique.
         path: What was handed in, or None for nothing; those of a team have the same.
         name: The student's, as people write it, or empty.
-        late: Whether the learning platform says so.
         problem: Why there is nothing to grade, or what the instructor should look at.
-        fault: Why what was handed in could not be fetched or read.
     """
 
     key: str
@@ -68,11 +66,7 @@ class HandedIn:
 
 @dataclass(frozen=True)
 class _Entry:
-    """Something in the folder, with the names that it has for its author.
-
-    Attributes:
-        fault: Why it cannot be read.
-    """
+    """Something in the folder, with the names that it has for its author."""
 
     key: str
     path: Path
@@ -97,7 +91,6 @@ def take_in(
             of such a folder.
         staging: An empty folder for what has to be unpacked, copied together or cloned.
         roster: Who should have handed in; without one everybody who did is a row.
-        on_left_out: Told the name of each file that is taken for no submission.
         out: Folder of the results; in ``source`` it is no submission.
         on_prefix: Told what all names of repositories begin with, where what follows is taken
             for a login of the roster.
@@ -124,10 +117,8 @@ def take_in_roster(
     """Take in what a roster itself names, as paths or URLs of git repositories.
 
     Args:
-        roster: With a column ``submission``.
         base: Folder that its paths are relative to.
         staging: An empty folder for clones.
-        on_taken: Told the key of each row.
 
     Raises:
         UsageError: No row names a submission.
@@ -433,12 +424,7 @@ class _Names:
     """
 
     def __init__(self, students: Sequence[Student], entries: Sequence[_Entry]) -> None:
-        """Learn the names of a class.
-
-        Args:
-            students: Of the roster.
-            entries: What was handed in.
-        """
+        """Learn the names of a class."""
         self._alike: dict[str, list[Student]] = {}
         for student in students:
             for form in student.resembling:

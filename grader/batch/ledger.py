@@ -41,7 +41,6 @@ class Entry:
     Attributes:
         key: Of the row; names its folder.
         name: The student's, or empty.
-        late: Whether it was handed in late.
         sha256: Of the submission, or empty where there is none.
         problem: What the instructor should look at, or why there is nothing to grade.
         same_as: Key of the row with the same submission that was graded for both, or empty.
@@ -181,9 +180,6 @@ class Ledger:
         """Write down what the batch consists of.
 
         Args:
-            entries: The rows.
-            assignment: Its id.
-            assignment_sha256: Hash of its files, as hex.
             location: Where it lies; None for one of rosgrade's own.
 
         Raises:

@@ -64,14 +64,6 @@ def keep_reference(
 ) -> str:
     """Keep the runs of the reference, and say how far they are from those kept before.
 
-    Args:
-        loaded: The assignment.
-        grade: Of the reference.
-        recordings: Of the reference, by scenario id.
-
-    Returns:
-        One line for whoever recorded them.
-
     Raises:
         UsageError: The reference lost points: nothing is kept.
     """
@@ -93,10 +85,6 @@ def keep_reference(
 
 def write_references(loaded: LoadedAssignment, recordings: Mapping[str, Recording]) -> Path | None:
     """Write the file of an assignment.
-
-    Args:
-        loaded: The assignment.
-        recordings: Of the reference, by scenario id.
 
     Returns:
         The file, or None where no scenario has a robot.

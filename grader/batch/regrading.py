@@ -31,9 +31,6 @@ class Found:
 
     Attributes:
         folder: The report's folder; for single recordings the folder that they are in.
-        recordings: By scenario.
-        files: Their files.
-        submission: The facts of the submission.
         result: The result until now, or None where there is none.
     """
 
@@ -71,9 +68,6 @@ class Found:
 def find(path: Path) -> Found:
     """Find the recordings at a path.
 
-    Args:
-        path: A report folder, its folder of recordings, or one ``.mcap`` file.
-
     Raises:
         UsageError: There is nothing to judge, or a file is damaged.
     """
@@ -106,10 +100,7 @@ def stored_assignment(path: Path, name: str, location: str | None, *command: str
     """Name the assignment that something was graded with, to load it again.
 
     Args:
-        path: What was graded.
-        name: The assignment's id.
         location: Where it lay; None for one of rosgrade's own, or where it is not known.
-        command: Of rosgrade, without the assignment, for the message.
 
     Raises:
         UsageError: It is not there.
@@ -134,11 +125,6 @@ def regrade_command(path: Path, loaded: LoadedAssignment) -> str:
 
 def refuse_other(folder: Path, name: str, loaded: LoadedAssignment) -> None:
     """Let nobody lose all points because a recording is judged as of another assignment.
-
-    Args:
-        folder: With results.
-        name: Id of the assignment that they are of.
-        loaded: To judge with.
 
     Raises:
         UsageError: It is another one.

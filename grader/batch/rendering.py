@@ -85,11 +85,7 @@ def render_all(folders: Sequence[Path], assignment: str | None = None) -> Iterat
     """Render the reports of a class again, on all CPUs.
 
     Args:
-        folders: Of the reports.
         assignment: Id or folder; by default the one that each result names.
-
-    Yields:
-        The report of each folder, in their order.
 
     Raises:
         UsageError: As :func:`render_again`.
@@ -115,7 +111,6 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
     """Render the report of one submission again from its result and its recordings.
 
     Args:
-        folder: The report's folder.
         assignment: Id or folder; by default the one that the result names.
 
     Raises:

@@ -41,11 +41,6 @@ class Student:
     Attributes:
         row: Number of its line in the file, the header being 1.
         id: Or empty, as all that follow.
-        login: Login or GitHub name.
-        email: Address.
-        name: As people write it.
-        submission: Path or URL of what was handed in.
-        problem: What is wrong with the row, where it can be used all the same.
     """
 
     row: int
@@ -91,12 +86,7 @@ class Student:
 
 @dataclass(frozen=True)
 class Roster:
-    """A class.
-
-    Attributes:
-        students: In the order of the file.
-        problems: Rows that cannot be used, and why.
-    """
+    """A class."""
 
     students: tuple[Student, ...]
     problems: tuple[str, ...] = ()
@@ -166,10 +156,6 @@ def _decoded(data: bytes) -> tuple[str, tuple[str, ...]]:
 
 def parse_roster(text: str, source: str) -> Roster:
     """Read the text of a roster.
-
-    Args:
-        text: CSV.
-        source: What to call it in messages.
 
     Raises:
         UsageError: No column names a student.

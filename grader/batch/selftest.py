@@ -55,9 +55,7 @@ class Trial:
     """One submission to grade, with the outcome that it must have.
 
     Attributes:
-        role: Reference, variant, mutant or starter.
         id: ``reference``, ``starter``, or the id of the change.
-        title: One line for people.
         change: What differs from the reference; None for the reference and the starter.
     """
 
@@ -72,12 +70,7 @@ class TrialResult:
     """How a trial went, without its recordings: an assignment has a hundred trials and more.
 
     Attributes:
-        trial: Which.
         verdict: How the checks ended against how they must.
-        lost: Ids of the checks that failed.
-        graded: Whether all could be judged.
-        repeated: Whether a scenario was run more than once.
-        grade: As :func:`grader.report.model.grade_part.grade_json` writes it.
         told: What the checks said that ended otherwise than they must.
     """
 
@@ -116,11 +109,7 @@ def trials(loaded: LoadedAssignment, reference: Path | None = None) -> tuple[Tri
 
 
 def write_submission(trial: Trial, loaded: LoadedAssignment, reference: Path, folder: Path) -> Path:
-    """Make the submission of a trial.
-
-    Returns:
-        The reference itself, or the changed copy or the starter in ``folder``.
-    """
+    """Make the submission of a trial."""
     if trial.role is Role.STARTER:
         write_starter(loaded, folder / trial.id)
         return folder / trial.id
@@ -139,16 +128,7 @@ def run_trial(
     folder: Path,
     on_graded: Callable[[Graded], None] = lambda _: None,
 ) -> TrialResult:
-    """Grade one trial.
-
-    Args:
-        trial: Which.
-        loaded: The assignment.
-        grading: Grades it.
-        reference: Folder of the reference solution.
-        folder: For the submission and its recordings.
-        on_graded: Told everything that was found, which is not kept.
-    """
+    """Grade one trial."""
     submission = write_submission(trial, loaded, reference, folder / "submissions")
     graded = grading.grade(submission, folder / "recordings" / trial.id)
     on_graded(graded)
@@ -214,18 +194,10 @@ def selftest(
     """Run every trial of an assignment.
 
     Args:
-        loaded: The assignment.
-        grading: Grades submissions of it.
         jobs: Submissions at the same time; the cells are admitted by the runner.
         reference: Folder of the reference solution, by default rosgrade's own.
         keep: Where the submissions and recordings of trials go that ended otherwise than they
             must, a folder for each.
-        chosen: Leaves trials out.
-        on_start: Told when a trial begins.
-        on_graded: Told everything that was found of a trial, which is not kept.
-
-    Yields:
-        Results as they come.
     """
     base = load_mutants(loaded.assignment, loaded.folder, reference).reference
     with Scratch("selftest") as folder:
@@ -263,10 +235,6 @@ class MutationScore:
     """How well an assignment tells right from wrong.
 
     Attributes:
-        killed: Mutants that lost exactly the checks that they name.
-        mutants: All mutants.
-        accepted: Right solutions (reference and variants) with full points.
-        right: All right solutions.
         starter_right: Whether the untouched starter got as little as it must.
     """
 

@@ -21,13 +21,7 @@ class TypeSupport:
     """What the probe imports to hear and send messages of an assignment."""
 
     def __init__(self, loaded: LoadedAssignment, ros: RosInstallation, cache: Path) -> None:
-        """Set up; nothing is built yet.
-
-        Args:
-            loaded: The assignment.
-            ros: Builds with this installation.
-            cache: Folder of cached builds.
-        """
+        """Set up; nothing is built yet."""
         self._loaded = loaded
         self._ros = ros
         self._cache = cache
@@ -36,9 +30,6 @@ class TypeSupport:
 
     def prefixes(self, on_build: Callable[[str], None] = lambda _: None) -> tuple[Path, ...]:
         """Install spaces of ours for the cell; built where they are not there yet, or any more.
-
-        Args:
-            on_build: Told the progress of the build.
 
         Raises:
             GraderFault: They cannot be built here.

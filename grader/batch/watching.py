@@ -97,14 +97,7 @@ class Watching:
     def __init__(
         self, submission: Path, report: Path, worker: Worker, assignment: Path | None = None
     ) -> None:
-        """Set up; nothing is watched yet.
-
-        Args:
-            submission: A folder, or an archive that may be replaced.
-            report: Whatever is written below it is no change.
-            worker: Grades.
-            assignment: Folder of the assignment, which may be saved too.
-        """
+        """Set up; nothing is watched yet."""
         self._submission = submission
         self._report = report.resolve()
         self._assignment = assignment.resolve() if assignment is not None else None
@@ -115,9 +108,6 @@ class Watching:
 
     def events(self) -> Iterator[Began | Cancelled | Ended]:
         """Watch and grade.
-
-        Yields:
-            What happens, without end.
 
         Raises:
             GraderFault: The files cannot be watched.

@@ -33,10 +33,8 @@ class Order:
     """What every worker of a batch needs to know.
 
     Attributes:
-        assignment: Id of the assignment, or its folder.
         sha256: Of the assignment; another one on a worker is a fault.
         seed: Base of all seeds, or None.
-        sandbox: What was asked for.
     """
 
     assignment: str
@@ -49,9 +47,6 @@ def grade_into(grading: Grading, key: str, path: Path, folder: Path) -> Graded:
     """Grade a submission and write report, result and recordings.
 
     Args:
-        grading: Of its assignment.
-        key: What to call it.
-        path: What was handed in.
         folder: For everything; exists.
 
     Raises:
@@ -101,10 +96,6 @@ class Parcel:
     """A submission on its way to a worker.
 
     Attributes:
-        key: What to call it.
-        name: Of the folder or archive that was handed in.
-        content: The archive, or the folder as :func:`pack` makes it.
-        is_folder: Which of the two.
         refused: What there is instead where it cannot be read as a submission, or None.
     """
 
@@ -145,13 +136,6 @@ class Parcel:
 
 def grade_remotely(order: Order, parcel: Parcel) -> bytes:
     """Grade on a worker of a cluster.
-
-    Args:
-        order: Of the batch.
-        parcel: The submission.
-
-    Returns:
-        Report, result and recordings, packed.
 
     Raises:
         GraderFault: The worker has another version of the assignment.
@@ -200,8 +184,6 @@ def make_grading(
     """Set up grading on this machine.
 
     Args:
-        order: Of the batch.
-        loaded: Its assignment.
         admission: Of cells; by default the machine's load decides.
 
     Raises:

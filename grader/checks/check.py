@@ -29,10 +29,8 @@ class NamedFields:
 
     Attributes:
         place: Where they stand below ``with``.
-        endpoint: The topic, service or action that they are exchanged on.
         fields: What is expected of which field, nested or by path; or one path.
         part: Of the definition: 0 message, request or goal; 1 response or result; 2 feedback.
-        tolerance: Largest difference of two numbers.
     """
 
     place: tuple[str | int, ...]
@@ -64,7 +62,6 @@ class Check:
 
     Attributes:
         name: ``family.noun`` as in YAML's ``uses``.
-        subject: What it judges.
         parameters: Model of the YAML's ``with``.
         judge: The pure function: (subject, parameters) -> Finding.
     """

@@ -23,13 +23,7 @@ _DURABILITIES = ("volatile", "transient_local")
 
 @dataclass(frozen=True)
 class DeclaredTimer:
-    """A timer as the process created it.
-
-    Attributes:
-        period_s: Its period.
-        declared_ns: When the probe read of it.
-        callback: Qualified name of what it calls.
-    """
+    """A timer as the process created it."""
 
     period_s: float
     declared_ns: int
@@ -68,12 +62,7 @@ def never_spun(recording: Recording, process: str | None = None) -> bool:
 
 
 def in_no_executor(recording: Recording, node: str) -> bool:
-    """Whether the process of a node spun, but gave this node to no executor.
-
-    Args:
-        recording: The run.
-        node: Fully qualified name.
-    """
+    """Whether the process of a node spun, but gave this node to no executor."""
     process = process_of(recording, node)
     if process is None or not declares(recording, "node", "node", node):
         return False
@@ -176,12 +165,6 @@ def left_open(recording: Recording, kind: Kind, topic: str, node: str) -> frozen
 
     DDS shows only what this came to with those who were there. Of several endpoints of the node
     on the topic, a policy counts if each of them left it open.
-
-    Args:
-        recording: The run.
-        kind: Of the endpoint.
-        topic: Its topic.
-        node: Its node's fully qualified name.
     """
     own = [
         item.data
@@ -218,10 +201,6 @@ def why_undeclared(recording: Recording, what: str) -> Cause:
 
     The tracer is in each program of Python that is started by its entry point, and in the Python
     programs that this one starts.
-
-    Args:
-        recording: The run.
-        what: A publisher or a subscription, in words.
     """
     seen = f"the process did not declare {what}"
     compiled = any(item.build_type == "ament_cmake" for item in recording.submission.packages)
@@ -238,12 +217,7 @@ def why_undeclared(recording: Recording, what: str) -> Cause:
 
 
 def why_never_appeared(recording: Recording, what: str) -> Cause:
-    """Why what the process declared is not in the ROS graph.
-
-    Args:
-        recording: The run.
-        what: A node or an endpoint, in words.
-    """
+    """Why what the process declared is not in the ROS graph."""
     seen = f"the process declared {what}, but it never appeared in the ROS graph"
     changed = sorted({_text(item.data, "changed") or "" for item in recording.declared("init")})
     names = [name for text in changed for name in text.split()]

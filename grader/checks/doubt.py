@@ -17,12 +17,7 @@ _LOST_S = 0.5
 
 
 def is_doubtful(recording: Recording, doubt: Doubt | None) -> bool:
-    """Whether the failure of a check may be an accident of its run.
-
-    Args:
-        recording: The run.
-        doubt: What makes the check's failure doubtful, beside a process that was killed.
-    """
+    """Whether the failure of a check may be an accident of its run."""
     return _was_signalled(recording) or (
         _was_out_of_hand(recording)
         if doubt is Doubt.STEERING_HELD_UP

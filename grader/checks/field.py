@@ -31,10 +31,6 @@ FieldPath = Annotated[str, AfterValidator(_field_path)]
 def value_at(message: Mapping[str, Any], path: str) -> Any:
     """The plain value in a field of a message.
 
-    Args:
-        message: Fields by name.
-        path: Names with dots between them, indices of arrays in brackets, counted from 0.
-
     Raises:
         NoSuchField: The message has no such field, or it holds other fields.
     """
@@ -62,10 +58,6 @@ def value_at(message: Mapping[str, Any], path: str) -> Any:
 
 def number_at(message: Mapping[str, Any], path: str) -> float:
     """The number in a field of a message.
-
-    Args:
-        message: Fields by name.
-        path: As for :func:`value_at`.
 
     Raises:
         NoSuchField: The message has no such field, or it holds no number.

@@ -81,13 +81,7 @@ def _is_default(value: Any) -> bool:
 
 
 def fields_hint(what: str, value: Mapping[str, Any], wrong: Sequence[str]) -> str:
-    """What to try where fields are wrong.
-
-    Args:
-        what: That has the fields: a ``response`` or a ``result``.
-        value: It, with all of its fields.
-        wrong: The wrong fields.
-    """
+    """What to try where fields are wrong."""
     if all(_is_default(item) for _, item in _plain(value)):
         return (
             f"Set the fields of the {what} in the callback, and return it: it came as a new one "

@@ -22,12 +22,7 @@ class UnknownValue(ValueError):
     """A check names a random value that its scenario does not have."""
 
     def __init__(self, name: str, values: Mapping[str, float]) -> None:
-        """Name the value, and the nearest that there is.
-
-        Args:
-            name: What the check names.
-            values: Those of the scenario.
-        """
+        """Name the value, and the nearest that there is."""
         listed = f" There are: {', '.join(sorted(values))}." if values else " It has none."
         super().__init__(
             f"the scenario has no random value {name!r}." + (did_you_mean(name, values) or listed)
@@ -36,10 +31,6 @@ class UnknownValue(ValueError):
 
 def resolve(reference: float | str, values: Mapping[str, float]) -> float:
     """The number that a parameter stands for.
-
-    Args:
-        reference: A number in SI units, or a name.
-        values: Random values of the scenario by name, in SI units.
 
     Raises:
         UnknownValue: There is no value of this name.
@@ -68,9 +59,6 @@ class Goal:
     def pose(self, values: Mapping[str, float]) -> Pose:
         """The same in numbers, in the world's frame.
 
-        Args:
-            values: Random values of the scenario by name, in SI units.
-
         Raises:
             UnknownValue: It names a value that is not among them.
         """
@@ -80,12 +68,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class _Reference:
-    """Pydantic annotation: a quantity or a name.
-
-    Attributes:
-        dimension: Of the quantity.
-        bare: Whether a number without a unit is one in SI units.
-    """
+    """Pydantic annotation: a quantity or a name."""
 
     dimension: Dimension
     bare: bool = False

@@ -37,9 +37,6 @@ class TimeTolerance:
 def parse_time_tolerance(text: Any) -> TimeTolerance:
     """Read a tolerance of a time.
 
-    Args:
-        text: ``5 %``, ``0.05`` or ``15 ms``.
-
     Raises:
         ValueError: It is negative, or neither a ratio nor a time.
     """

@@ -29,8 +29,6 @@ class Difference:
 
     Attributes:
         field: Path such as ``linear.x`` or ``data[2]``.
-        expected: What it should be.
-        observed: What it is.
     """
 
     field: str
@@ -56,13 +54,6 @@ def leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> dict[str, Any]:
     """Flatten an expected value by the fields that a message has.
-
-    Args:
-        expected: Nested (``{linear: {x: 1.0}}``) or by path (``{linear.x: 1.0}``).
-        message: Any message of the type.
-
-    Returns:
-        Path -> expected value. A list stays one value, for its length is expected too.
 
     Raises:
         NoSuchField: A name is not a field of the message, or its value has another kind.
@@ -104,13 +95,7 @@ def _other_kind(item: Any, value: Any) -> str:
 
 
 def unreachable(expected: Any, sample: Any, tolerance: float) -> str:
-    """Why a field can never have an expected value, to follow its name; nothing if it can.
-
-    Args:
-        expected: The value.
-        sample: A value of the field's type, as its definition has it.
-        tolerance: Largest difference of two numbers.
-    """
+    """Why a field can never have an expected value, to follow its name; nothing if it can."""
     if _kind(expected) != _kind(sample):
         return _other_kind(expected, sample)
     items, samples = _items(expected), _items(sample)
@@ -139,8 +124,6 @@ def differences(
     """Fields of a message that have not the expected value.
 
     Args:
-        expected: From :func:`expected_leaves`.
-        message: The message.
         rest_zero: Whether every field that is not expected to be something must be zero,
             false or empty.
         tolerance: Largest absolute difference of two numbers.

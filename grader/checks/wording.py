@@ -36,11 +36,7 @@ def counted(number: int, noun: str, plural: str | None = None) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Write a value of a message field exactly, so that two different ones never look alike.
-
-    Returns:
-        Text, long values shortened to their beginning.
-    """
+    """Write a value of a message field exactly, so that two different ones never look alike."""
     if isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, float):

@@ -15,11 +15,7 @@ Narrate = Callable[[str, Mapping[str, Any]], None]
 
 
 def while_it_starts(narrate: Narrate) -> Narrate:
-    """Prepare for reading and reporting at the first launch that is told.
-
-    Args:
-        narrate: What else is told of everything.
-    """
+    """Prepare for reading and reporting at the first launch that is told."""
     begun = threading.Event()
 
     def tell(scenario: str, event: Mapping[str, Any]) -> None:

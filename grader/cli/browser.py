@@ -14,11 +14,7 @@ _SETTLED_S = 2.0
 
 
 def open_page(url: str) -> None:
-    """Open a page, or say that it has to be opened by hand.
-
-    Args:
-        url: Of the page.
-    """
+    """Open a page, or say that it has to be opened by hand."""
     if not _is_there():
         print_warning(f"--open: there is no browser on this machine; the page is {url}")
         return

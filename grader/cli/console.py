@@ -40,11 +40,7 @@ class Progress:
     """What happens at the moment: a line that is overwritten on a terminal, else plain lines."""
 
     def __init__(self, quiet: bool = False) -> None:
-        """Prepare.
-
-        Args:
-            quiet: Say nothing at all.
-        """
+        """Prepare."""
         self._quiet = quiet
         self._status: object | None = None
         self._last = ""

@@ -58,12 +58,8 @@ class Formats:
     """What to write, and where to.
 
     Attributes:
-        junit: JUnit XML.
-        junit_family: Its dialect.
-        markdown: Markdown of the student's copy.
         gradescope: ``results.json``.
         gradescope_metadata: ``submission_metadata.json``.
-        github: Whether GitHub Actions reads the output.
         classroom50: Whether Classroom 50 started this.
     """
 
@@ -111,10 +107,6 @@ class Formats:
 
     def write(self, result: Result, submission: Path | None = None) -> None:
         """Write everything that was asked for.
-
-        Args:
-            result: The whole result.
-            submission: What was graded, for the places that annotations point to.
 
         Raises:
             UsageError: A file cannot be read or written.

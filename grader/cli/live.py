@@ -29,11 +29,7 @@ class ScenarioActivity:
     """Where one scenario is.
 
     Attributes:
-        doing: In a few words.
         since_s: When recording began, by the monotonic clock; None before and after.
-        limit_s: How long recording may take.
-        messages: How many have come.
-        done: Whether it is over.
     """
 
     doing: str = ""
@@ -69,13 +65,7 @@ class ScenarioActivity:
 
 @dataclass
 class Activity:
-    """Where a grading is: reading and building, then its scenarios.
-
-    Attributes:
-        doing: What is done besides the scenarios.
-        scenarios: By id, in the order in which they began.
-        since_s: Since when it is done, by the monotonic clock.
-    """
+    """Where a grading is: reading and building, then its scenarios."""
 
     doing: str = ""
     scenarios: dict[str, ScenarioActivity] = field(default_factory=dict)
@@ -112,12 +102,7 @@ class GradingProgress(Progress):
     """Shows on standard error what a grading does."""
 
     def __init__(self, quiet: bool = False, verbose: bool = False) -> None:
-        """Prepare.
-
-        Args:
-            quiet: Say nothing at all.
-            verbose: Also show the build's log and what the student's processes print.
-        """
+        """Prepare."""
         super().__init__(quiet)
         self._verbose = verbose
         self._activity = Activity()
@@ -176,12 +161,7 @@ class GradingProgress(Progress):
             self._print(text)
 
     def narrate(self, scenario: str, event: Mapping[str, Any]) -> None:
-        """Tell what a cell does, in a student's words.
-
-        Args:
-            scenario: Its scenario.
-            event: What it told.
-        """
+        """Tell what a cell does, in a student's words."""
         if event["event"] == "printed":
             self.output(f"{scenario} {event['process']}", event["text"])
             return
@@ -192,12 +172,7 @@ class GradingProgress(Progress):
             self._print(f"{scenario}: {now}")
 
     def output(self, source: str, line: str) -> None:
-        """Show a line that the build or a process of the student printed, where that is wanted.
-
-        Args:
-            source: Who printed it.
-            line: The line.
-        """
+        """Show a line that the build or a process of the student printed, where that is wanted."""
         if not self._verbose or self._quiet:
             return
         from rich.text import Text

@@ -23,13 +23,7 @@ _NOT_YET = b"The first report comes soon."
 
 @dataclass(frozen=True)
 class PageState:
-    """What the page shows around the report.
-
-    Attributes:
-        version: Counts the reports.
-        title: Of the tab.
-        told: One line above the report.
-    """
+    """What the page shows around the report."""
 
     version: int = 0
     title: str = "rosgrade watch"
@@ -69,13 +63,7 @@ class ReportPage:
         return f"{ADDRESS}:{self._server.server_address[1]}"
 
     def tell(self, told: str, title: str, *, is_new: bool = False) -> None:
-        """Let every open page show something.
-
-        Args:
-            told: One line.
-            title: Of the tab.
-            is_new: Whether the report was written anew.
-        """
+        """Let every open page show something."""
         with self._changed:
             self._state = PageState(self._state.version + is_new, title, told)
             self._changed.notify_all()

@@ -55,8 +55,6 @@ class ClassProgress:
         """Begin a piece of work.
 
         Args:
-            work: One word, such as ``grading``.
-            total: How many there are.
             already: How many of them were done before; they say nothing of the pace.
         """
         self._work, self._total, self._count, self._fresh = work, total, 0, 0
@@ -70,13 +68,7 @@ class ClassProgress:
             print(f"rosgrade: {work} {total}{before}", file=sys.stderr, flush=True)
 
     def advance(self, name: str, said: str = "", *, fresh: bool = True) -> None:
-        """One more is done.
-
-        Args:
-            name: Of it.
-            said: What came of it, worth a line where lines stay.
-            fresh: Whether it took any work now.
-        """
+        """One more is done."""
         self._count += 1
         self._fresh += fresh
         if self._bar is not None and self._task is not None:

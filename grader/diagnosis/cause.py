@@ -12,9 +12,6 @@ class Cause:
     """What several checks say in the same words when the same thing went wrong.
 
     Attributes:
-        observed: What was seen instead.
-        hint: What to try next.
-        evidence: Where it can be seen.
         ours: Not the student's fault, or it cannot be told: the finding is an error.
         disturbed: The run is worth repeating: the machine has, or may have, a part in it.
     """

@@ -31,9 +31,6 @@ def explain(
 
     Args:
         wrong: At least one difference.
-        observed: All leaves of the message.
-        tolerance: As for the comparison.
-        always: No other message is right.
 
     Returns:
         A clause such as ``linear.x and angular.z are swapped``, or an empty text.

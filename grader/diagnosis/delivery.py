@@ -21,12 +21,7 @@ _PROMISES = ("deadline", "liveliness")
 
 
 def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
-    """Why no message on a topic can have reached the student, or None if it must have.
-
-    Args:
-        recording: A run in which the cell publishes on the topic.
-        topic: Fully qualified topic name.
-    """
+    """Why no message on a topic can have reached the student, or None if it must have."""
     cause = why_no_endpoint(recording, Kind.SUBSCRIPTION, topic)
     if cause is not None:
         return cause
@@ -55,12 +50,7 @@ def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
 
 
 def why_not_sent(recording: Recording, topic: str) -> Cause:
-    """Why a stimulus published nothing: no subscription of the student's could get it, or ours.
-
-    Args:
-        recording: A run in which the probe should have published on the topic.
-        topic: Fully qualified topic name.
-    """
+    """Why a stimulus published nothing: no subscription of the student's could get it, or ours."""
     return why_not_delivered(recording, topic) or Cause.to_repeat(
         f"nothing was sent on {code(topic)}"
     )
@@ -68,11 +58,6 @@ def why_not_sent(recording: Recording, topic: str) -> Cause:
 
 def why_no_history(recording: Recording, topic: str, seen: str) -> Cause | None:
     """Why the student does not get what the probe published before the launch.
-
-    Args:
-        recording: A run in which the probe's publisher keeps messages for late joiners.
-        topic: Fully qualified topic name.
-        seen: What is missing, in words.
 
     Returns:
         The policy that stands against it, or None if there is none.

@@ -25,9 +25,6 @@ def why_unsubscribed(
     """The cause if the student's code destroyed its subscriptions to a topic, or None.
 
     Args:
-        recording: The run.
-        topic: Fully qualified topic name.
-        seen: What came of it, in words.
         sent_ns: When something was sent that they did not get; by default any time will do.
     """
     subscriptions = recording.student_endpoints(Kind.SUBSCRIPTION, topic)
@@ -48,12 +45,6 @@ def why_destroyed(
     """The cause if the student's code destroyed all of some endpoints, services or actions.
 
     What vanished with its process, or because the scenario ended that, was not destroyed.
-
-    Args:
-        recording: The run.
-        seen: What came of it, in words.
-        what: They, in words, such as ``the service `/add```.
-        items: They.
     """
     found = tuple(items)
     ends = [item.vanished_ns for item in found if item.vanished_ns is not None]

@@ -26,9 +26,6 @@ def explain(printed: Sequence[float], wanted: Wanted, missing: Sequence[str], de
     """Say in a clause what a line shows instead of the values, or nothing.
 
     Args:
-        printed: Numbers of the line.
-        wanted: The message, and the values that the line should show.
-        missing: Those of its fields that it does not show.
         decimals: How many decimals must be right.
 
     Returns:

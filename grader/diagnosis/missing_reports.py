@@ -49,10 +49,6 @@ def why_reports_are_missing(
     """Why a callback did not report enough complete runs, or None if all did.
 
     Args:
-        recording: The run.
-        topic: Where they should report.
-        callbacks: Their names.
-        reports: What was reported there.
         at_least: How many complete runs each must have.
     """
     messages = recording.on(topic)

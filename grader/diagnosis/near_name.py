@@ -13,12 +13,7 @@ from grader.spec.nearest_name import nearest
 
 @dataclass(frozen=True)
 class Named:
-    """Something of the student's that is there under another name.
-
-    Attributes:
-        name: Fully qualified.
-        node: Fully qualified name of its node.
-    """
+    """Something of the student's that is there under another name."""
 
     name: str
     node: str
@@ -27,15 +22,7 @@ class Named:
 def why_misnamed(
     wanted: str, there: Iterable[Named], does: str, write: str, evidence: Evidence
 ) -> Cause | None:
-    """Why nothing has the wanted name, if something has nearly that name.
-
-    Args:
-        wanted: Fully qualified.
-        there: What the student has of the kind.
-        does: What is true of a name of these, such as ``the node publishes on``.
-        write: Where to write the last part of the wanted name, as the hint.
-        evidence: Of the cause.
-    """
+    """Why nothing has the wanted name, if something has nearly that name."""
     names = tuple(there)
     for item in names:
         told = _same_but_for_its_place(wanted, item)

@@ -37,12 +37,6 @@ def why_unanswered(
     """Why an answer did not come in time.
 
     Args:
-        recording: The run.
-        what: That it was not, in words.
-        server: Which kind of server should have answered.
-        name: Its fully qualified name.
-        asked_ns: When it was asked.
-        within_s: How soon the answer was due.
         while_busy: What is said of an executor that does not come round, or does not tell; by
             default in general words.
     """
@@ -86,13 +80,7 @@ def why_unanswered(
 
 
 def why_gone(recording: Recording, what: str, node: str) -> Cause | None:
-    """Why the process of a node ended early, or None if it did not.
-
-    Args:
-        recording: The run.
-        what: What came of it, in words.
-        node: Fully qualified name.
-    """
+    """Why the process of a node ended early, or None if it did not."""
     process = declarations.process_of(recording, node)
     ended = exited(recording) if process is None else (process,)
     if ended and ended_early(recording, ended[0]):
@@ -106,13 +94,6 @@ def why_taken(
     """The machine's doing, if it took as much as something was too late; else None.
 
     An answer that never came was not due where the observation ended before its time.
-
-    Args:
-        recording: The run.
-        what: That it was too late, in words.
-        begin_ns: When it was asked for.
-        end_ns: When it came, or when the observation ended.
-        within_s: How long it may have taken.
     """
     stolen_s = recording.stolen_s(begin_ns, end_ns)
     excess_s = (end_ns - begin_ns) / NS - within_s
@@ -127,12 +108,7 @@ def why_taken(
 
 
 def why_one_cpu(recording: Recording, what: str) -> Cause | None:
-    """The cause if an executor of several threads has one only because the machine has one CPU.
-
-    Args:
-        recording: The run.
-        what: What came of it, in words.
-    """
+    """The cause if an executor of several threads has one only because the machine has one CPU."""
     spins = [item.data for item in recording.declared("spin")]
     alone = any(item.get("executor") == _MULTI and item.get("threads") == 1 for item in spins)
     one_cpu = recording.environment.get("cpus", "1") == "1"
@@ -152,9 +128,6 @@ def why_raised(
     """An exception that a process printed and survived from a time on; None if there is none.
 
     Args:
-        recording: The run.
-        what: What came of it, in words.
-        begin_ns: From when on.
         processes: Whose; by default all.
     """
     candidates = recording.processes if processes is None else processes
@@ -189,12 +162,7 @@ def _why_raised_in(
 
 
 def why_never_awaited(recording: Recording, what: str) -> Cause | None:
-    """A coroutine that was made but never run, as Python warns; None if there is no such warning.
-
-    Args:
-        recording: The run.
-        what: What came of it, in words.
-    """
+    """A coroutine that was made but never run, as Python warns; None without such a warning."""
     for line in recording.log:
         found = _NEVER_AWAITED.search(line.text) if line.stream == "stderr" else None
         if found:

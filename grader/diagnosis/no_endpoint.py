@@ -29,13 +29,7 @@ _OTHER = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.SUBSCRIPTION: Kind.PUBLISHER}
 
 
 def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | None:
-    """Why the student has no such endpoint on a topic, or None if there is one.
-
-    Args:
-        recording: The run.
-        kind: Publisher or subscription.
-        topic: Fully qualified topic name.
-    """
+    """Why the student has no such endpoint on a topic, or None if there is one."""
     if recording.student_endpoints(kind, topic):
         return None
     if kind is Kind.PUBLISHER and _only_students_publish(recording, topic):
@@ -84,11 +78,6 @@ def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | Non
 
 def misnamed(recording: Recording, kind: Kind, topic: str) -> str:
     """The remapping rule for the one endpoint of the right type on a topic that nobody else has.
-
-    Args:
-        recording: A run without such an endpoint on the topic.
-        kind: Publisher or subscription.
-        topic: What it should be called.
 
     Returns:
         Such as ``/cmdvel:=/cmd_vel``; empty where there is no such endpoint, or more than one, or

@@ -40,11 +40,6 @@ def why_not_logged(
     """Why fewer messages than needed were followed by log lines with their values.
 
     Args:
-        recording: The run.
-        topic: Fully qualified topic name.
-        wanted: What the log should show, by message.
-        found: Messages that were followed, too few.
-        needed: How many there should have been.
         decimals: How many decimals must be right.
         within_ns: How soon after its message a line must have come.
     """

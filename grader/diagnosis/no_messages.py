@@ -38,12 +38,7 @@ _OWN_S = 2.0
 
 
 def why_silent(recording: Recording, topic: str) -> Cause:
-    """Why nothing was recorded on a topic.
-
-    Args:
-        recording: A run without a message on the topic.
-        topic: Fully qualified topic name.
-    """
+    """Why nothing was recorded on a topic."""
     cause = why_no_endpoint(recording, Kind.PUBLISHER, topic)
     if cause is not None:
         return cause
@@ -102,13 +97,7 @@ def why_unreadable(recording: Recording, topic: str) -> Cause | None:
 
 
 def why_few(recording: Recording, topic: str, needed: int) -> Cause:
-    """Why fewer messages than needed were recorded on a topic.
-
-    Args:
-        recording: The run.
-        topic: Fully qualified topic name.
-        needed: How many messages there should have been, more than there are.
-    """
+    """Why fewer messages than needed were recorded on a topic."""
     messages = recording.on(topic)
     if not messages:
         return why_silent(recording, topic)

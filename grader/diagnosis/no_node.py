@@ -29,12 +29,7 @@ def why_no_node(recording: Recording) -> Cause | None:
 
 
 def why_not_node(recording: Recording, name: str) -> Cause | None:
-    """Why a certain node did not appear, or None if it did.
-
-    Args:
-        recording: The run.
-        name: Fully qualified node name.
-    """
+    """Why a certain node did not appear, or None if it did."""
     names = [node.name for node in recording.student_nodes]
     if name in names:
         return None

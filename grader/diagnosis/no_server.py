@@ -40,10 +40,8 @@ class Word:
     """How a thing that is offered is called, and made.
 
     Attributes:
-        article: Of the noun.
         noun: ``service`` or ``action``.
         create: The code that makes one; ``{type}`` and ``{name}`` stand for its own.
-        folder: Module of its interfaces.
     """
 
     article: str
@@ -97,9 +95,6 @@ def is_offered(recording: Recording, word: Word, name: str, interface: str | Non
     """The finding of a check that a node of the student offers a service or action.
 
     Args:
-        recording: The run.
-        word: What it is.
-        name: Fully qualified.
         interface: Its type, or None where any will do.
     """
     expected = f"{word.article} {word.noun} {code(name)}"
@@ -127,9 +122,6 @@ def why_not_offered(
     """Why no node of the student offers a service or action, or None if one does.
 
     Args:
-        recording: The run.
-        word: What it is.
-        name: Fully qualified.
         interface: Its type, or None where any will do.
     """
     there = _of_students(recording, word)
@@ -174,15 +166,7 @@ def why_not_offered(
 
 
 def why_not_met(recording: Recording, word: Word, name: str, what: str, asked_ns: int) -> Cause:
-    """Why something that was offered could not be asked.
-
-    Args:
-        recording: The run.
-        word: What it is.
-        name: Fully qualified.
-        what: What could not be done, in words.
-        asked_ns: When that was noted.
-    """
+    """Why something that was offered could not be asked."""
     items = offered(recording, word, name)
     return why_destroyed(recording, f"it {what}", f"the {word.noun} {code(name)}", items) or Cause(
         f"the {word.noun} {code(name)} {what}: it was there, but no client with the usual QoS met "

@@ -52,13 +52,7 @@ def used_packages(interface: InterfaceName, definition: Definition) -> tuple[str
 def why_not_generated(
     submission: SubmissionRecord, interface: InterfaceName, definition: Definition
 ) -> Cause | None:
-    """Why the build made no code for an interface, or None if it did.
-
-    Args:
-        submission: What was handed in.
-        interface: What should have been generated.
-        definition: The student's definition of it.
-    """
+    """Why the build made no code for an interface, or None if it did."""
     cause = why_no_package(submission, interface.package)
     if cause is not None:
         return cause

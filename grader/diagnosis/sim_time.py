@@ -18,10 +18,6 @@ def why_time_stands_still(recording: Recording, what: str) -> Cause | None:
 
     A node subscribes to ``/clock`` if its parameter ``use_sim_time`` is true, and only then (see
     "Clock and Time" in the design documents of ROS 2).
-
-    Args:
-        recording: The run.
-        what: What came of it, in words.
     """
     listeners = recording.student_endpoints(Kind.SUBSCRIPTION, _CLOCK)
     told = any(item.topic == _CLOCK and item.kind is Kind.PUBLISHER for item in recording.endpoints)

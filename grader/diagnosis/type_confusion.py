@@ -26,12 +26,7 @@ _SUFFIXES = {
 
 
 def explain(expected: str, found: str) -> str:
-    """Say in a clause how the two types are related, or nothing.
-
-    Args:
-        expected: Interface name, such as ``geometry_msgs/msg/Twist``.
-        found: The other one.
-    """
+    """Say in a clause how the two types are related, or nothing."""
     wanted, other = expected.rpartition("/")[2], found.rpartition("/")[2]
     if wanted == other:
         return f"the same short name, but of the package {code(found.partition('/')[0])}"

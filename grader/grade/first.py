@@ -40,12 +40,6 @@ def reason(check: str, scenario: str | None, observed: str, evidence: _Evidence)
 
     That is the same line of the student's code, in whichever run, or the same said of the same
     moment of a run. What names neither, or only a file, is a mistake of its own.
-
-    Args:
-        check: Its id.
-        scenario: The run that decided.
-        observed: What it says of it.
-        evidence: Where that can be seen.
     """
     if evidence.places and all(one.line is not None for one in evidence.places):
         return tuple((one.file, one.line, one.message) for one in evidence.places)
@@ -67,7 +61,6 @@ def first_to_fix(
 
     Args:
         reasons: Why each check failed, in the author's order; for the same reason, equal.
-        waits: Of each check that was skipped, those that it waits for.
         without_points: Checks that are worth none.
 
     Returns:

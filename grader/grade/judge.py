@@ -45,13 +45,7 @@ def grade(
     is an error of ours and keeps its traceback.
 
     Args:
-        loaded: The assignment with its checks.
-        submission: What was handed in.
         recordings: By scenario id; empty where nothing could be launched.
-        faults: Why a scenario has no recording, through no fault of the student's, by its id.
-
-    Returns:
-        The grade, with one result per check in the author's order.
 
     Raises:
         ValueError: A requirement does not exist, or the requirements form a circle.

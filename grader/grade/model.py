@@ -23,7 +23,6 @@ class ScenarioFinding:
     Attributes:
         scenario: Id of the scenario; None for the submission itself, and for a check that
             was skipped.
-        finding: What the check said.
         traceback: Where the check itself failed, for the instructor; else empty.
     """
 
@@ -37,16 +36,9 @@ class CheckResult:
     """What one check said in all its scenarios.
 
     Attributes:
-        id: Its id in the assignment.
-        title: One line for the student.
-        status: The worst of its findings.
         points: Earned, in [0, max_points].
-        max_points: For passing.
-        visibility: When the student gets to see it.
         scenarios: Ids of the scenarios that it judges; empty for the submission itself.
         findings: One per scenario in the assignment's order, at least one in all.
-        waits_for: Ids of the failed or errored checks at the bottom of a skip.
-        hint: The author's own hint.
         put_right: It failed by a wrong name that the runs put right, so nothing waits for it.
     """
 
@@ -82,10 +74,6 @@ class Grade:
     """The grade of one submission.
 
     Attributes:
-        assignment: What was asked for.
-        assignment_sha256: Hash of its files, as hex.
-        submission: What was handed in.
-        results: One per check, in the author's order.
         withheld: Checks that were not judged because a student does not get to see them yet.
         assignment_location: Where the assignment lies; None for one of rosgrade's own.
     """

@@ -9,12 +9,6 @@ from heapq import heapify, heappop, heappush
 def dependency_order(requires: Mapping[str, Sequence[str]]) -> tuple[str, ...]:
     """Sort checks so that each comes after all that it requires.
 
-    Args:
-        requires: Id of each check, in the author's order, with the ids that it requires.
-
-    Returns:
-        All ids. Of those that could come next, the one that the author wrote first does.
-
     Raises:
         ValueError: A requirement does not exist, or checks require each other in a circle.
     """

@@ -12,10 +12,6 @@ from grader.submission.record import SubmissionRecord
 def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Finding | None:
     """Say why nothing of a submission could be launched: one cause, the deepest.
 
-    Args:
-        submission: What is known of it.
-        packages: What is launched, and what else the assignment asks for.
-
     Returns:
         A finding, or None where every package was built: then it should have been run, and
         the missing recording is a fault of ours.
@@ -33,11 +29,6 @@ def why_incomplete(
     submission: SubmissionRecord, packages: Iterable[str], expected: str
 ) -> Finding | None:
     """Say what this machine lacks for something that a scenario launches.
-
-    Args:
-        submission: What is known of it.
-        packages: What is launched.
-        expected: What was expected of the run.
 
     Returns:
         An error, or None where the scenario could run as it would anywhere else.

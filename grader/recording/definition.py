@@ -21,9 +21,6 @@ _PRIMITIVES = frozenset(
 def definition_finder(prefixes: Iterable[Path]) -> Callable[[str], str]:
     """Make a function that reads ``.msg`` files from install prefixes.
 
-    Args:
-        prefixes: ament prefixes, the first wins.
-
     Returns:
         A function from ``package/msg/Name`` (or ``srv``, ``action``) to the file's text; KeyError
         if there is none.
@@ -43,10 +40,6 @@ def definition_finder(prefixes: Iterable[Path]) -> Callable[[str], str]:
 
 def concatenated_definition(interface: str, find: Callable[[str], str]) -> str:
     """Definition of a message with all that it contains.
-
-    Args:
-        interface: Such as ``geometry_msgs/msg/Twist``.
-        find: From ``package/msg/Name`` to the text of its ``.msg`` file.
 
     Raises:
         KeyError: A definition is missing.

@@ -14,13 +14,6 @@ from grader.recording.model import Recording
 def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
     """Read the messages that the probe or the simulator published.
 
-    Args:
-        file: The recording's file.
-        recording: What it holds.
-
-    Returns:
-        In the order of their source timestamps.
-
     Raises:
         UsageError: The file cannot be read.
     """

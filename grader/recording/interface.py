@@ -44,9 +44,7 @@ class Field:
     """One field of a message.
 
     Attributes:
-        name: Its name.
         type: ``float64``, ``string``, ... or the full name of a message.
-        is_array: Whether it holds several values.
         count: Values of an array of fixed size, or None.
         most: Largest number of values of a bounded array, or None.
         longest: Largest length of a bounded text, or None.
@@ -86,7 +84,6 @@ class Constant:
     """One constant of a message.
 
     Attributes:
-        name: Its name.
         type: ``uint8``, ``string``, ...
         value: What stands behind the equals sign; a number as Python writes it.
     """
@@ -106,7 +103,6 @@ class Section:
 
     Attributes:
         fields: In their order, which is the order of the bytes too.
-        constants: In their order, which means nothing.
         lines: Name of each of them -> its line in the definition, from 1.
     """
 
@@ -121,10 +117,6 @@ class Section:
 
 def sections_of(interface: str, text: str) -> tuple[Section, ...]:
     """The parts of a definition: one of a message, two of a service, three of an action.
-
-    Args:
-        interface: Such as ``geometry_msgs/msg/Twist``.
-        text: Of its ``.msg``, ``.srv`` or ``.action`` file.
 
     Raises:
         DefinitionError: A line of it cannot be read.
@@ -151,12 +143,7 @@ def sections_of(interface: str, text: str) -> tuple[Section, ...]:
 
 
 def fields_of(interface: str, text: str) -> dict[str, Field]:
-    """The fields of a message by name, in their order; constants are none.
-
-    Args:
-        interface: Such as ``geometry_msgs/msg/Twist``.
-        text: Of its ``.msg`` file.
-    """
+    """The fields of a message by name, in their order; constants are none."""
     package = interface.partition("/")[0]
     read = (_read(line.partition("#")[0].strip(), package) for line in text.splitlines())
     return {found.name: found for found in read if isinstance(found, Field)}

@@ -40,9 +40,6 @@ def get_ready() -> None:
 def read_recording(file: Path) -> Recording:
     """Read a recording.
 
-    Args:
-        file: An MCAP file that :func:`~grader.recording.mcap_writer.write_recording` made.
-
     Raises:
         UsageError: The file is missing, damaged, or not a recording of rosgrade.
     """
@@ -173,13 +170,6 @@ def _in_order(messages: Mapping[str, list[Message]]) -> dict[str, tuple[Message,
 
 def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, ...]]:
     """Read the messages on one topic of any MCAP file with messages of ROS 2.
-
-    Args:
-        file: Such as a bag that ``ros2 bag record --storage mcap`` made.
-        topic: Fully qualified topic name.
-
-    Returns:
-        The messages in the order of their reception, and the names of all topics.
 
     Raises:
         OSError: The file cannot be read.

@@ -51,14 +51,8 @@ class RawMessage:
     """A message as it came over DDS.
 
     Attributes:
-        topic: Fully qualified name.
-        type: Interface name.
         cdr: Serialized bytes with their encapsulation header.
-        stamp_ns: Source timestamp.
-        received_ns: When the reader had it.
-        sequence: The writer's sequence number.
         join: Name of the late joiner that received it, or empty.
-        is_sent: Whether the probe published it.
     """
 
     topic: str
@@ -81,10 +75,8 @@ def write_recording(
     """Write a recording; the file appears whole or not at all.
 
     Args:
-        file: Where to.
         recording: What was observed; its own ``messages`` are ignored.
         messages: The messages as bytes.
-        definitions: Concatenated definition of every type in ``messages``.
         submission: The submission's facts as JSON, where the recording itself does not have
             them (a cell passes them on unread).
     """

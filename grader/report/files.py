@@ -25,10 +25,6 @@ def write_whole(file: Path, content: str | bytes) -> None:
     A reader sees the old file or the new one, never half of it. Missing folders are made;
     text is written as UTF-8.
 
-    Args:
-        file: Where to.
-        content: All of it.
-
     Raises:
         UsageError: It cannot be written there.
         GraderFault: The disk is full or broken, or files may not be so large.
@@ -83,11 +79,6 @@ def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None])
 
 def refuse_part(output: Path, folder: Path, what: str) -> None:
     """See that nothing is written into a folder that is read as a whole: it would be a part of it.
-
-    Args:
-        output: File or folder that is written.
-        folder: What is read.
-        what: What that is, for the message.
 
     Raises:
         UsageError: It would.

@@ -47,7 +47,6 @@ class Admission:
             cells: Most cells at once, whatever the load; by default the load decides. No more
                 than the descriptors of this process suffice for.
             starts: Most cells that start at once; by default three for each CPU.
-            load: Of the machine.
         """
         cpus = cpu_count()
         self.most = _with_descriptors(cells if cells is not None else _CELLS_PER_CPU * cpus)
@@ -123,12 +122,7 @@ class Admission:
 
 
 class Ticket:
-    """The place of one cell.
-
-    Attributes:
-        is_starting: Whether it has not got to where only its timers cost CPU time.
-        called: Notified when it may be its turn.
-    """
+    """The place of one cell."""
 
     def __init__(self, admission: Admission, called: threading.Condition) -> None:
         """Made by :meth:`Admission.cell` only."""

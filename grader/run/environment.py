@@ -33,12 +33,7 @@ _INSIDE = {"HOME": "/tmp", "TMPDIR": "/tmp"}
 
 
 def cell_environment(ros: RosInstallation, *, sandboxed: bool = False) -> dict[str, str]:
-    """Variables of a cell: ROS, rosgrade itself, and the fast announcement of the probe.
-
-    Args:
-        ros: The installation.
-        sandboxed: Whether it has a file system and a network of its own.
-    """
+    """Variables of a cell: ROS, rosgrade itself, and the fast announcement of the probe."""
     environment = ros.environment(os.environ)
     root = Path(grader.__file__).resolve().parent.parent
     environment.update(
@@ -56,8 +51,6 @@ def student_environment(ros: RosInstallation, install: Path, scratch: Path) -> d
     """Variables of a student's process: ROS, the packages handed in, and the tracer.
 
     Args:
-        ros: The installation.
-        install: Install space of the submission.
         scratch: Home, working and temporary folder; exists.
     """
     environment = ros.environment(os.environ, (install,))
@@ -80,12 +73,7 @@ def student_environment(ros: RosInstallation, install: Path, scratch: Path) -> d
 def sandboxed_environment(
     environment: Mapping[str, str], places: Mapping[str, str]
 ) -> dict[str, str]:
-    """The same variables of a student's process for one in a sandbox.
-
-    Args:
-        environment: As :func:`student_environment` makes them.
-        places: Path outside -> where it is seen inside.
-    """
+    """The same variables of a student's process for one in a sandbox."""
     found = {name: value for name, value in environment.items() if name not in _OF_THE_CALLER}
     for outside, inside in places.items():
         found = {name: value.replace(outside, inside) for name, value in found.items()}

@@ -34,16 +34,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic to record.
-
-    Attributes:
-        name: Fully qualified.
-        type: Interface name.
-        reliability: Requested by the probe's first subscription.
-        durability: Requested by the probe's first subscription.
-        depth: Queue depth of the probe.
-        ours: The simulator's own topic: recorded, but nothing waits for it.
-    """
+    """A topic to record."""
 
     name: str
     type: str
@@ -58,15 +49,8 @@ class Limits:
     """Bounds of one run; times in seconds.
 
     Attributes:
-        discovery_s: Until the first node.
         settle_s: From the newest change of the student's graph until we stop to expect a
             matching endpoint.
-        timeout_s: From the first match to the end of the observation.
-        shutdown_s: From SIGINT to SIGTERM.
-        terminate_s: From SIGTERM to SIGKILL.
-        messages: Messages kept per topic.
-        message_bytes: Largest message kept.
-        output_bytes: Output kept per stream, half of it from the end.
     """
 
     discovery_s: float
@@ -102,10 +86,7 @@ class SimulatorOrder:
     """The simulated robot of a scenario.
 
     Attributes:
-        world: World file.
         values: What stands for ``$name`` in it.
-        options: :class:`sim.description.SimulatorOptions` as JSON.
-        seed: Of noise and drift.
     """
 
     world: str
@@ -119,23 +100,10 @@ class CellOrder:
     """One scenario for one cell.
 
     Attributes:
-        scenario: Its id.
-        seed: For everything random.
-        commands: Processes of the student.
-        environment: Their variables.
-        prefixes: ament prefixes, for message definitions.
-        topics: What to record.
-        stimuli: What to do besides observing.
-        until: When to end early.
-        limits: Bounds.
         scratch: Folder of the student: working directory, home and temporary files.
         submission: The submission's facts, as JSON, to go into the recording unread.
         simulator: The simulated robot, or None.
-        values: Random values of the scenario, to go into the recording.
-        facts: Environment facts to go into the recording.
-        type_support: Install spaces of ours with interfaces that the probe needs.
         process_sandbox: The sandbox of each process of the student, or None.
-        tells_output: Whether lines that the student prints are told as they come.
     """
 
     scenario: str

@@ -43,22 +43,7 @@ class Input:
 
 @dataclass(frozen=True)
 class ReplayOrder:
-    """What is replayed.
-
-    Attributes:
-        recording: The recording's file.
-        commands: What is launched.
-        environment: Variables of the launched processes.
-        scratch: Their working folder.
-        inputs: Topics that are given.
-        outputs: Topic -> type of what the student published in the recording.
-        type_support: Install spaces of ours with interfaces that the player needs.
-        launched_ns: Launch in the recording.
-        matched_ns: When the recording's clock started.
-        duration_s: From then to the end of the observation.
-        discovery_s: How long a subscription of the student may take to appear.
-        shutdown_s: How long the node may take to end after SIGINT.
-    """
+    """What is replayed."""
 
     recording: str
     commands: tuple[Command, ...]
@@ -99,15 +84,6 @@ def make_order(
     type_support: Sequence[Path] = (),
 ) -> ReplayOrder:
     """Say what to replay.
-
-    Args:
-        file: The recording's file.
-        recording: What it holds.
-        assignment: What it was recorded for.
-        ros: Runs the node, with the install spaces of ours that it was built with.
-        install: The submission's install space.
-        scratch: Working folder of the node.
-        type_support: Install spaces of ours with interfaces that the player needs.
 
     Raises:
         UsageError: The assignment has no such scenario, or nothing was given to the node.

@@ -124,11 +124,7 @@ class Player:
             self._listen(topic, interface)
 
     def play(self, messages: tuple[RawMessage, ...]) -> int:
-        """Launch, give everything, stop.
-
-        Returns:
-            The exit code.
-        """
+        """Launch, give everything, stop."""
         early = [m for m in messages if self._is_early(m)]
         for message in early:
             self._publishers[message.topic].publish(message.cdr)

@@ -45,9 +45,6 @@ def scenario_seed(assignment: str, scenario: str, submission_sha256: str, base: 
     """Seed of a scenario: of the submission's own, so that nobody can write for known numbers.
 
     Args:
-        assignment: Its id.
-        scenario: Its id.
-        submission_sha256: Of the submission.
         base: A seed that the caller gave; replaces the submission.
 
     Returns:
@@ -59,12 +56,7 @@ def scenario_seed(assignment: str, scenario: str, submission_sha256: str, base: 
 
 
 def ros_arguments(launch: Launch, values: dict[str, float]) -> tuple[str, ...]:
-    """Command line arguments of a launch, as ``ros2 run`` passes them on.
-
-    Args:
-        launch: What is launched.
-        values: Random values of the scenario, for parameters.
-    """
+    """Command line arguments of a launch, as ``ros2 run`` passes them on."""
     from grader.assignment.drawing import fill_in
 
     rules: list[str] = []
@@ -83,11 +75,6 @@ def ros_arguments(launch: Launch, values: dict[str, float]) -> tuple[str, ...]:
 
 def launch_file_program(ros: RosInstallation, package: str, file: str) -> tuple[str, ...]:
     """What starts a launch file, as `ros2 launch` does.
-
-    Args:
-        ros: What runs it.
-        package: Of the student's, that installs it.
-        file: Its name.
 
     Raises:
         GraderFault: This ROS has no `ros2 launch`.
@@ -173,12 +160,7 @@ class Runner:
     """Runs scenarios in cells.
 
     Attributes:
-        ros: What builds and runs students' packages.
-        admission: Shared bounds on cells.
-        progress: Told what happens in each scenario.
-        cpu_s: CPU time of all cells so far, with the students in them.
         sandbox: What cells and students run in, or None.
-        verbose: Whether progress also tells what the student's processes print.
     """
 
     ros: RosInstallation
@@ -221,16 +203,8 @@ class Runner:
         """Run one scenario and leave its recording.
 
         Args:
-            assignment: The scenario's assignment.
-            scenario: What to run.
-            submission: Facts that go into the recording.
             install: The submission's install space (merged layout).
-            recording: File to write.
-            seed: For everything random.
             worlds: Folder that world files are relative to.
-            underlays: Install spaces of ours that the submission was built with.
-            type_support: Install spaces of ours with interfaces that the probe needs.
-            alone: Let no other cell of ours run meanwhile.
             remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right; of a file of
                 the install space, without a slash in front.
 
@@ -416,11 +390,7 @@ class Runner:
         """What to execute for a launch.
 
         Args:
-            launch: What is launched.
             default_package: Its package, where it names none.
-            install: The submission's install space.
-            values: Random values of the scenario, for parameters.
-            files: What to execute in place of a file of the install space that is not there.
         """
         package = launch.package or default_package
         if launch.executable is None:

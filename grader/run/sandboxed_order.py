@@ -37,16 +37,7 @@ def sandboxed(
     install: Path,
     limits: Limits,
 ) -> CellOrder:
-    """Make an order for a sandbox, and copy into the cell's folder what it needs.
-
-    Args:
-        order: As it is without a sandbox.
-        folder: The cell's.
-        sandbox: What it runs in.
-        ros: The installation, with the install spaces of ours that the submission needs.
-        install: The submission's install space.
-        limits: What the student may take.
-    """
+    """Make an order for a sandbox, and copy into the cell's folder what it needs."""
     support = [Path(path) for path in order.type_support]
     copies = _copy([install, *ros.underlays, *support], folder)
     for_student = {

@@ -53,9 +53,7 @@ class Bind:
     """A folder or file that is seen inside.
 
     Attributes:
-        source: Outside.
         target: Inside; absolute.
-        writable: Whether it can be changed inside.
     """
 
     source: Path
@@ -69,12 +67,7 @@ class Bind:
 
 
 def namespaces(uid: int, *, network: bool = True) -> list[str]:
-    """New namespaces, with a user of no rights in them.
-
-    Args:
-        uid: What it is called inside.
-        network: Also of its own network, with nothing but a loopback interface.
-    """
+    """New namespaces, with a user of no rights in them."""
     own = [*_NAMESPACES, "--unshare-cgroup-try", *(["--unshare-net"] if network else [])]
     return [*own, "--uid", str(uid), "--gid", str(uid), "--new-session"]
 
@@ -106,9 +99,6 @@ def copy_system_files(folder: Path) -> None:
 
     Whoever installs a package while a class is graded replaces them, and what was replaced can
     no longer be bound from within a sandbox that has stood before.
-
-    Args:
-        folder: Made if it is not there.
     """
     for file in _system_files():
         copy = folder / file.relative_to("/")
@@ -149,11 +139,7 @@ def launch(
 
     Args:
         arguments: Of bubblewrap; what is bound by them everybody may read.
-        binds: What is seen inside besides.
-        last: Further arguments, in force after the binds.
-        command: Run in it.
         filter_file: Filter of system calls, or None.
-        uid: Who it runs as where we are root.
     """
     program = [str(shutil.which("bwrap"))]
     opened: list[str] = []

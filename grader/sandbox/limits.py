@@ -35,18 +35,10 @@ class Limits:
     """Bounds of one sandbox.
 
     Attributes:
-        memory_bytes: Of all its processes together, shared pages counted once.
-        processes: Processes and threads together.
-        cpu_s: CPU time of all its processes together.
-        file_bytes: Of one file.
-        disk_bytes: Of everything that is written to /tmp and home.
-        files: Number of files and folders there.
-        shared_bytes: Of /dev/shm.
         open_files: Of all processes together, sockets and the like among them; the kernel holds
             each process to it, or to a quarter of what we may have open.
         address_bytes: Address space of one process. Reserving takes nothing from anybody, and
             every thread reserves some, so this is far more than the memory.
-        output_bytes: A process that writes more than this is ended.
     """
 
     memory_bytes: int = 1024 * MIB
@@ -101,9 +93,6 @@ class Limits:
 
         The number of processes counts per user and user namespace where it is set inside, and
         over everything of the user where it is set outside.
-
-        Args:
-            more_processes: So many more, of those around a sandbox.
         """
         bounds = self.rlimits()
         bounds[resource.RLIMIT_NPROC] += more_processes

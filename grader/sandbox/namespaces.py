@@ -71,11 +71,6 @@ class Mounter:
     def mount(self, disk_bytes: int, files: int, shared_bytes: int) -> None:
         """Mount what students can write to, and end.
 
-        Args:
-            disk_bytes: Size of /tmp and home together.
-            files: Number of files and folders there.
-            shared_bytes: Size of /dev/shm.
-
         Raises:
             OSError: The system refuses it.
         """
@@ -114,7 +109,6 @@ class Rights:
     """What a cell got hold of before it gave up its rights.
 
     Attributes:
-        mounter: Still has the right to mount.
         wire: Hears the cell's network; None where the kernel has no packet sockets.
     """
 
@@ -132,9 +126,6 @@ def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
         folder: The cell's own; its parent holds those of all cells.
         sentence: Asked now and then by the one that waits: None to let the new process go on,
             or the signal that it shall seem to have been ended by.
-
-    Returns:
-        What is left of the rights that the new process had.
 
     Raises:
         OSError: The system refuses it.

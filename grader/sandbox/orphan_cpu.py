@@ -20,12 +20,7 @@ last. One that is missing once may have ended after its parent was read; twice i
 
 
 class Process(NamedTuple):
-    """What tells a process from a later one with its number.
-
-    Attributes:
-        pid: Its id.
-        started: When it started, in ticks since the machine did.
-    """
+    """What tells a process from a later one with its number."""
 
     pid: int
     started: int
@@ -35,7 +30,6 @@ class Taken(NamedTuple):
     """CPU time of a process in ticks, as proc(5) tells it.
 
     Attributes:
-        own: Its own.
         waited: Of the children that it has waited for, and of those that they have.
     """
 
@@ -50,7 +44,6 @@ class OrphanCpu:
     anything of one that was never seen.
 
     Attributes:
-        ticks: What was lost so far.
         ended: How many processes have ended since the look before, if any of them was not waited
             for; else 0.
     """
@@ -67,7 +60,6 @@ class OrphanCpu:
         """Note what is there now.
 
         Args:
-            there: All processes that there are, zombies too, each with what it took so far.
             complete: That none ended between the moment when all were listed and when it was
                 to be read itself. Whoever is missing has ended for certain then.
         """

@@ -97,14 +97,7 @@ def bound_ports() -> frozenset[int]:
 
 
 def heartbeats(data: bytes) -> Iterator[tuple[str, int, int]]:
-    """Heartbeats of writers that programs make, in an RTPS message (DDSI-RTPS 2.5, 9.4.5.7).
-
-    Args:
-        data: What a UDP packet holds.
-
-    Yields:
-        The writer's identifier as hex, and the first and the last message that it keeps.
-    """
+    """Heartbeats of writers that programs make, in an RTPS message (DDSI-RTPS 2.5, 9.4.5.7)."""
     place = _RTPS_HEADER_BYTES
     while place + _SUBMESSAGE_HEADER_BYTES <= len(data):
         order = "<" if data[place + 1] & 1 else ">"

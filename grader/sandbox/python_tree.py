@@ -44,12 +44,7 @@ _FOR_OTHERS = 0o444
 
 @dataclass(frozen=True)
 class PythonTree:
-    """An environment that is held: it stays as long as this object, or its process.
-
-    Attributes:
-        path: Its folder.
-        lock: Descriptor of the lock.
-    """
+    """An environment that is held: it stays as long as this object, or its process."""
 
     path: Path
     lock: int
@@ -87,11 +82,6 @@ def student_prefix(
 ) -> PythonTree:
     """The environment, made if it is not there.
 
-    Args:
-        cache: rosgrade's cache folder.
-        libraries: Distributions that the assignment allows besides.
-        prefix: The environment that rosgrade runs in.
-
     Raises:
         GraderFault: A library is not installed here.
     """
@@ -124,11 +114,7 @@ def check_installed(libraries: Collection[str]) -> None:
 
 
 def not_installed(libraries: Collection[str]) -> list[str]:
-    """Say of each library that is not there what it is, and how it gets there.
-
-    Args:
-        libraries: Distributions that the assignment allows.
-    """
+    """Say of each library that is not there what it is, and how it gets there."""
     if not libraries:
         return []
     installed = set(_installed())
@@ -145,12 +131,7 @@ def _lack(name: str, installed: Collection[str]) -> str:
 
 
 def unlisted(modules: Collection[str], libraries: Collection[str]) -> tuple[str, ...]:
-    """Find modules that can be imported here, but not in the environment of a sandbox.
-
-    Args:
-        modules: Names of top-level modules.
-        libraries: Distributions that the assignment allows.
-    """
+    """Find modules that can be imported here, but not in the environment of a sandbox."""
     foreign = set(modules) - sys.stdlib_module_names - {"numpy"}
     if not foreign:
         return ()
@@ -164,13 +145,7 @@ def unlisted(modules: Collection[str], libraries: Collection[str]) -> tuple[str,
 
 
 def prune(folder: Path, kept: int = KEPT, age_s: float = AGE_S) -> None:
-    """Throw away environments that nobody uses.
-
-    Args:
-        folder: Of all environments.
-        kept: So many of those that were used last stay.
-        age_s: Those that were not used for so long do not stay in any case.
-    """
+    """Throw away environments that nobody uses."""
     now_s = time.time()
     trees: list[tuple[float, Path]] = []
     for path in folder.iterdir():

@@ -57,7 +57,6 @@ class Sandbox:
 
     Attributes:
         cache: rosgrade's cache folder; the Python environments of students are kept in it.
-        libraries: Distributions that students may import besides those of ROS.
     """
 
     cache: Path
@@ -160,12 +159,7 @@ class Sandbox:
         return check
 
     def student_view(self, ros: RosInstallation, trees: Path | None = None) -> list[Bind]:
-        """What untrusted code sees of Python and ROS.
-
-        Args:
-            ros: The installation.
-            trees: Where the folder of all :attr:`python_tree` is to be found.
-        """
+        """What untrusted code sees of Python and ROS."""
         own = Path(sys.prefix)
         binds = [Bind.same(path) for path in _python_and_ros(ros) if path != own]
         if _in_environment():
@@ -181,15 +175,7 @@ class Sandbox:
         environment: Mapping[str, str],
         shown: Sequence[Bind] = (),
     ) -> list[str]:
-        """The command line of a nursery whose cells can go into namespaces of their own.
-
-        Args:
-            command: Of the nursery.
-            ros: What it runs with.
-            cells: Holds the folders of the cells.
-            environment: Its variables.
-            shown: What it sees besides.
-        """
+        """The command line of a nursery whose cells can go into namespaces of their own."""
         # Students' interpreters start there as well, so Python is what they see of it; what runs
         # for us finds ours beside.
         binds = self.student_view(ros)
@@ -212,10 +198,8 @@ class Sandbox:
         """Let a part of a build write to folders.
 
         Args:
-            ros: What it builds with.
             folders: What it may write to; the first is its working directory. They are ours
                 again afterwards.
-            limits: What it may take.
         """
         uid = bubblewrap.build_uid()
         for folder in folders:
@@ -229,16 +213,7 @@ class Sandbox:
 
 @dataclass(frozen=True)
 class BuildRoom:
-    """Where a part of a build runs.
-
-    Attributes:
-        sandbox: The sandbox.
-        ros: What it builds with.
-        folders: What it may write to.
-        limits: What it may take.
-        uid: Who it runs as where we are root.
-        environment: Of the process that starts it.
-    """
+    """Where a part of a build runs."""
 
     sandbox: Sandbox
     ros: RosInstallation
@@ -251,12 +226,7 @@ class BuildRoom:
     _cpu: CpuAccount = field(default_factory=CpuAccount, repr=False)
 
     def command(self, command: Sequence[str], environment: Mapping[str, str]) -> list[str]:
-        """The command line that runs a command in it.
-
-        Args:
-            command: Of the build.
-            environment: Its variables.
-        """
+        """The command line that runs a command in it."""
         binds = [*self.sandbox.student_view(self.ros), *map(Bind.same, self.ros.underlays)]
         hidden = hide(binds)
         binds += [Bind.same(folder, writable=True) for folder in self.folders]
@@ -276,11 +246,7 @@ class BuildRoom:
         )
 
     def excess(self, pid: int) -> str | None:
-        """Say which limit a build has passed, or None.
-
-        Args:
-            pid: Of the process that all its processes descend from.
-        """
+        """Say which limit a build has passed, or None."""
         limits = self.limits
         usages = usage_of([pid])
         room = limits.memory_bytes - memory_bytes(usages, limits.memory_bytes)

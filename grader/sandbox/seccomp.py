@@ -103,7 +103,6 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
         one_session: For a build: also keep all processes in one session, as the kernel shares
             the CPU between sessions, and let none of them send a signal to what started them.
             A daemon then gets the signals that are meant for its parent.
-        guarded: What :func:`guard_filter` tells of is left to it.
 
     Raises:
         RuntimeError: libseccomp is not there.
@@ -152,9 +151,6 @@ def guard_filter(*, heard: bool = True) -> bytes:
     It is in force while bubblewrap makes the sandbox, so it holds only calls that bubblewrap
     itself does not need, or that the guard lets go on.
 
-    Args:
-        heard: Whether somebody listens. Then it also tells of what :func:`can_end` speaks of.
-
     Raises:
         RuntimeError: libseccomp is not there.
     """
@@ -187,12 +183,7 @@ def guarded_calls() -> dict[str, int]:
 
 
 def can_end(name: str, arguments: Sequence[int]) -> bool:
-    """Whether a call can kill or stop a process of the same sandbox, which is allowed.
-
-    Args:
-        name: The call, of which the guard was told.
-        arguments: Its arguments, as the kernel gives them.
-    """
+    """Whether a call can kill or stop a process of the same sandbox, which is allowed."""
     return any(
         name == way and arguments[place] & mask in values for way, place, values, mask in _WAYS
     )
@@ -204,12 +195,7 @@ def is_counted(name: str) -> bool:
 
 
 def told_of(name: str, arguments: Sequence[int]) -> str | None:
-    """What a process did by a call that the guard was told of; None where there is no harm in it.
-
-    Args:
-        name: The call.
-        arguments: Its arguments, as the kernel gives them.
-    """
+    """What a process did by a system call that the guard saw; None if it does no harm."""
     if name in _UNHEARD_OF:
         return f"called `{name}`"
     if name in _COUNTED:

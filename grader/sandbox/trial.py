@@ -37,7 +37,6 @@ class Trial:
 
     Attributes:
         problem: Why not, or empty.
-        remedy: What to do about it.
     """
 
     problem: str = ""
@@ -46,10 +45,6 @@ class Trial:
 
 def choose(choice: Choice, cache: Path) -> tuple[Sandbox | None, str]:
     """The sandbox to use.
-
-    Args:
-        choice: What was asked for.
-        cache: rosgrade's cache folder.
 
     Returns:
         The sandbox or None, and a line for the user where there is something to say.

@@ -22,13 +22,7 @@ class Usage(NamedTuple):
     """What a process takes; all of it stands in one file, which is read often.
 
     Attributes:
-        pid: Its id.
-        parent: Of its parent.
-        session: Of its session.
-        started: When it started, in ticks since the machine did.
         taken: CPU time of it, and of its children that have ended and were waited for.
-        threads: How many it has.
-        resident_bytes: Its resident set, pages that it shares with others among them.
     """
 
     pid: int
@@ -48,11 +42,7 @@ class CpuAccount:
         self._unwaited = OrphanCpu()
 
     def stolen_s(self, usages: Iterable[Usage]) -> float:
-        """What was taken so far, at least.
-
-        Args:
-            usages: Of all processes that there are now.
-        """
+        """What was taken so far, at least."""
         there = {Process(one.pid, one.started): one.taken for one in usages}
         self._unwaited.look(there)
         return (sum(map(sum, there.values())) + self._unwaited.ticks) / _TICKS_PER_S
@@ -81,10 +71,8 @@ def memory_bytes(usages: Sequence[Usage], enough: int, hidden: int = 0) -> int:
     """Memory of processes, pages that they share counted once.
 
     Args:
-        usages: Of the processes.
         enough: Below this a quick upper bound is returned (see proc(5): the sum of resident sets
             counts shared pages several times, the proportional ones of smaps_rollup do not).
-        hidden: What :func:`hidden_bytes` found.
     """
     upper = sum(usage.resident_bytes for usage in usages) + hidden
     return upper if upper <= enough else hidden + sum(_proportional_bytes(one) for one in usages)
@@ -104,7 +92,6 @@ def hidden_bytes(usages: Iterable[Usage], room: int = 0) -> int:
     is, so all that is mapped counts as taken.
 
     Args:
-        usages: Of the processes.
         room: Where all shared memory of this machine is no more than this, it is not looked for:
             to read what processes have mapped takes longer than all else that is read of them.
     """

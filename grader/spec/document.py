@@ -47,10 +47,6 @@ for _name, _pattern, _first in (
 def parse_yaml(text: str, file: Path) -> tuple[Any, dict[Place, int]]:
     """Read YAML text.
 
-    Args:
-        text: One YAML document.
-        file: Only named in errors.
-
     Returns:
         Plain dicts, lists and scalars; and the line (from 1) of each value, for an entry of a
         mapping the line of its key.
@@ -233,10 +229,6 @@ def _long_quoted(text: str, line: int) -> tuple[int, int] | None:
 
     A quote that is not closed lasts until the next one, wherever that is, and turns all quotes
     after it inside out.
-
-    Args:
-        text: The document.
-        line: Where the error is.
     """
     begin, end = 0, 0
     try:

@@ -18,7 +18,6 @@ class Mistake:
 
     Attributes:
         place: Where; only steps that the document has.
-        message: What is wrong and what is allowed.
     """
 
     place: Place
@@ -27,13 +26,7 @@ class Mistake:
 
 @dataclass(frozen=True)
 class _Item:
-    """An error of pydantic with its place in the document.
-
-    Attributes:
-        branch: Whether it is one alternative of a union that did not fit.
-        missing: The key that is missing, if that is the error.
-        meant: The key that an unknown one seems to stand for.
-    """
+    """An error of pydantic with its place in the document."""
 
     place: Place
     message: str
@@ -48,8 +41,6 @@ def mistakes(
     """Translate a validation error.
 
     Args:
-        error: What pydantic raised.
-        model: The model that was read.
         exists: Whether the document has a place. (Pydantic also counts the alternatives of a
             union as steps, and keys that are missing.)
 

@@ -10,8 +10,6 @@ def nearest(name: str, candidates: Iterable[str], *, cutoff: float = 0.6) -> str
     """Find the candidate that is most like ``name``.
 
     Args:
-        name: What was written.
-        candidates: What would have been allowed.
         cutoff: Least similarity in [0, 1], as in :func:`difflib.get_close_matches`.
 
     Returns:

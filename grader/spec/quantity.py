@@ -28,7 +28,6 @@ def written_as_read(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> 
 
     Args:
         read: Makes the value from what the YAML has; raises a :func:`refusal`.
-        write: Makes of the value what ``read`` reads again.
     """
     return core_schema.no_info_plain_validator_function(
         read,

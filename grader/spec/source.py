@@ -37,7 +37,6 @@ class Source:
     """A YAML document with its positions.
 
     Attributes:
-        file: Where it was read from.
         data: Plain dicts, lists and scalars; a dict at the top.
         lines: Line (from 1) of each value and, for a mapping entry, of its key.
     """
@@ -66,7 +65,6 @@ class Source:
         """Validate the document, or a part of it, as a model.
 
         Args:
-            model: The pydantic model.
             place: The part to read; a part that was not written down reads as empty.
 
         Raises:
@@ -108,12 +106,6 @@ def _sorted(problems: list[Problem]) -> list[Problem]:
 
 def read_source(file: Path) -> Source:
     """Read a YAML file.
-
-    Args:
-        file: The file to read.
-
-    Returns:
-        Its data with the line of every value.
 
     Raises:
         UsageError: The file does not exist or cannot be read.

@@ -78,9 +78,6 @@ def parse_quantity(text: str | int | float, dimension: Dimension) -> float:
             may a ratio below one (``0.05`` is ``5 %``).
         dimension: What must be given.
 
-    Returns:
-        The value in SI units.
-
     Raises:
         ValueError: With a message that names the allowed units.
     """

@@ -42,10 +42,8 @@ class Prepared:
     """A submission that is ready to run, or the record of why it is not.
 
     Attributes:
-        record: What is known of it.
         install: Its install space (merged layout), read-only for everybody; also there when
             only some packages were built. None where nothing was.
-        underlays: Install spaces of ours that it was built with, and runs with.
     """
 
     record: SubmissionRecord
@@ -83,13 +81,7 @@ def prepare(
     package's ``manifest_error``, or in ``build``.
 
     Args:
-        path: A folder or an archive.
-        ros: Builds with this installation.
-        cache: Folder for builds, such as ``$XDG_CACHE_HOME/rosgrade``.
-        limits: What is too much.
-        on_progress: Told in a few words what happens.
         sandbox: What it is built in, or None.
-        stop: Ends the build from another thread when it is set.
         on_output: Called with each line of the build's log as it comes; an earlier build's log
             comes at once.
 
@@ -122,10 +114,6 @@ def refused(source: Path, error: SubmissionError) -> Prepared:
 
 def fingerprint(path: Path | str, limits: ArchiveLimits | None = None) -> str:
     """The hash that :func:`prepare` will give a submission; nothing is built.
-
-    Args:
-        path: A folder or an archive.
-        limits: What is too much.
 
     Raises:
         UsageError: Nothing is at ``path``, or it is a URL.

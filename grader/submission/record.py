@@ -16,9 +16,7 @@ class SourceError:
     """A mistake at a place in the student's files.
 
     Attributes:
-        file: Path in the submission.
         line: Line from 1, or None where none is known.
-        message: One line, as the tool that found it said it.
     """
 
     file: str
@@ -40,7 +38,6 @@ class Import:
 
     Attributes:
         module: Top-level module name, such as ``geometry_msgs``.
-        file: Path in the submission.
         line: Line from 1.
         optional: Guarded by ``try`` or ``if TYPE_CHECKING``: the code runs without it.
     """
@@ -56,10 +53,8 @@ class Dependency:
     """An entry of package.xml (REP-149).
 
     Attributes:
-        name: ROS package or rosdep key.
         kind: The tag: ``depend``, ``exec_depend``, ``build_depend``, ``test_depend``, ... An
             ``export/depend`` stands inside <export>, where it does not count.
-        line: Line in package.xml.
         known: True for a ROS package or rosdep key that exists, False for a slip of one or a
             name that is known not to exist, None where this machine cannot tell.
     """
@@ -76,7 +71,6 @@ class Definition:
 
     Attributes:
         file: Path in the submission; of a generated one below ``share/<package>``.
-        text: Its content.
     """
 
     file: str
@@ -88,15 +82,12 @@ class PackageRecord:
     """One ament package of a submission.
 
     Attributes:
-        name: Name in package.xml.
         path: Folder in the submission (``.`` for the submission itself).
         build_type: ``ament_python``, ``ament_cmake``, ...
         manifest_error: Why package.xml cannot be used (broken XML, invalid e-mail), or None.
-        dependencies: What package.xml names.
         imports: What its Python code imports; tests, launch files and setup.py left aside.
         ros_imports: Those of ``imports`` that belong to a ROS package, with that package's
             name in ``module``; of several that provide a module the one that is declared.
-        syntax_errors: Files that Python cannot parse.
         newer_syntax: Other files, that the Python here cannot parse, but that of ROS 2 Jazzy can.
         entry_points: console_scripts of setup.py or setup.cfg: executable -> ``module:function``.
         executables: What the build installed for ``ros2 run``, in ``lib/<package>/``.
@@ -109,7 +100,6 @@ class PackageRecord:
         groups: Groups that package.xml makes it a member of (REP-149).
         cmake: Its CMakeLists.txt, or None where it has none.
         definitions: Its ``.msg``, ``.srv`` and ``.action`` files, and others beside them.
-        generated: Definitions that the build generated code for and installed.
         registered: Whether ROS finds what was installed, in ament's index of packages.
         sources: What its Python code says; tests, launch files and setup.py left aside.
         lint: What ruff said of the same files, or None where it was not asked.
@@ -149,8 +139,6 @@ class BuildRecord:
     Attributes:
         succeeded: colcon's exit status was 0 and it built every package.
         duration_s: Wall time of the build when it ran, also when taken from the cache now.
-        cached: Taken from the cache.
-        timed_out: Ended by us after the time limit.
         failed_packages: Packages that colcon did not finish: that failed, or were never begun
             since one that they need failed or colcon did not take them for packages.
         lacking: Packages of ROS 2 Jazzy that CMake did not find, because they are not installed
@@ -174,10 +162,7 @@ class SubmissionRecord:
     """Everything known of a submission before it runs.
 
     Attributes:
-        id: Its name, for people: the folder's or archive's name.
-        sha256: Hash over the paths and contents of its files, as hex.
         problem: Why nothing can be graded (empty, not a workspace, refused archive), or None.
-        packages: By name, sorted.
         build: None where nothing was built.
     """
 

@@ -22,9 +22,6 @@ def to_plain(record: SubmissionRecord) -> dict[str, Any]:
 def from_plain(plain: object) -> SubmissionRecord:
     """Turn what :func:`to_plain` made into a record again.
 
-    Args:
-        plain: Read from JSON.
-
     Raises:
         GraderFault: It is no record: a field is missing or of a wrong type.
     """
@@ -38,9 +35,6 @@ def from_plain(plain: object) -> SubmissionRecord:
 
 def read_record(file: Path) -> SubmissionRecord:
     """Read a record from a JSON file.
-
-    Args:
-        file: Written from :func:`to_plain`, or by any writer of the same dataclasses.
 
     Raises:
         UsageError: It cannot be read, or holds no record.

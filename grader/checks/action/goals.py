@@ -31,12 +31,6 @@ def judged_goals(
 ) -> tuple[Goal, ...] | Cause:
     """Goals with certain fields, each answered by the server, or why there are none.
 
-    Args:
-        recording: The run.
-        action: Fully qualified name.
-        fields: Which goals: those with these fields.
-        wanted: Which of them.
-
     Raises:
         NoSuchField: A goal cannot have such a field.
     """

@@ -20,8 +20,6 @@ class Run:
     """One call of a callback.
 
     Attributes:
-        callback: Its name in the reports.
-        begin_ns: Source timestamp of its start.
         end_ns: Source timestamp of its end; None if none was reported.
     """
 
@@ -37,13 +35,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Reports:
-    """What the messages on a topic tell.
-
-    Attributes:
-        runs: In the order of their starts.
-        strange: Texts that are no report.
-        orphans: Callbacks whose end was reported without a start.
-    """
+    """What the messages on a topic tell."""
 
     runs: tuple[Run, ...]
     strange: tuple[str, ...]
@@ -69,9 +61,6 @@ def read_reports(messages: Sequence[Message]) -> Reports:
 
     Calls of one callback that overlap each other take equally long, so the first that began is
     the first that ends.
-
-    Args:
-        messages: With a text in ``data``, oldest first.
     """
     began: dict[str, list[int]] = {}
     runs: list[Run] = []
@@ -99,13 +88,7 @@ def read_reports(messages: Sequence[Message]) -> Reports:
 
 @dataclass(frozen=True)
 class Overlap:
-    """Two runs at the same time.
-
-    Attributes:
-        one: Began first.
-        other: Began while the first had not ended.
-        seconds: How long both ran.
-    """
+    """Two runs at the same time."""
 
     one: Run
     other: Run
@@ -116,7 +99,6 @@ def overlaps(runs: Iterable[Run], least_s: float = 0.0) -> Iterator[Overlap]:
     """Pairs of runs that overlap, in the order of their beginning.
 
     Args:
-        runs: Whose end is known.
         least_s: How long they must overlap; beyond what clocks may be off.
     """
     active: list[Run] = []

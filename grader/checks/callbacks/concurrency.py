@@ -50,12 +50,7 @@ def single(recording: Recording) -> bool:
 
 
 def forbids(recording: Recording, *, itself: bool) -> bool:
-    """Whether what the process declared would keep these callbacks from running at the same time.
-
-    Args:
-        recording: The run.
-        itself: They are two runs of one subscription's callback.
-    """
+    """Whether the declared callback groups or executor keep these callbacks apart."""
     groups = _groups(recording, "subscription")
     return single(recording) or (itself and len(groups) == 1 and groups[0][0] == _EXCLUSIVE)
 
@@ -63,15 +58,7 @@ def forbids(recording: Recording, *, itself: bool) -> bool:
 def not_judged(
     recording: Recording, expected: str, observed: str, *, prevented: bool, at_once: int = 2
 ) -> Finding | None:
-    """The finding where it is not the student's fault that callbacks did not run together.
-
-    Args:
-        recording: The run.
-        expected: Of the finding.
-        observed: How they ran instead.
-        prevented: Whether the machine may have kept them from running together often enough.
-        at_once: How many of them should have run at the same time.
-    """
+    """The finding where it is not the student's fault that callbacks did not run together."""
     if _has_one_thread_for_one_cpu(recording):
         return Finding.error(
             expected,

@@ -65,13 +65,7 @@ class Responsive(Parameters):
 
 @dataclass(frozen=True)
 class _Answers:
-    """Calls to one node.
-
-    Attributes:
-        node: Fully qualified name.
-        judged: Calls that count.
-        late: Those that were not answered in time.
-    """
+    """Calls to one node."""
 
     node: str
     judged: tuple[Call, ...]

@@ -18,9 +18,7 @@ class InterfaceName:
     """The parts of an interface's name, such as ``bot_msgs/msg/BotStatus``.
 
     Attributes:
-        package: The package.
         kind: ``msg``, ``srv`` or ``action``; folder and suffix of its definition.
-        name: The last part.
     """
 
     package: str
@@ -44,10 +42,6 @@ class InterfaceName:
 
 def find_definition(submission: SubmissionRecord, interface: InterfaceName) -> Definition | Cause:
     """The definition of an interface, as the build took it or else as it was handed in.
-
-    Args:
-        submission: What was handed in.
-        interface: What is looked for.
 
     Returns:
         The definition with its path in the submission, or why there is none.

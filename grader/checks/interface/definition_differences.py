@@ -19,8 +19,6 @@ class Difference:
 
     Attributes:
         name: Of the entry in the student's definition, or in ours where theirs has none.
-        text: What differs.
-        hint: What to write.
     """
 
     name: str
@@ -29,13 +27,7 @@ class Difference:
 
 
 def field_differences(wanted: Section, own: Section, package: str) -> Iterator[Difference]:
-    """How the fields of a section differ.
-
-    Args:
-        wanted: As it should be.
-        own: The student's.
-        package: The package that both belong to.
-    """
+    """How the fields of a section differ."""
     expected = {field.name: field for field in wanted.fields}
     observed = {field.name: field for field in own.fields}
     renamed = _renamed(expected, observed)
@@ -64,13 +56,7 @@ def field_differences(wanted: Section, own: Section, package: str) -> Iterator[D
 
 
 def constant_differences(wanted: Section, own: Section, package: str) -> Iterator[Difference]:
-    """How the constants of a section differ; further ones do not count.
-
-    Args:
-        wanted: As it should be.
-        own: The student's.
-        package: The package that both belong to.
-    """
+    """How the constants of a section differ; further ones do not count."""
     expected = {constant.name: constant for constant in wanted.constants}
     observed = {constant.name: constant for constant in own.constants}
     renamed = _renamed(expected, observed)

@@ -16,8 +16,6 @@ class Wanted:
     """What the log should show of one message.
 
     Attributes:
-        message: The message.
-        values: Path of each field -> its value.
         ready_ns: When a subscription was there to get it, later than the message itself for
             what a publisher kept for late joiners.
     """
@@ -37,7 +35,6 @@ class Echo:
     """Lines that show one message.
 
     Attributes:
-        wanted: The message, with its values.
         lines: At least one; all values are in them together.
     """
 
@@ -49,11 +46,6 @@ def wanted_values(
     messages: Sequence[Message], fields: Sequence[str], ready_ns: int = 0
 ) -> tuple[Wanted, ...]:
     """What the log should show of each message.
-
-    Args:
-        messages: What the node was sent.
-        fields: Paths of the fields to show.
-        ready_ns: When the node was there to get messages that are older.
 
     Raises:
         NoSuchField: The messages have no such field, or it holds no number.
@@ -89,11 +81,8 @@ def echoes(
     need not come in the order of the messages: with several threads they do not.
 
     Args:
-        recording: The run.
-        wanted: What to look for, in the order of the messages.
         decimals: How many decimals must be right.
         within_ns: How soon after its message a line must have come.
-        forgive: Allow what the host took meanwhile in addition.
     """
     lines = output_lines(recording)
     times = [line.time_ns for line in lines]
@@ -144,8 +133,6 @@ def _listed(printed: Sequence[float], wanted: Sequence[Wanted], decimals: int) -
     """How many messages a line serves: its numbers are their values in order, and no two the same.
 
     Args:
-        printed: Numbers of the line, the value of the first message among them.
-        wanted: Messages that came before it, the oldest first.
         decimals: How many decimals must be right.
     """
     values = [value for item in wanted for value in item.values.values()][: len(printed)]

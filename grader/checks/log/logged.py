@@ -23,10 +23,7 @@ class Logged:
     """One record of a logger.
 
     Attributes:
-        time_ns: Its own stamp.
         logger: Name, such as ``bot`` or ``robot.bot``.
-        level: Of :data:`LEVELS`.
-        text: The message, several lines included.
     """
 
     time_ns: int

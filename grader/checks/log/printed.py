@@ -86,8 +86,6 @@ def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[st
     Names may also follow their numbers or stand apart from them, and such a text is not read.
 
     Args:
-        text: One line or several.
-        values: Path of each field -> its value.
         decimals: How many decimals must be right.
 
     Returns:
@@ -119,8 +117,6 @@ def shows(number: float, value: float, decimals: int) -> bool:
     """Whether a printed number stands for a value.
 
     Args:
-        number: As printed: rounded, cut off or exact.
-        value: What it should be.
         decimals: How many of its decimals must be right; the last of them may be one off,
             because cutting off is right too.
     """

@@ -23,7 +23,6 @@ class Sample:
 
     Attributes:
         number: Which message on its topic, from 1.
-        message: The message.
         values: The numbers in its fields; NaN for one that is not there.
         window: Indices of those sources; the last one is the newest that there was.
         excused: How many of them, the oldest, are right only by what the host took.
@@ -44,12 +43,7 @@ class MadeOf:
     """All messages of a topic against those of another one.
 
     Attributes:
-        fields: The compared fields.
-        values: Where the number in each comes from.
-        tolerance: Largest difference.
         sources: The messages that they come from, oldest first; at least one.
-        table: For each of these the numbers that should be in the fields.
-        samples: The messages that were published after the first of these.
     """
 
     fields: tuple[str, ...]
@@ -73,11 +67,7 @@ class MadeOf:
 
         Args:
             recording: The run; what the host took from the node makes older sources right.
-            messages: Oldest first.
             sources: Oldest first; at least one.
-            fields: Field of the messages -> where its value comes from.
-            tolerance: Largest difference.
-            within_s: How old the newest values may be.
 
         Raises:
             NoSuchField: A field does not exist, or holds no number.
@@ -109,7 +99,6 @@ class MadeOf:
         """Whether the values of a message are those of one source.
 
         Args:
-            sample: The message.
             window: Sources to look at; by default its own window.
             fields: Indices of the fields to look at; by default all.
         """

@@ -23,8 +23,6 @@ class SourceValue:
     """How a number follows from a message.
 
     Attributes:
-        text: As the author wrote it.
-        path: The field, or the quaternion whose yaw it is.
         is_yaw: Whether it is the yaw of a quaternion, in radians.
     """
 

@@ -17,13 +17,7 @@ MOST_BEHIND = 2
 
 @dataclass(frozen=True)
 class Answer:
-    """A command with what its sender can have known.
-
-    Attributes:
-        command: As published.
-        seen_ns: When the odometry was measured that it answers.
-        pose: The robot's then.
-    """
+    """A command with what its sender can have known."""
 
     command: Command
     seen_ns: int
@@ -31,12 +25,7 @@ class Answer:
 
 
 def answers(recording: Recording, behind: int) -> list[Answer]:
-    """Every command that knows where the robot is.
-
-    Args:
-        recording: Of a run whose robot moved.
-        behind: By how many messages the student was behind the newest odometry.
-    """
+    """Every command that knows where the robot is."""
     told = odometry(recording)
     found = []
     for item in commands(recording):

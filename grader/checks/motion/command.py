@@ -18,7 +18,6 @@ class Command:
     """A velocity command.
 
     Attributes:
-        time_ns: When it was published.
         twist: What it asks of the robot; may be NaN or infinite.
         stray: Other fields of it that are not zero, such as ``linear.y``.
     """

@@ -28,12 +28,7 @@ _SHORT_OF = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A command and the error it answers.
-
-    Attributes:
-        error_rad: In [-pi, pi].
-        command_rad_s: angular.z as published.
-    """
+    """A command and the error it answers."""
 
     error_rad: float
     command_rad_s: float
@@ -68,10 +63,8 @@ class Verdict:
     """A law with its figures.
 
     Attributes:
-        law: Which.
         gain: Slope of the line through the origin, in rad/s for each rad.
         r2: Coefficient of determination of that line, at most 1.
-        used: How many commands the line was laid through.
         values: For steps: the sizes of the commands, in rad/s.
         share: For an error that is not normalised: share of the commands that are a turn off.
     """
@@ -90,7 +83,6 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> V
     Args:
         samples: In the order of time; finite.
         limit_rad_s: What the robot can do; larger commands say little of the law.
-        least_r2: What counts as a good fit.
     """
     turning = [item for item in samples if abs(item.command_rad_s) > _ZERO_RAD_S]
     largest_rad = max((abs(item.error_rad) for item in samples), default=math.inf)
@@ -167,10 +159,6 @@ def fit(samples: Sequence[Sample], limit_rad_s: float) -> Verdict:
 
     A command at a limit is left out only if the line asks for at least that much there, so that
     a step does not pass for a clamp.
-
-    Args:
-        samples: Finite.
-        limit_rad_s: What the robot can do.
     """
     if not samples:
         return Verdict(Law.TOO_FEW)

@@ -21,10 +21,7 @@ class Detour:
     """A turn by the long way.
 
     Attributes:
-        step: Where it begins.
-        error_rad: What would have been the short way from there.
         away_rad: How far it turned away before it passed half a turn, or the run ended.
-        what: What it turned to.
     """
 
     step: Truth
@@ -39,10 +36,7 @@ def away(
     """Turns away from an error, by more than the tolerance, through half a turn.
 
     Args:
-        truth: Steps of a run.
         error: How far the robot would have to turn at a step, in rad from -pi to pi.
-        tolerance_rad: How far it may turn so.
-        what: What it turns to.
     """
     away_rad = 0.0
     begin: Truth | None = None

@@ -219,13 +219,7 @@ def _astray_m(run: Approach, position_m: float) -> float:
 
 
 def _why_far(run: Approach, seen: str, more_m: float) -> Cause | None:
-    """The cause if commands that came late by the machine's doing may explain a long path.
-
-    Args:
-        run: The run.
-        seen: What was seen.
-        more_m: How much longer than allowed it is, in m.
-    """
+    """The cause if commands that came late by the machine's doing may explain a long path."""
     lost_s = stolen_s(run.recording, run.truth[0].time_ns, run.truth[-1].time_ns)
     fastest = max(abs(step.linear_m_s) for step in run.truth)
     # What it drives on without a command, it has to come back.

@@ -21,7 +21,6 @@ class Sight:
 
     Attributes:
         name: Such as ``boxes[2]``.
-        distance_m: From the LiDAR to its outline.
         bearing_rad: In the robot's frame, counter-clockwise from straight ahead.
     """
 

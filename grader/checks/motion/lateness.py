@@ -13,11 +13,6 @@ def stolen_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
 
     The student's waits for a CPU and the probe's lateness, and how late the simulator itself
     was with its sensors' messages.
-
-    Args:
-        recording: The run.
-        begin_ns: Beginning of the interval.
-        end_ns: Its end.
     """
     late_s = [
         item.value or 0.0

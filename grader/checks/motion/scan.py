@@ -24,12 +24,7 @@ _STRIDE = 10
 
 @dataclass(frozen=True)
 class Misreading:
-    """What may have been read wrongly in a scan.
-
-    Attributes:
-        words: A clause to follow what was seen.
-        hint: What to try.
-    """
+    """What may have been read wrongly in a scan."""
 
     words: str
     hint: str
@@ -46,7 +41,6 @@ def front(scan: Message, lidar_rad: float = 0.0) -> float | None:
     """What the beam straight ahead reports, in metres; may be inf, NaN or 0.0.
 
     Args:
-        scan: What the LiDAR told.
         lidar_rad: How far the LiDAR is turned on the robot, counter-clockwise.
     """
     ranges = scan.value.get("ranges")
@@ -57,13 +51,7 @@ def front(scan: Message, lidar_rad: float = 0.0) -> float | None:
 
 
 def misreading(recording: Recording, time_ns: int, nearest: Sight | None) -> Misreading | None:
-    """Why the robot may have seen an obstacle ahead where there is none.
-
-    Args:
-        recording: The run.
-        time_ns: When it stopped, or did not start.
-        nearest: The nearest thing then, in any direction.
-    """
+    """Why the robot may have seen an obstacle ahead where there is none."""
     scan = newest(recording, time_ns)
     if scan is None:
         return None

@@ -18,13 +18,7 @@ _GOOD_R2 = 0.9
 
 
 def on_the_way(run: Approach, known: Sequence[Answer], position_m: float) -> list[Sample]:
-    """Commands until the robot is near the goal, with the error to the goal's direction.
-
-    Args:
-        run: The run.
-        known: As :func:`~grader.checks.motion.answer.answers` finds them.
-        position_m: How near.
-    """
+    """Commands until the robot is near the goal, with the error to the goal's direction."""
     return [_to_goal(run, item) for item in before_arrival(run, known, position_m)]
 
 
@@ -41,12 +35,6 @@ def at_the_goal(
     """Commands since the robot has stopped near the goal, with the error to its heading.
 
     One that drives on while it turns is judged by what it does since it arrived.
-
-    Args:
-        run: The run.
-        known: As :func:`~grader.checks.motion.answer.answers` finds them.
-        position_m: How near.
-        limit_rad_s: The robot's.
     """
     arrival, driven = run.arrival(position_m), run.driven(position_m)
     since_ns: float

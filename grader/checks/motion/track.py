@@ -58,11 +58,7 @@ def turned_rad(truth: Sequence[Truth]) -> float:
 
 
 def turns_one_way(truth: Sequence[Truth]) -> float:
-    """Whole turns of a robot that turns on and on in one sense, counter-clockwise positive.
-
-    Returns:
-        Their number, or 0.0 where it is less than one and a half, or the sense changes.
-    """
+    """Whole turns of a robot that turns on and on in one sense, counter-clockwise positive."""
     net_rad = turned_rad(truth)
     gross_rad = sum(abs(wrap_angle(b.yaw_rad - a.yaw_rad)) for a, b in pairwise(truth))
     is_one_way = abs(net_rad) >= max(1.5 * math.tau, _ONE_WAY * gross_rad)
@@ -146,9 +142,6 @@ def over_time(
     """Draw something of the truth over time, thinned out to what can be seen.
 
     Args:
-        recording: The run.
-        title: What is shown.
-        y_label: With unit.
         value: Ordinate of a step; None leaves it out.
         band: Lowest and highest allowed ordinate, or None.
     """

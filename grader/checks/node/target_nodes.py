@@ -12,9 +12,6 @@ def target_nodes(recording: Recording) -> tuple[Node, ...]:
     node of the program, and is destroyed again or never spun; what becomes of those is its own
     affair.
 
-    Args:
-        recording: The run.
-
     Returns:
         In the order of their appearance; empty if no node has such an endpoint.
     """

@@ -17,10 +17,6 @@ def with_runtime_imports(
     """The same submission, with what its code imported in the runs beside what it names.
 
     What a library imports in its turn is not the student's to declare, and is left out.
-
-    Args:
-        submission: What is known before anything of it runs.
-        recordings: Its runs.
     """
     found = {
         Import(str(item.data["module"]), path, item.data["line"])

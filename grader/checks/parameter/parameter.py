@@ -189,13 +189,7 @@ def why_services_silent(recording: Recording, node: str, calls: tuple[Call, ...]
 
 
 def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
-    """Why the probe asked a node's parameter services no more: an answer that was late or lost.
-
-    Args:
-        recording: The run.
-        node: Fully qualified name.
-        what: What was not asked, in words.
-    """
+    """Why the probe asked a node's parameter services no more: an answer that was late or lost."""
     calls = [
         call
         for call in recording.calls

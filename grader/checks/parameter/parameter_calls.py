@@ -43,8 +43,6 @@ class Range:
     """Values that a number may have, both ends included.
 
     Attributes:
-        low: Lowest.
-        high: Highest.
         step: Between two values, 0 for any.
     """
 
@@ -58,12 +56,8 @@ class Descriptor:
     """How a parameter is declared.
 
     Attributes:
-        name: Of the parameter.
         type: As in :data:`TYPES`, or ``not set``.
-        read_only: It cannot be set.
-        dynamic: Its type may change.
         range: Allowed values, or None.
-        description: For people.
     """
 
     name: str
@@ -79,7 +73,6 @@ class Reading:
     """A value at a time.
 
     Attributes:
-        call: The call that told it.
         value: It, or None where it is not set.
     """
 
@@ -92,10 +85,7 @@ class Setting:
     """An attempt to set a parameter.
 
     Attributes:
-        call: The call that tried.
-        value: What it should be.
         accepted: Whether the node set it; None without an answer.
-        reason: Why not, in the node's words.
     """
 
     call: Call

@@ -25,9 +25,6 @@ class Comparison:
     """One policy of a publisher and a subscription.
 
     Attributes:
-        policy: Its name.
-        offered: By the publisher, in words.
-        requested: By the subscription, in words.
         compatible: Whether this policy lets them match; None where it is not known.
         rule: What must hold.
     """

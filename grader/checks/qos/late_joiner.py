@@ -106,12 +106,7 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
 
 @dataclass(frozen=True)
 class _Before:
-    """What was published before a late joiner was there.
-
-    Attributes:
-        messages: As far as they were received, oldest first.
-        number: How many there were.
-    """
+    """What was published before a late joiner was there."""
 
     messages: list[Message]
     number: int

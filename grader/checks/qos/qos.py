@@ -81,10 +81,8 @@ class _Side:
     """The words and the rule for one end.
 
     Attributes:
-        kind: Publisher or subscription.
         has: ``offers`` or ``requests``.
         did: ``offered`` or ``requested``.
-        partner: The other end, in words.
         comparisons: (found, expected) -> how a partner with the expected profile fits.
     """
 

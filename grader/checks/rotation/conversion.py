@@ -50,14 +50,7 @@ class WrongMessage(ValueError):
 
 @dataclass(frozen=True)
 class Conversion:
-    """One way to write a rotation, turned into another.
-
-    Attributes:
-        asks: Field paths of a question, in the order of its row.
-        answers: Field paths of an answer, in the order of its row.
-        group: What is special about a question.
-        shown: A question in words.
-    """
+    """One way to write a rotation, turned into another."""
 
     asks: tuple[str, ...]
     answers: tuple[str, ...]
@@ -147,7 +140,6 @@ def oracle(name: str, questions: Rows) -> Rows:
     """The right rotations.
 
     Args:
-        name: Of the conversion.
         questions: Shape (n, k), as in the module's description.
 
     Returns:

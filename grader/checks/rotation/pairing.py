@@ -34,7 +34,6 @@ def pair(
         asked_ns: When each question was sent, in order.
         answered_ns: When each answer was published, in order.
         right: Whether an answer would be right for a question, shape (questions, answers).
-        optional: Questions that need no answer.
 
     Returns:
         Per answer the index of its question; None for what came before the first question.
@@ -63,10 +62,7 @@ def _align(
     """The cheapest pairing.
 
     Args:
-        asked_ns: As for :func:`pair`.
         answered_ns: As for :func:`pair`; at least one is not before the first question.
-        right: As for :func:`pair`.
-        optional: As for :func:`pair`.
         wrong: Cost of a wrong answer; a question without an answer costs 1.
         copy: Cost of an answer once more, after a question that needs none.
     """

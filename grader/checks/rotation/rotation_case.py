@@ -29,7 +29,6 @@ class Limits:
     """What is right.
 
     Attributes:
-        angle_rad: How far an answer may be from the right rotation.
         length: How far the length of a quaternion may be from 1.
     """
 
@@ -42,10 +41,8 @@ class Answer:
     """One answer to a question.
 
     Attributes:
-        row: Its numbers.
         error_rad: Angle between its rotation and the right one; infinite where it is none.
         length: Of a quaternion; None for angles.
-        good: Whether it is within the limits.
     """
 
     row: tuple[float, ...]
@@ -65,10 +62,7 @@ class Case:
 
     Attributes:
         number: Of the question, counted from 1.
-        row: Its numbers.
-        group: What is special about it.
         right: Unit quaternion (x, y, z, w) of the right rotation.
-        asked_ns: When it was sent.
         answers: The worst first; none if nothing answers it.
         behind_s: Where the next question had been sent already when the first answer came: how
             long ago the newest question was sent then; else None.
@@ -110,12 +104,6 @@ def cases(
     conversion: str, sent: Sequence[Message], received: Sequence[Message], limits: Limits
 ) -> tuple[Case, ...]:
     """Pair answers with questions and measure them.
-
-    Args:
-        conversion: Name of the conversion.
-        sent: Questions, oldest first.
-        received: Answers, oldest first.
-        limits: What is right.
 
     Raises:
         WrongMessage: A message is not of the conversion.

@@ -52,15 +52,7 @@ def right_words(conversion: str, case: Case) -> str:
 def evidence_of(
     recording: Recording, conversion: str, topic: str, tolerance_rad: float, judged: list[Case]
 ) -> Evidence:
-    """Wrong answers in a table, and the error of each case.
-
-    Args:
-        recording: The run.
-        conversion: Its name.
-        topic: Where the answers came.
-        tolerance_rad: Largest allowed error.
-        judged: The cases.
-    """
+    """Wrong answers in a table, and the error of each case."""
     question = CONVERSIONS[conversion].shown
     wrong = [case for case in judged if not case.good]
     rows = tuple(

@@ -62,8 +62,6 @@ class Mistake:
     """A mistake.
 
     Attributes:
-        words: Clause that says what is wrong.
-        hint: What to try.
         formula: From questions, shape (n, k), to the answers that it gives, shape (n, l).
     """
 
@@ -78,10 +76,8 @@ def explain(
     """The mistake that gives these answers.
 
     Args:
-        conversion: Its name.
         questions: Of the wrong cases, shape (n, k).
         answers: The wrong answers, finite, shape (n, l).
-        tolerance_rad: How far an answer may be from what the mistake gives.
 
     Returns:
         The mistake that explains the most, with the share that it explains; None if none
@@ -106,7 +102,6 @@ def wrong_part(conversion: str, questions: Rows, answers: Rows) -> tuple[str, st
     """The only one of roll, pitch and yaw that is wrong, as a clause and what to try.
 
     Args:
-        conversion: Its name.
         questions: Of the wrong cases, shape (n, k).
         answers: The wrong answers, finite, shape (n, l).
 
@@ -290,7 +285,6 @@ def _each_angle(
     """A factor on all three angles, or on one of them.
 
     Args:
-        times: The formula that multiplies roll, pitch and yaw by factors.
         mistakes: What is wrong, to follow "the angles are"; the factor; what to try.
     """
     return tuple(

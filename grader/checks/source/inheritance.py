@@ -80,12 +80,7 @@ class Family:
         return known
 
     def inherits(self, item: Found, base: str) -> Kinship:
-        """Whether a class inherits another one.
-
-        Args:
-            item: The class.
-            base: Dotted name of the other.
-        """
+        """Whether a class inherits another one."""
         ancestors = self.ancestors(item)
         if ancestors & _SAME.get(base, frozenset({base})):
             return Kinship.YES

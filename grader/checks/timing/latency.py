@@ -29,7 +29,6 @@ class Reaction:
     """A message that the probe sent, and what came of it.
 
     Attributes:
-        sent: The message.
         answer: The first message that may answer it, or None.
     """
 
@@ -51,11 +50,6 @@ def reactions(
 
     An answer belongs to one message: the oldest that is still unanswered when it comes. A
     message whose time has passed when the next answer comes was not answered.
-
-    Args:
-        sent: In the order of their stamps.
-        answers: Likewise.
-        within_ns: How long an answer may take to count as one.
     """
     stamps = [message.stamp_ns for message in answers]
     found = []

@@ -29,9 +29,6 @@ class Interval:
     """Time between two messages that one writer published one after the other.
 
     Attributes:
-        begin_ns: Source timestamp of the earlier.
-        end_ns: Source timestamp of the later.
-        seconds: Their difference.
         before_ns: Where the interval before began, or ``begin_ns`` for the first.
     """
 
@@ -46,9 +43,6 @@ class Limits:
     """What is allowed.
 
     Attributes:
-        period_s: Expected period.
-        median_s: How far the median may be from it.
-        spread_s: How far a single interval may be from the median.
         outliers: Share of irregular intervals that is allowed; rounded down, but one at least
             unless it is zero.
     """
@@ -65,14 +59,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Verdict:
-    """How intervals compare with limits.
-
-    Attributes:
-        median_s: Median interval.
-        irregular: Indices of irregular intervals, a pair by its first.
-        period_good: The median is within its tolerance.
-        regular: No more intervals are irregular than allowed.
-    """
+    """How intervals compare with limits."""
 
     median_s: float
     irregular: tuple[int, ...]
@@ -110,7 +97,6 @@ def judge(seconds: Sequence[float], limits: Limits) -> Verdict:
 
     Args:
         seconds: At least one interval, in their order.
-        limits: What is allowed.
     """
     middle = median(seconds)
     irregular = _irregular([value - middle for value in seconds], limits.spread_s + _EPSILON_S)

@@ -34,7 +34,6 @@ class Explanation:
 
     Attributes:
         words: A clause to follow the figures, or empty.
-        hint: What to try.
     """
 
     words: str
@@ -51,11 +50,7 @@ def explain(
     """Explain why the rhythm is not the expected one.
 
     Args:
-        recording: The run.
-        topic: Where the messages were published.
         measured: Intervals, at least one.
-        verdict: That is not good.
-        limits: What was allowed.
     """
     declared = [timer.period_s for timer in declarations.timers(recording)]
     often = _too_often(recording, topic, measured, verdict, limits, declared)
@@ -71,11 +66,6 @@ def is_declared(recording: Recording, verdict: Verdict, limits: Limits) -> bool:
 
     A hold-up moves single messages of a timer, never its period: then it is not the machine's
     doing.
-
-    Args:
-        recording: The run.
-        verdict: On the intervals.
-        limits: What was allowed.
     """
     declared = [timer.period_s for timer in declarations.timers(recording)]
     right = [item for item in declared if judge([item], limits).period_good]

@@ -28,10 +28,6 @@ _HINT = "Publish when the time has come, and leave the clock of the process alon
 def why_not_believed(recording: Recording, messages: Sequence[Message]) -> Cause | None:
     """Why the source timestamps of these messages do not tell when they were published.
 
-    Args:
-        recording: Where they were recorded.
-        messages: In the order of their source timestamps.
-
     Returns:
         A cause, an error where the host's disturbance may explain the difference, or None. What
         the middleware alone may have held up has to happen twice.

@@ -27,8 +27,6 @@ class Reading:
     """A way to read yaw.
 
     Attributes:
-        words: What comes out.
-        hint: What to do about it.
         of: From the true yaw, in rad.
     """
 
@@ -105,10 +103,6 @@ def misread_yaw(run: Approach, position_m: float) -> Reading | None:
 
     The commands then are in proportion to the direction of the goal less that yaw, and not in
     proportion to the direction less the true one.
-
-    Args:
-        run: The run.
-        position_m: How near the goal the way to it ends.
     """
     scene = run.recording.scene
     limit_rad_s = scene.max_angular_rad_s if scene is not None else math.inf

@@ -75,11 +75,7 @@ _HINTS = {
 
 
 def mistake_hint(failure: Failure) -> str | None:
-    """What to try after such an exception; None if it is no known one.
-
-    Args:
-        failure: What ended a process.
-    """
+    """What to try after such an exception; None if it is no known one."""
     taken = _NO_SETTER.match(failure.message)
     if taken and (name := taken[1] or taken[2]) in _NODE_PROPERTIES:
         return (

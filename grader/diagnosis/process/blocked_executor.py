@@ -31,11 +31,6 @@ def first_unanswered(recording: Recording, nodes: Collection[str], since_ns: int
 
     A node's parameter services answer only while its executor spins. What the machine took from
     the node is no time for an answer, and so a node that only gets no CPU is never blocked.
-
-    Args:
-        recording: The run.
-        nodes: Fully qualified names of the nodes in question.
-        since_ns: An answer before this says nothing.
     """
     calls = [
         call
@@ -55,10 +50,6 @@ def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float
 
     A single one may have been lost on its way. What the machine took from the nodes meanwhile
     does not count.
-
-    Args:
-        recording: The run.
-        nodes: Fully qualified names of the nodes in question.
     """
     waits = []
     for call in recording.calls:
@@ -81,13 +72,7 @@ def stuck_callback(recording: Recording) -> SourceError | None:
 
 
 def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
-    """The cause if callbacks are not called, or late; None where nothing tells of it.
-
-    Args:
-        recording: The run.
-        seen: What was seen of it.
-        nodes: Fully qualified names of those whose callbacks should run.
-    """
+    """The cause if callbacks are not called, or late; None where nothing tells of it."""
     return (
         why_never_spun(recording, seen, nodes)
         or why_blocked(recording, seen, nodes, recording.launched_ns)
@@ -98,14 +83,7 @@ def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> C
 def why_blocked(
     recording: Recording, seen: str, nodes: Collection[str], since_ns: int
 ) -> Cause | None:
-    """The cause if an executor never comes round, as unanswered calls to its node tell.
-
-    Args:
-        recording: The run.
-        seen: What was seen of it.
-        nodes: Fully qualified names of those whose callbacks should run.
-        since_ns: An answer before this says nothing.
-    """
+    """The cause if an executor never comes round, as unanswered calls to its node tell."""
     call = first_unanswered(recording, nodes, since_ns)
     if call is None:
         return None
@@ -120,13 +98,7 @@ def why_blocked(
 
 
 def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause | None:
-    """The cause if callbacks keep each other waiting for long, as late answers to calls tell.
-
-    Args:
-        recording: The run.
-        seen: What was seen of it.
-        nodes: Fully qualified names of those whose callbacks should run.
-    """
+    """The cause if callbacks keep each other waiting for long, as late answers to calls tell."""
     waited = long_wait(recording, nodes)
     if waited is None or waited[1] <= _SLOW_S:
         return None
@@ -165,11 +137,7 @@ def why_never_spun(
     """The cause if nothing spins a node, by the word of its process's tracer.
 
     Args:
-        recording: The run.
-        seen: What was seen of it.
-        nodes: Fully qualified names of those whose callbacks should run.
         processes: Which may be the one that never spun; by default all.
-        moments: Evidence besides the place at which it was interrupted.
     """
     candidates = recording.processes if processes is None else processes
     process = next(
@@ -192,14 +160,7 @@ def why_never_spun(
 def why_not_given(
     recording: Recording, seen: str, nodes: Iterable[str], moments: tuple[Moment, ...] = ()
 ) -> Cause | None:
-    """The cause if nodes were given to no executor, though their process has one that spins.
-
-    Args:
-        recording: The run.
-        seen: What was seen of it.
-        nodes: Their fully qualified names.
-        moments: Evidence.
-    """
+    """The cause if nodes were given to no executor, though their process has one that spins."""
     names = sorted(set(nodes))
     if not names or not all(declarations.in_no_executor(recording, name) for name in names):
         return None

@@ -30,11 +30,7 @@ _ELSE = "Otherwise it is used before it is defined, or misspelt."
 
 
 def import_hint(message: str) -> str | None:
-    """What to try where a well-known name was not imported; None for any other name.
-
-    Args:
-        message: Of a NameError.
-    """
+    """What to try where a well-known name was not imported; None for any other name."""
     found = _UNDEFINED.match(message)
     name = found[1] if found else ""
     if name == "self":

@@ -26,9 +26,7 @@ def lacking_package(
     same holds for one that the build does not find.
 
     Args:
-        message: Of a ``ModuleNotFoundError``.
         submission: What was handed in; its own packages are its own matter.
-        installed: Packages that are known to be there, which a program may keep from itself.
     """
     found = _MISSING_ROOT.match(message)
     if found is None or found[1] not in PACKAGES:
@@ -43,7 +41,6 @@ def library_hint(message: str, recording: Recording) -> str | None:
     """What to do about an import of a library that is not among those of the assignment.
 
     Args:
-        message: Of the ``ModuleNotFoundError``.
         recording: Of the run; where it was in a sandbox, it names the libraries.
 
     Returns:

@@ -56,7 +56,6 @@ def newer_name(failure: Failure, recording: Recording) -> NewerName | None:
     """The name that a failure is about, if only the machine that grades lacks it.
 
     Args:
-        failure: What ended a process.
         recording: Of the run; it tells the version of Python.
     """
     dropped = _dropped_by_numpy(failure)

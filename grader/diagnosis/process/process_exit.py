@@ -203,12 +203,7 @@ def why_ended(recording: Recording, seen: str = "") -> Cause | None:
 
 
 def why_it_exited(recording: Recording, process: Process) -> Cause:
-    """Why a process ended early, with its exception and the student's line if there is one.
-
-    Args:
-        recording: Where it ran.
-        process: One that :func:`ended_early`.
-    """
+    """Why a process ended early, with its exception and the student's line if there is one."""
     left = process.stopped_by != "itself"
     exited_ns = declarations.exiting_ns(recording, process.name) if left else process.exited_ns
     when_s = recording.since_launch_s(exited_ns or recording.stop_ns)

@@ -25,7 +25,6 @@ class Frame:
     """One step of a traceback.
 
     Attributes:
-        file: Path as Python printed it.
         line: Line from 1.
         where: Function, or ``<module>``; empty for a syntax error.
         source: The line of code, or empty.
@@ -43,9 +42,6 @@ class Failure:
 
     Attributes:
         type: Short name of the class, such as ``ValueError``.
-        message: First line of its text.
-        frames: Outermost first.
-        linked: It was raised while the failure before it was handled.
         ignored: Python printed and ignored it (``Exception ignored in ...``).
     """
 
@@ -61,11 +57,7 @@ class Failure:
 
 
 def parse_failures(lines: Sequence[str]) -> tuple[Failure, ...]:
-    """Find every traceback in the output of one process.
-
-    Args:
-        lines: Lines without line ends, in the order they were written.
-    """
+    """Find every traceback in the output of one process."""
     found: list[Failure] = []
     linked = ignored = False
     # What C code raised has no frames: the next failure, which has, is what came of it.
@@ -185,8 +177,6 @@ def student_place(
     """The deepest frame in the student's own files, with its path in the submission.
 
     Args:
-        failure: What was raised.
-        submission: Knows which installed file came from where.
         message: What to say at the place; by default the exception.
     """
     frame = _student_frame(failure, submission)

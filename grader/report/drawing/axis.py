@@ -16,7 +16,6 @@ def time_axis(scale: Scale, y: float, width: float) -> list[Markup]:
     Args:
         scale: Seconds to pixels.
         y: Pixel of the line.
-        width: Of the drawing.
     """
     drawn = [line(scale.begin, y, scale.end, y, "axis")]
     for value, text in ticks(scale.low, scale.high, 10 if width > NARROW else 5):

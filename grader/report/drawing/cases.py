@@ -37,7 +37,6 @@ def draw_cases(cases: Cases, name: str) -> Figure:
     """Draw the error of each case.
 
     Args:
-        cases: What was tried.
         name: Unique in the document; letters, digits and hyphens.
     """
     caption = _caption(cases)

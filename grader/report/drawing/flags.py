@@ -19,7 +19,6 @@ class Flag:
 
     Attributes:
         time_s: Seconds since launch.
-        text: What happened, with the time in words.
     """
 
     time_s: float
@@ -31,9 +30,7 @@ class PlacedFlag:
     """A flag with its place.
 
     Attributes:
-        flag: What it says.
         x: Pixel of its leader.
-        row: Row from the top.
         left: Whether its text lies left of the leader, because it would not fit on the right.
     """
 
@@ -58,7 +55,6 @@ def place(flags: Sequence[Flag], scale: Scale) -> tuple[PlacedFlag, ...]:
     and only there a leader passes behind a text.
 
     Args:
-        flags: In the order of their times.
         scale: Seconds to pixels.
     """
     rights: list[PlacedFlag] = []
@@ -88,7 +84,6 @@ def draw_flags(flags: Sequence[Flag], scale: Scale, below: float) -> tuple[list[
     """Draw flags with leaders that go on through what is drawn below.
 
     Args:
-        flags: In the order of their times.
         scale: Seconds to pixels.
         below: Height of what is drawn below, in pixels.
 

@@ -29,8 +29,6 @@ class View:
     """What part of a world is shown, and how large.
 
     Attributes:
-        left_m: West edge.
-        top_m: North edge.
         scale: Pixels for a metre.
         width: Pixels.
         height: Pixels.
@@ -58,7 +56,6 @@ def fit(points: Iterable[Point], scene: Scene, width: float, lowest: float, high
 
     Args:
         points: Positions that must be seen, in metres; at least one.
-        scene: The world.
         width: Of the drawing, in pixels.
         lowest: Its least height, in pixels.
         highest: Its greatest height, in pixels.

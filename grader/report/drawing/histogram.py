@@ -16,7 +16,6 @@ def bars(values: Sequence[float], y: Scale, left: float, right: float) -> list[M
     """Draw a histogram beside a plot, with its counts to the right.
 
     Args:
-        values: Ordinates of the plot, finite.
         y: Its axis; ``begin`` is the lower end.
         left: First pixel.
         right: Last pixel.

@@ -61,11 +61,7 @@ class _Panel:
     """One of the two speeds, drawn as high in every width.
 
     Attributes:
-        title: What it is.
-        y: Scale of its values.
-        limits: Of the robot, where it came near, each with its label.
         command: What was commanded and in force: times (s since launch) and vertical pixels.
-        true: What it was, in the same units.
     """
 
     title: str
@@ -79,7 +75,6 @@ def draw_motion(recording: Recording, name: str) -> Figure | None:
     """Draw commands and speeds of a run.
 
     Args:
-        recording: The run.
         name: Unique in the document; letters, digits and hyphens.
 
     Returns:

@@ -46,7 +46,6 @@ class Target:
 
     Attributes:
         pose: In the world's frame.
-        radius_m: How far from it is still right.
     """
 
     pose: Pose
@@ -57,8 +56,6 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Fig
     """Draw the path of the robot.
 
     Args:
-        recording: The run.
-        targets: Where it should end.
         name: Unique in the document; letters, digits and hyphens.
 
     Returns:
@@ -94,14 +91,8 @@ class _Course:
     """What is to be drawn, whatever the width.
 
     Attributes:
-        scene: The world.
-        truth: Of the robot.
-        targets: Where it should end.
         outline: Positions along the path, in metres; those on straight lines are left out.
-        gone_m: Length of the path up to each step.
-        moved: Whether the robot has left its place or its heading.
         stopped: Where it first came to rest with something near ahead, and how far that was.
-        touched: The first step of every contact.
     """
 
     scene: Scene

@@ -90,12 +90,6 @@ class _Values:
     """What is to be drawn, whatever the width.
 
     Attributes:
-        points: Those that can be drawn.
-        shown: Of these, those that can be told apart in the wide drawing.
-        inside: Whether each of those is within the band.
-        outside: How many of all points are not.
-        y: Scale of the ordinates.
-        edges: Of the band, those that can be drawn.
         course: Of the shown points, those that a line through them needs in the wide drawing.
     """
 

@@ -28,7 +28,6 @@ class Figure:
     """A drawing.
 
     Attributes:
-        caption: What is to be seen, for everybody.
         wide: SVG for :data:`WIDE` pixels.
         narrow: The same for :data:`NARROW` pixels.
     """
@@ -77,8 +76,6 @@ def element(tag: str, *content: str, **attributes: str | float) -> Markup:
     """An element; text and attributes are escaped, nested elements are not again.
 
     Args:
-        tag: Name of the element.
-        content: Text or elements.
         attributes: By name; ``class_`` gives ``class``, ``stroke_width`` ``stroke-width``.
     """
     # Plain strings, each escaped here: Markup.format takes ten times as long.
@@ -96,10 +93,7 @@ def drawing(
 
     Args:
         name: Unique in the document; letters, digits and hyphens.
-        title: What it is.
-        description: What is to be seen in it, in words.
         size: Width and height in pixels.
-        content: Its elements.
     """
     width, height = size
     return element(
@@ -162,7 +156,6 @@ def outline(points: Sequence[Point], tolerance: float = 0.3) -> list[int]:
 
     Args:
         points: At least one.
-        tolerance: How far a point that is left out may lie from the line, in the points' unit.
 
     Returns:
         Their indices, in order.

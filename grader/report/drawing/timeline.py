@@ -45,11 +45,7 @@ class Lane:
     """A row of the time line; all times in seconds since launch.
 
     Attributes:
-        name: Whose it is.
-        note: What is to be seen in it, in words.
         bar: From when to when it was there, or None.
-        ticks: Single events.
-        crosses: Single events that went wrong.
     """
 
     name: str
@@ -63,8 +59,6 @@ def draw_timeline(recording: Recording, moments: Sequence[Moment], name: str) ->
     """Draw the time line of a run.
 
     Args:
-        recording: The run.
-        moments: Times that findings point at.
         name: Unique in the document; letters, digits and hyphens.
 
     Returns:

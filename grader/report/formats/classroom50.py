@@ -50,8 +50,6 @@ def render_result(result: Result, identity: Mapping[str, str], committed: str) -
     """Render ``result.json``; students can read it, so it is made from their copy.
 
     Args:
-        result: What to render.
-        identity: See :func:`identity`.
         committed: When the graded commit was made, ISO 8601 in UTC; a regrade does not move it.
 
     Raises:

@@ -55,7 +55,6 @@ def summary(result: Result, used_bytes: int = 0) -> str:
 
     Args:
         result: What to tell of; only what students get to see is told.
-        used_bytes: What the file holds already.
     """
     return render_markdown(for_student(result), SUMMARY_BYTES - used_bytes)
 
@@ -64,10 +63,6 @@ def outputs(result: Result, delimiter: str) -> str:
     """Lines for ``$GITHUB_OUTPUT``.
 
     They set ``score`` (empty where there is none), ``max-score``, ``status`` and ``summary``.
-
-    Args:
-        result: What to tell of.
-        delimiter: A text that stands in no value, such as a random one.
     """
     copy = for_student(result)
     values = {
@@ -100,8 +95,6 @@ def command(name: str, message: str, **properties: str) -> str:
     """Write a workflow command.
 
     Args:
-        name: Such as ``error``.
-        message: Any text.
         properties: Such as ``file``; the runner decodes them.
     """
     told = ",".join(f"{key}={_property(value)}" for key, value in properties.items())

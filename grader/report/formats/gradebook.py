@@ -45,10 +45,7 @@ class CanvasExport:
     """A gradebook as Canvas exported it.
 
     Attributes:
-        identity: Headers of the columns that say who a student is.
-        columns: Headers of the other columns.
         points: What it says of the points of each of them: a number, ``(read only)``, or nothing.
-        students: Their identity cells, a row each.
         excused: For each of these rows, the columns that Canvas excuses the student from.
     """
 
@@ -64,10 +61,7 @@ class CanvasFile:
     """A gradebook to import into Canvas.
 
     Attributes:
-        text: CSV.
-        filled: Students with a score.
         problems: What an instructor must know: who could not be matched, who is not graded.
-        doubts: What may be meant so: that Canvas counts other points.
     """
 
     text: str
@@ -78,10 +72,6 @@ class CanvasFile:
 
 def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> str:
     """The gradebook of a class: a row for everybody, a column for each check.
-
-    Args:
-        rows: All of one assignment.
-        zero: What gets 0 points of the rows without a grade.
 
     Returns:
         CSV. What could not be judged is an empty cell, and so is the score of a row that has no
@@ -137,10 +127,6 @@ def _score(row: ClassRow, zero: Collection[RowStatus]) -> float | None:
 def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
     """Read a gradebook as Canvas exports it, with commas or with semicolons.
 
-    Args:
-        text: The file.
-        name: What to call it in errors.
-
     Raises:
         UsageError: It is not one.
     """
@@ -177,8 +163,6 @@ def canvas_csv(
     """Fill a Canvas gradebook.
 
     Args:
-        rows: All of one assignment.
-        export: The course's own gradebook.
         column: Title of the assignment in Canvas, with or without its number; by default the
             title of the column that the export has for the assignment's id.
         zero: What gets 0 points of the rows without a grade. Students of the gradebook that no

@@ -52,7 +52,6 @@ def render_gradescope(result: Result, metadata: Mapping[str, Any] | None = None)
     """Render a result as ``results.json``.
 
     Args:
-        result: The whole result, hidden checks too.
         metadata: Gradescope's ``submission_metadata.json``, or None.
     """
     copy = for_student(result)

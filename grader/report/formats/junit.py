@@ -27,10 +27,6 @@ _WITHOUT_POINTS = "no points"
 def render_junit(result: Result, *, xunit1: bool = False) -> str:
     """Render a result as JUnit XML.
 
-    Args:
-        result: What to render.
-        xunit1: In the older family.
-
     Returns:
         A whole document; the same input gives the same text.
     """

@@ -32,7 +32,6 @@ def render_markdown(result: Result, most_bytes: int | None = None) -> str:
     """Render a result.
 
     Args:
-        result: What to render.
         most_bytes: Length as UTF-8 that must not be exceeded; what comes last is left out.
 
     Returns:
@@ -53,12 +52,7 @@ def render_markdown(result: Result, most_bytes: int | None = None) -> str:
 
 
 def prose(text: str, *, cell: bool = False) -> str:
-    """Text of a finding in one line; only what stands between backticks is markup, as code.
-
-    Args:
-        text: What to show.
-        cell: It stands in a table, whose cells end at a bar even within code.
-    """
+    """Text of a finding in one line; only what stands between backticks is markup, as code."""
     parts = one_line(text).split("`")
     if len(parts) % 2 == 0:
         parts[-2:] = [f"{parts[-2]}`{parts[-1]}"]

@@ -18,7 +18,6 @@ class BuildLog:
 
     Attributes:
         first: The lines around the student's own mistake, with the place marked.
-        whole: All that was kept of the output.
     """
 
     first: tuple[tuple[str, bool], ...]

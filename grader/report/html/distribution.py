@@ -18,8 +18,6 @@ def draw_distribution(scores: Sequence[float], most: float, name: str) -> Figure
     """Draw a histogram of scores, with full points apart.
 
     Args:
-        scores: Of everybody who was graded.
-        most: Points that there are.
         name: Unique in the document; letters, digits and hyphens.
 
     Returns:

@@ -33,12 +33,7 @@ class Handout:
     """What a student is given.
 
     Attributes:
-        id: Of the assignment.
-        title: One line.
         text: The handout in Markdown; empty where the author wrote none.
-        checks: What they get to see, in the author's order.
-        hidden: How many more checks there are.
-        hidden_points: What those give.
     """
 
     id: str
@@ -68,9 +63,6 @@ class Handout:
 
 def make_handout(loaded: LoadedAssignment) -> Handout:
     """Collect what a student is given.
-
-    Args:
-        loaded: The assignment.
 
     Raises:
         UsageError: Its handout cannot be read.

@@ -31,14 +31,7 @@ _UNGRADED = (RowStatus.NOT_GRADED, RowStatus.UNREADABLE, RowStatus.MISSING)
 
 @dataclass(frozen=True)
 class Column:
-    """A check over the whole class.
-
-    Attributes:
-        id: Of the check.
-        title: For people.
-        max_points: For passing.
-        counts: Status -> submissions.
-    """
+    """A check over the whole class."""
 
     id: str
     title: str
@@ -53,9 +46,6 @@ class Column:
 
 def render_overview(rows: Sequence[ClassRow]) -> str:
     """Render the overview of a class.
-
-    Args:
-        rows: One for everybody, in the order in which they shall stand.
 
     Returns:
         A whole HTML document; the same input gives the same text. Its links are relative to

@@ -29,10 +29,6 @@ class Pictures:
 
     Attributes:
         open: Whether they are shown at once: something was lost in this run, or a limit reached.
-        path: The robot in its world.
-        motion: Commands and speeds.
-        timeline: What happened when.
-        qos: Offered against requested.
     """
 
     open: bool
@@ -62,9 +58,6 @@ class Gallery:
         """Draw a plot, or say where it is.
 
         Args:
-            plot: What to draw.
-            name: For the drawing, unique in the document.
-            scenario: The run that it is of.
             folded: Whether the finding is folded up at first. One that is not shows its plot,
                 even if one that is has it too.
         """
@@ -78,13 +71,7 @@ class Gallery:
 
 
 def draw_run(grade: Grade, section: Section, *, alone: bool) -> Pictures | None:
-    """Draw what there is of a section's run, or None where it has none.
-
-    Args:
-        grade: The grade.
-        section: One of its sections.
-        alone: Whether it is the only run.
-    """
+    """Draw what there is of a section's run, or None where it has none."""
     if section.scenario is None or section.recording is None:
         return None
     name, recording = section.scenario.id, section.recording

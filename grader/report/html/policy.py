@@ -13,7 +13,6 @@ def content_security_policy(style: str, script: str = "") -> str:
     """The content of the policy's meta element.
 
     Args:
-        style: Exactly what stands in the style element.
         script: Exactly what stands in the script element; a page without one runs none.
     """
     scripts = _source(script) if script else "'none'"

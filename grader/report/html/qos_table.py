@@ -17,12 +17,8 @@ class Pair:
     """A publisher and a subscription on one topic.
 
     Attributes:
-        topic: Fully qualified topic name.
         publisher: Its node, or ``the grader``.
         subscription: Its node, or ``the grader``.
-        cells: Policy -> what is offered and what is requested, in words.
-        refused: Policies by which they do not match.
-        types_differ: Whether they do not match because of their types.
     """
 
     topic: str

@@ -44,7 +44,6 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
     """Make the replay of a run, or None in a scenario without a simulated robot.
 
     Args:
-        recording: The run.
         scenario: What was run; it knows the units of the random values.
     """
     scene, truth = recording.scene, recording.truth
@@ -88,13 +87,7 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
 
 
 def with_goals(replay: Replay, assignment: Assignment, scenario: str) -> Replay:
-    """Add where the robot should end, as the checks say it now.
-
-    Args:
-        replay: A run.
-        assignment: With its checks.
-        scenario: Id of what was run.
-    """
+    """Add where the robot should end, as the checks say it now."""
     return {
         **replay,
         "goals": [

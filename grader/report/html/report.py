@@ -46,11 +46,7 @@ def render_report(
     """Render the report of one submission.
 
     Args:
-        grade: The grade.
         recordings: By scenario id; may lack scenarios that were not run.
-        facts: How the grade came about.
-        references: Replays of the reference solution by scenario id, to be seen beside the
-            submission's own.
 
     Returns:
         A whole HTML document; the same input gives the same text.

@@ -13,7 +13,6 @@ class Change:
 
     Attributes:
         before: Its result in the earlier grade; None where it was not judged.
-        after: Its result now.
     """
 
     before: CheckResult | None
@@ -21,12 +20,7 @@ class Change:
 
 
 def changes(before: Grade, after: Grade) -> tuple[Change, ...]:
-    """Find the checks whose status or points changed, in the author's order.
-
-    Args:
-        before: The earlier grade.
-        after: The later one.
-    """
+    """Find the checks whose status or points changed, in the author's order."""
     known = {result.id: result for result in before.results}
     return tuple(
         Change(known.get(result.id), result)

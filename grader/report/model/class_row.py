@@ -25,13 +25,10 @@ class ClassRow:
     """One row of a class.
 
     Attributes:
-        id: Key of the submission, unique.
         name: The student's; may be empty.
         report: The HTML report, relative to the overview, or None where there is none.
         result: As in ``result.json``, or None where nothing could be graded at all.
         note: What an instructor should know, in a few words; empty for an ordinary one.
-        late: Whether it was handed in late.
-        missing: Whether nothing was handed in.
     """
 
     id: str

@@ -16,9 +16,7 @@ class RunFacts:
         started: When grading began, ISO 8601 with offset.
         duration_s: Wall time from then to the grade, in seconds.
         environment: ``ros_distro``, ``rmw``, ``python``, ``sandbox``, ...
-        rosgrade_version: Version of rosgrade that judged.
         recordings: Scenario id -> its recording, as a path relative to the report.
-        runs: Scenario id -> how often it was run, where that is known.
     """
 
     started: str

@@ -50,10 +50,6 @@ def grade_json(result: Result) -> str:
 def differences(one: str, other: str) -> list[str]:
     """Say what differs between two grades.
 
-    Args:
-        one: A grade as :func:`grade_json` writes it.
-        other: Another one.
-
     Returns:
         One line each; nothing where they are identical.
     """

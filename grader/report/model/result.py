@@ -36,9 +36,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
     """Make the result of a grade.
 
     Args:
-        grade: The grade.
         recordings: By scenario id; may lack scenarios that were not run.
-        facts: How the grade came about.
     """
     first = grade.first_to_fix()
     submission = grade.submission
@@ -85,15 +83,6 @@ def write_result(
     grade: Grade, recordings: Mapping[str, Recording], facts: RunFacts, file: Path
 ) -> Result:
     """Write ``result.json``, whole or not at all.
-
-    Args:
-        grade: The grade.
-        recordings: By scenario id.
-        facts: How the grade came about.
-        file: Where to.
-
-    Returns:
-        What was written.
 
     Raises:
         UsageError: It cannot be written there.

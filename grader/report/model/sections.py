@@ -28,14 +28,7 @@ ENDINGS = {
 
 @dataclass(frozen=True)
 class Output:
-    """What the processes printed.
-
-    Attributes:
-        head: The first lines, or all.
-        tail: The last lines, where some are left out.
-        left_out: Number of lines in between.
-        dropped_bytes: Output beyond what the recording kept.
-    """
+    """What the processes printed."""
 
     head: tuple[LogLine, ...]
     tail: tuple[LogLine, ...]
@@ -53,9 +46,6 @@ class Section:
     """Checks that belong together.
 
     Attributes:
-        id: Unique in the report.
-        title: Heading.
-        results: In the author's order.
         scenario: The scenario, or None.
         recording: Its recording, or None where there is none.
     """

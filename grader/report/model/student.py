@@ -23,9 +23,6 @@ def for_student(result: Result) -> Result:
 
     Args:
         result: The whole result; no visible check waits for one that is not.
-
-    Returns:
-        A copy, or the result itself where everything is visible.
     """
     visible = tuple(check for check in result.checks if _is_visible(check))
     hidden = [check for check in result.checks if not _is_visible(check)]
@@ -54,9 +51,6 @@ def grade_for_student(grade: Grade) -> Grade:
 
     Args:
         grade: The whole grade; no visible check waits for one that is not.
-
-    Returns:
-        A copy, or the grade itself where everything is visible.
     """
     visible = [one for one in grade.results if one.visibility is Visibility.VISIBLE]
     hidden = [one for one in grade.results if one.visibility is not Visibility.VISIBLE]

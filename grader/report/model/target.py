@@ -20,13 +20,7 @@ DEFAULT_M = 0.1
 def targets(
     assignment: Assignment, scenario: str, values: Mapping[str, float]
 ) -> tuple[Target, ...]:
-    """The goals that visible checks name for a scenario, each once.
-
-    Args:
-        assignment: With its checks.
-        scenario: Id of the scenario.
-        values: Random values of the run by name, in SI units.
-    """
+    """The goals that visible checks name for a scenario, each once."""
     found: dict[tuple[float, float, float], Target] = {}
     # The first that says how near goes before one that leaves it to the default.
     for check in sorted(assignment.checks, key=lambda check: "position" not in check.with_):

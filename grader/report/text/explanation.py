@@ -37,9 +37,7 @@ class Notes:
     """What is worth knowing of the runs, beside the checks.
 
     Attributes:
-        title: What the notes are.
         notes: Scenario and text of each, in one line each; between backticks stands code.
-        left_out: Number of notes beyond these.
     """
 
     title: str
@@ -70,12 +68,7 @@ def _cut(text: str) -> str:
 
 
 def explain(check: CheckPart, result: Result) -> tuple[Row, ...]:
-    """Say why a check ended as it did, every scenario that did not pass in its turn.
-
-    Args:
-        check: Which.
-        result: The result that it is part of.
-    """
+    """Say why a check ended as it did, every scenario that did not pass in its turn."""
     findings = [check, *check.other_scenarios]
     told = [item for item in findings if item.status is check.status]
     rows = [row for item in told for row in _rows(check, item, many=len(findings) > 1)]

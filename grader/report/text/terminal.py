@@ -48,8 +48,6 @@ def print_grade(
 
     Args:
         console: Where to; its width, colours and encoding are respected.
-        grade: What to print.
-        recordings: Of its runs by scenario id, for the limits that were reached in them.
     """
     console.print(_heading(console, grade))
     console.print()
@@ -72,9 +70,6 @@ def print_changes(
 
     Args:
         console: Where to; its width, colours and encoding are respected.
-        before: The earlier grade.
-        after: The later one.
-        recordings: Of its runs by scenario id.
     """
     changed = changes(before, after)
     if changed:

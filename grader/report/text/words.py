@@ -18,13 +18,7 @@ from grader.submission.record import SourceError
 
 @dataclass(frozen=True)
 class StatusWords:
-    """A status for people; the symbol tells it without colour, and in ASCII too.
-
-    Attributes:
-        word: One word.
-        symbol: One character.
-        ascii: One character for terminals without Unicode.
-    """
+    """A status for people; the symbol tells it without colour, and in ASCII too."""
 
     word: str
     symbol: str
@@ -132,12 +126,7 @@ def first_place(first: CheckResult | CheckPart) -> str:
 
 
 def points_waiting(check: str, checks: Iterable[CheckResult | CheckPart]) -> str:
-    """``4.25 points wait for this``: what is skipped because a check failed; or nothing.
-
-    Args:
-        check: Id of the check that failed.
-        checks: All checks of the grade.
-    """
+    """``4.25 points wait for this``: what is skipped because a check failed; or nothing."""
     points = total(one.max_points for one in checks if check in one.waits_for)
     if not points:
         return ""

@@ -37,10 +37,6 @@ class CellProcess:
     def __init__(self, nursery: PreforkServer, imports: Sequence[str] = ()) -> None:
         """Start it; it joins the graph while the order is still being made.
 
-        Args:
-            nursery: What forks it.
-            imports: Modules and interfaces that it will import besides what every cell does.
-
         Raises:
             GraderFault: The nursery has ended.
         """
@@ -57,9 +53,6 @@ class CellProcess:
 
     def run(self, order: CellOrder) -> Iterator[Mapping[str, Any]]:
         """Run an order.
-
-        Yields:
-            Events of its progress.
 
         Raises:
             MiddlewareHung: The student's processes kept its middleware busy.

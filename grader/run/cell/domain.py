@@ -55,9 +55,6 @@ def lock_domain(avoid: Collection[int] = ()) -> DomainLock:
 
     The order is shuffled, so that a domain whose nodes were just killed is not the next.
 
-    Args:
-        avoid: Domains not to use, such as the caller's own ROS_DOMAIN_ID.
-
     Raises:
         GraderFault: All are in use.
     """
@@ -89,9 +86,6 @@ def domains_of_ports(table: str) -> tuple[int, ...]:
     10 + 2 * participant and 11 + 2 * participant above that (the mapping of ports of the DDSI-RTPS
     standard; see About-Domain-ID). One of these alone may be any socket's, whose port the system
     chose.
-
-    Args:
-        table: Content of /proc/net/udp (proc(5)).
     """
     lines = table.splitlines()[1:]
     ports = {int(line.split()[1].rpartition(":")[2], 16) - _FIRST_PORT for line in lines}

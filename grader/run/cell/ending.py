@@ -31,10 +31,7 @@ class EndingConditions:
         """Keep what to look at.
 
         Args:
-            probe: For messages.
-            output: For the timers that the process declared.
             robot: The simulated robot, or None.
-            player: Of the stimuli.
         """
         self._player = player
         self._probe = probe
@@ -50,7 +47,6 @@ class EndingConditions:
 
         Args:
             until: What is asked for; nothing asked for is never met.
-            watch: Started at the first match.
         """
         conditions = []
         if until.messages is not None:

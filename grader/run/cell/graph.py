@@ -68,7 +68,6 @@ class GraphObserver:
         forbidden_names: Whether a node or a topic has had a name that ROS does not allow. Every
             client library refuses such a name, so whoever made it went round them; and so do
             those that are asked about it.
-        changed_ns: When something appeared for the last time.
     """
 
     def __init__(
@@ -82,9 +81,6 @@ class GraphObserver:
         """Prepare the observer.
 
         Args:
-            node: The probe's node, to ask through.
-            student_pids: Processes of the student known at the moment.
-            rescan: Looks for new processes of the student.
             private: Nobody but us and the student can reach this network: who is here now is
                 ours, and who comes later is the student's. Process ids say nothing there,
                 because a sandbox counts its own.

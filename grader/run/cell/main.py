@@ -50,13 +50,7 @@ def main(
     avoid_domains: tuple[int, ...],
     rights: Rights | None = None,
 ) -> int:
-    """Get ready, wait for the word, run the order in the folder.
-
-    Args:
-        folder: The cell's own.
-        avoid_domains: Domains not to use.
-        rights: In a sandbox: what the cell got hold of before it gave up its rights.
-    """
+    """Get ready, wait for the word, run the order in the folder."""
     # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
     gc.disable()
     become_subreaper()

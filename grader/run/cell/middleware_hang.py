@@ -34,11 +34,7 @@ class HangMonitor:
     """Looks at one cell, again and again."""
 
     def __init__(self, task: Path) -> None:
-        """Only prepare.
-
-        Args:
-            task: Its folder in ``/proc``.
-        """
+        """Only prepare."""
         self._task = task
         self._waiting: tuple[bytes, ...] = ()
         self._before_s = 0.0
@@ -79,13 +75,7 @@ def _switches(status: bytes) -> tuple[bytes, ...]:
 
 
 def hung_recording(order: CellOrder, submission: SubmissionRecord, launched_ns: int) -> Recording:
-    """What is known of a run whose cell was ended: nothing that was sent in it.
-
-    Args:
-        order: What was run.
-        submission: Whose.
-        launched_ns: When it began.
-    """
+    """What is known of a run whose cell was ended: nothing that was sent in it."""
     now_ns = time.time_ns()
     breach = Breach(
         now_ns,

@@ -68,8 +68,6 @@ class ForkedCell:
     """A cell that a nursery forks, with the surface of :class:`subprocess.Popen`.
 
     Attributes:
-        stdin: It goes on while this is open.
-        stdout: Its progress.
         returncode: As in :mod:`subprocess`, or None while it runs.
         cpu_s: CPU time of it and of all processes of the student, and what the nursery
             took since another one ended; known at its end.
@@ -78,14 +76,7 @@ class ForkedCell:
     def __init__(
         self, stdin: IO[str], stdout: IO[str], status: int, kill: Callable[[int], None]
     ) -> None:
-        """Take over the descriptors.
-
-        Args:
-            stdin: Write end.
-            stdout: Read end.
-            status: Of the pipe that tells its process id and then its exit status.
-            kill: Kills the cell of that process id.
-        """
+        """Take over the descriptors."""
         self._kill = kill
         self.stdin = stdin
         self.stdout = stdout
@@ -139,7 +130,6 @@ class PreforkServer:
         """Start it; it begins to import at once.
 
         Args:
-            ros: The installation.
             sandbox: What it and its cells run in, or None.
         """
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -187,9 +177,6 @@ class PreforkServer:
         """Fork a cell.
 
         Args:
-            folder: The cell's own.
-            errors: Where its standard error goes.
-            arguments: Further arguments of the cell.
             imports: Modules and interfaces that it will import besides what every cell does;
                 ours or ROS's only.
 
@@ -236,11 +223,7 @@ class PreforkServer:
             bubblewrap.give(folder)
 
     def close(self, limit_s: float = _CLOSING_LIMIT_S) -> None:
-        """Wait for the cells that it has forked, and for itself, to end.
-
-        Args:
-            limit_s: What has not ended by then is killed.
-        """
+        """Wait for the cells that it has forked, and for itself, to end."""
         self._socket.close()
         send(signal.SIGKILL, self._stopped())
         try:
@@ -343,11 +326,7 @@ def _tell_ended(running: dict[int, int], own_s: float) -> bool:
     """Tell of each cell that has ended.
 
     Args:
-        running: The cells.
         own_s: CPU time that nobody was told of yet; it is added to that of the first one.
-
-    Returns:
-        Whether there was one.
     """
     has_told = False
     while True:

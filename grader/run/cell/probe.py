@@ -74,17 +74,12 @@ class Probe:
     """Subscribes to the scenario's topics and calls parameter services.
 
     Attributes:
-        recording: Whether what arrives is kept.
         counts_servers: Whether a call is answered only when every server of its service has;
             what is left of a killed process stays in the graph, but answers nothing.
     """
 
     def __init__(self, domain_id: int) -> None:
-        """Join the graph; nothing is recorded yet.
-
-        Args:
-            domain_id: ROS domain.
-        """
+        """Join the graph; nothing is recorded yet."""
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id)
         self.node = Node(
@@ -114,10 +109,6 @@ class Probe:
 
     def listen(self, topics: tuple[Topic, ...], limits: Limits) -> None:
         """Record topics from now on.
-
-        Args:
-            topics: What to record.
-            limits: How much is kept.
 
         Raises:
             ImportError: An interface of a topic does not exist.
@@ -155,15 +146,6 @@ class Probe:
 
     def join(self, name: str, topic: str, type: str, profile: QoSProfile) -> Any:
         """Subscribe to a topic from now on, and record it under a name of its own.
-
-        Args:
-            name: What to record under.
-            topic: Fully qualified name.
-            type: Interface name.
-            profile: What to request.
-
-        Returns:
-            The subscription.
 
         Raises:
             ImportError: The interface does not exist.
@@ -230,10 +212,6 @@ class Probe:
         """Call a service that a node answers only while it spins.
 
         Nothing happens as long as several calls are still unanswered.
-
-        Args:
-            node: Fully qualified name.
-            name: One of :data:`grader.recording.interaction.EXECUTOR_SERVICES`.
         """
         kind = import_interface(EXECUTOR_SERVICES[name])
         service = f"{node}/{name}"

@@ -38,13 +38,7 @@ class RosoutLog:
         self._kept = KeptLines(0)
 
     def listen(self, node: Node, limit_bytes: int, on_match: Callable[[Any], None]) -> None:
-        """Keep what comes from now on, and what was published before a logger was matched.
-
-        Args:
-            node: To subscribe with.
-            limit_bytes: How much text is kept, half of it from the end.
-            on_match: Told when a logger comes or goes, which nearly every node has.
-        """
+        """Keep what comes from now on, and what was published before a logger was matched."""
         self._kept = KeptLines(limit_bytes)
         profile = QoSProfile(
             depth=_DEPTH,

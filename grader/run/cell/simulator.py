@@ -32,10 +32,6 @@ class SimulatedRobot:
     def __init__(self, node: Node, order: SimulatorOrder) -> None:
         """Create its topics; simulated time does not run yet.
 
-        Args:
-            node: The probe's node.
-            order: World, options and seed.
-
         Raises:
             AssignmentError: World or options are wrong.
         """

@@ -29,9 +29,6 @@ class ViolationWatch:
         """Make them known; call it before anything of the student's runs.
 
         Args:
-            students: Under guard.
-            output: Reads the tracer's pipe.
-            graph: Looks at the ROS graph.
             wire: Hears the network, or None.
         """
         self._students = students

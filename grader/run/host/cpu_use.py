@@ -30,8 +30,6 @@ class Interval:
     """CPU time in an interval.
 
     Attributes:
-        begin_ns: Its beginning.
-        end_ns: Its end.
         others_ns: CPU time of all CPUs together that neither the student's processes had nor
             nobody: the host's other processes, ours, and what a hypervisor took.
     """
@@ -68,10 +66,8 @@ class CpuTimes:
     """CPU times so far, at one moment.
 
     Attributes:
-        time_ns: The moment, on the steady clock.
         student_ns: Of the student's processes, with those that they have waited for.
         idle_ns: Of nobody, on the CPUs that may be used; 0 where it is not known.
-        own_ns: Of this process, the cell.
         unwaited: How many processes of the student's have ended since the reading before, if
             anything of what they took was lost.
     """
@@ -87,9 +83,7 @@ def interval(before: CpuTimes, after: CpuTimes, cpus: int) -> Interval:
     """What happened between two moments.
 
     Args:
-        before: The first.
         after: The second.
-        cpus: Number of CPUs.
     """
     all_ns = cpus * (after.time_ns - before.time_ns)
     # A process that has just ended takes its time with it until its parent is looked at.
@@ -120,12 +114,7 @@ class CpuMeter:
         return len(self._cpus)
 
     def read(self, pids: Iterable[int]) -> CpuTimes:
-        """Read them now.
-
-        Args:
-            pids: The student's processes. Of those that have ended counts what nobody waited
-                for.
-        """
+        """Read them now."""
         there: dict[Process, Taken] = {}
         student_ns = 0
         complete = True
@@ -153,12 +142,7 @@ class CpuMeter:
 
 
 def idle_ticks(stat: str, cpus: Iterable[int]) -> int:
-    """Ticks in which CPUs had nothing to do, waits for a disk among them.
-
-    Args:
-        stat: Content of /proc/stat (proc(5)).
-        cpus: Their numbers.
-    """
+    """Ticks in which CPUs had nothing to do, waits for a disk among them."""
     wanted = {f"cpu{number}" for number in cpus}
     rows = (line.split() for line in stat.splitlines())
     return sum(int(row[4]) + int(row[5]) for row in rows if row and row[0] in wanted)

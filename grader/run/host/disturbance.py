@@ -40,13 +40,7 @@ class DisturbanceMeter:
         cpu: CpuMeter | None = None,
         delays: RunDelays | None = None,
     ) -> None:
-        """Prepare the meter.
-
-        Args:
-            pids: The student's processes at the moment.
-            cpu: Of this machine.
-            delays: Of threads of this machine.
-        """
+        """Prepare the meter."""
         self._run_delays = delays or RunDelays()
         self._pids = pids
         self._known: tuple[int, ...] = ()

@@ -26,12 +26,7 @@ class Shortage:
         self._before = kills()
 
     def fault(self, processes: Iterable[Process], breaches: Sequence[Breach]) -> str | None:
-        """That the kernel has ended one of these, in words; None if it need not have been.
-
-        Args:
-            processes: The student's, ended.
-            breaches: Limits of the sandbox that they passed, for which we end them ourselves.
-        """
+        """That the kernel has ended one of these, in words; None if it need not have been."""
         now = self._kills()
         if breaches or self._before is None or now is None or now == self._before:
             return None

@@ -11,7 +11,6 @@ def readable(descriptors: Collection[int], limit_s: float | None = None) -> set[
     """Wait until something can be read, or an end be seen.
 
     Args:
-        descriptors: What to read from.
         limit_s: How long to wait at most.
 
     Returns:

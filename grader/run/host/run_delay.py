@@ -24,9 +24,6 @@ class RunDelays:
     def read(self, pid: int) -> dict[int, int]:
         """Run delay of each thread of a process so far.
 
-        Args:
-            pid: Id of the process.
-
         Returns:
             Thread id -> nanoseconds; empty where nothing is known.
         """

@@ -26,12 +26,7 @@ class WallClock:
         wall_ns: Callable[[], int] = time.time_ns,
         steady_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Begin to compare.
-
-        Args:
-            wall_ns: Time of day.
-            steady_ns: A clock that goes on evenly.
-        """
+        """Begin to compare."""
         self._wall_ns, self._steady_ns = wall_ns, steady_ns
         self._ahead_ns = self._read()
 

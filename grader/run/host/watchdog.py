@@ -53,9 +53,6 @@ class Watchdog:
         """Prepare.
 
         Args:
-            limits: What is too much.
-            inits: Ids of the first processes of the student's sandboxes.
-            output_bytes: How much was written so far.
             deeds: What they did so far that is never allowed: its kind (see :class:`Breach`), and
                 the same in words.
         """

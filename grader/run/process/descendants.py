@@ -24,14 +24,7 @@ def become_subreaper() -> None:
 
 
 def descendants(of: int) -> dict[int, str]:
-    """All living descendants of a process.
-
-    Args:
-        of: Its id.
-
-    Returns:
-        Process id -> command line (or name), zombies left out.
-    """
+    """All living descendants of a process."""
     children: dict[int, list[int]] = {}
     for entry in os.listdir("/proc"):  # noqa: PTH208  names only, and often
         if entry.isdigit():
@@ -121,13 +114,6 @@ def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:
     """SIGKILL every descendant until none is left.
 
     New ones may be forked while we kill, so this repeats; they are stopped first.
-
-    Args:
-        of: Whose descendants.
-        limit_s: Give up after this time.
-
-    Returns:
-        Those that were found, process id -> command line.
     """
     killed: dict[int, str] = {}
     deadline = time.monotonic() + limit_s
@@ -170,9 +156,7 @@ def kill_by_variable(name: str, value: str, *, limit_s: float = 5.0) -> None:
     For what a cell left behind that was killed itself: its processes are nobody's descendants.
 
     Args:
-        name: Of the environment variable.
         value: Its value; unique to what is to be killed.
-        limit_s: Give up after this time.
     """
     wanted = f"{name}={value}".encode()
     deadline = time.monotonic() + limit_s

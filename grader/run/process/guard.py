@@ -42,11 +42,6 @@ class Guard:
     def __init__(self, program: bytes, calls: Mapping[str, int], unheard: bytes) -> None:
         """Stand guard.
 
-        Args:
-            program: :func:`grader.sandbox.seccomp.guard_filter`.
-            calls: :func:`grader.sandbox.seccomp.guarded_calls`.
-            unheard: The filter where nobody can listen.
-
         Raises:
             OSError: The kernel takes no such filter.
         """
@@ -75,11 +70,7 @@ class Guard:
         return self._listener is not None
 
     def can_have_ended(self, ours: Collection[int | None]) -> bool:
-        """Whether the student's processes may have killed or stopped one of them themselves.
-
-        Args:
-            ours: Processes that are not the student's.
-        """
+        """Whether the student's processes may have killed or stopped one of them themselves."""
         return bool(self._ending.difference(ours)) or not self.is_heard
 
     @property

@@ -42,11 +42,6 @@ class KeptLines:
 
     Attributes:
         limit: Bytes that are kept.
-        head: The first lines.
-        tail: The last lines.
-        head_bytes: Size of the first.
-        tail_bytes: Size of the last.
-        dropped_bytes: Size of what came between and was not kept.
     """
 
     limit: int
@@ -101,7 +96,6 @@ class _Stream:
         end yet gets none, and counts from when it came.
 
         Args:
-            data: What was read.
             now_ns: When; by default now.
         """
         now_ns = time.time_ns() if now_ns is None else now_ns
@@ -148,7 +142,6 @@ class OutputReader:
         """Start reading.
 
         Args:
-            limit_bytes: What is kept of each stream.
             on_line: Told the first lines of each stream as they come, but not a tracer's; called
                 in the thread that reads.
         """
@@ -197,11 +190,7 @@ class OutputReader:
         return []
 
     def close(self, limit_s: float) -> tuple[LogLine, ...]:
-        """Wait for the ends of the pipes and return all lines in the order of their times.
-
-        Args:
-            limit_s: A pipe that somebody still holds open after this time is left.
-        """
+        """Wait for the ends of the pipes and return all lines in the order of their times."""
         self._closing = True
         os.write(self._wake_write, b".")
         self._thread.join(limit_s)

@@ -35,17 +35,7 @@ _FORMATS = (b"\x7fELF", b"#!")
 
 @dataclass(frozen=True)
 class ProcessSandbox:
-    """What a cell has to know to put a student into a sandbox.
-
-    Attributes:
-        arguments: Of bubblewrap.
-        filter: File with the filter of system calls.
-        guard: File with the filter around it, which asks a guard.
-        unheard: File with the one in its place where nobody can listen.
-        calls: Numbers of the calls that it asks about.
-        limits: What its processes may take.
-        folders: Folder inside -> where the cell finds it.
-    """
+    """What a cell has to know to put a student into a sandbox."""
 
     arguments: tuple[str, ...]
     filter: str
@@ -80,12 +70,6 @@ class SandboxedProcess(subprocess.Popen[bytes]):
         pass_fds: Sequence[int],
     ) -> None:
         """Start it.
-
-        Args:
-            process_sandbox: The sandbox.
-            argv: What to execute.
-            environment: Its variables.
-            pass_fds: Descriptors that it inherits.
 
         Raises:
             OSError: It cannot be executed.

@@ -94,7 +94,6 @@ class StudentProcesses:
         """Prepare; nothing is started yet.
 
         Args:
-            output: Reads what they write.
             process_sandbox: The sandbox that each of them gets, or None.
 
         Raises:
@@ -124,11 +123,7 @@ class StudentProcesses:
         """Start a process in a session of its own.
 
         Args:
-            name: ``package/executable``.
-            argv: What to execute.
-            environment: Its variables.
             of_run: Further variables, of this run; the tracer's pipe is added.
-            folder: Working directory.
 
         Raises:
             OSError: It cannot be executed.
@@ -238,11 +233,7 @@ class StudentProcesses:
         return bool(named) and named[-1].killed_ns is not None
 
     def kill(self, name: str, number: signal.Signals) -> bool:
-        """Send a signal to the process group of one process, in the middle of the run.
-
-        Returns:
-            Whether it still ran.
-        """
+        """Send a signal to the process group of one process, in the middle of the run."""
         self.let_leave(name)
         running = self.is_running(name)
         for process in self._running:
@@ -253,12 +244,7 @@ class StudentProcesses:
         return running
 
     def stop(self, limits: Limits, meter: DisturbanceMeter) -> None:
-        """SIGINT, SIGTERM, SIGKILL, each with a bounded wait; dates the end of each process.
-
-        Args:
-            limits: How long to wait after each signal.
-            meter: What the host takes meanwhile does not count.
-        """
+        """SIGINT, SIGTERM, SIGKILL, each with a bounded wait; dates the end of each process."""
         self.let_leave()
         watch = Stopwatch(meter)
         for number, limit_s in (
@@ -320,9 +306,6 @@ class StudentProcesses:
 
         Within a sandbox only its own processes can send a signal, and a guard is told of that.
         Without one, or where they may have done it, it cannot be told who did.
-
-        Args:
-            breaches: Limits that the processes passed, for which they were ended by us.
         """
         # A sandbox's own processes end with the status of what was started in it.
         started = [item.popen for item in self._running if isinstance(item.popen, SandboxedProcess)]

@@ -17,11 +17,7 @@ class Answers:
     """
 
     def __init__(self, within_s: float) -> None:
-        """Nothing was asked yet.
-
-        Args:
-            within_s: How long to wait for an answer.
-        """
+        """Nothing was asked yet."""
         self._within_s = within_s
         self._newest: bytes | None = None
         self._before: bytes | None = None
@@ -41,12 +37,7 @@ class Answers:
         self._first_s = None
 
     def hear(self, answer: bytes, waited_s: float) -> None:
-        """Something came on the topic.
-
-        Args:
-            answer: The message.
-            waited_s: How long after the newest question.
-        """
+        """Something came on the topic."""
         self._newest = answer
         is_new = answer != self._before
         if is_new and not self._is_new:
@@ -57,21 +48,13 @@ class Answers:
         self._is_new |= is_new
 
     def may_go_on(self, waited_s: float) -> bool:
-        """Whether the next question may be asked.
-
-        Args:
-            waited_s: How long after the newest one.
-        """
+        """Whether the next question may be asked."""
         if not self._is_asked or waited_s >= self._within_s:
             return True
         return self._is_new or (self._first_s is not None and waited_s >= self._patience_s)
 
     def is_over(self, waited_s: float) -> bool:
-        """Whether every answer to the last question is there, or was waited for.
-
-        Args:
-            waited_s: How long after it.
-        """
+        """Whether every answer to the last question is there, or was waited for."""
         if not self._is_asked or waited_s >= self._within_s:
             return True
         if self._is_behind or self._first_s is None:

@@ -20,13 +20,8 @@ class Asked:
     """A call under way, or one that could not be sent.
 
     Attributes:
-        service: Fully qualified name.
-        type: Interface name.
-        request: Its fields.
-        requested_ns: When it was sent.
         answered_ns: When the answer was there, or None.
         response: Its fields, or None.
-        error: Why it could not be sent or read.
     """
 
     service: str
@@ -52,12 +47,7 @@ class Asker:
     """Clients of the probe, one for each service."""
 
     def __init__(self, probe: Probe, most_bytes: int) -> None:
-        """Nothing is asked yet.
-
-        Args:
-            probe: Whose node calls.
-            most_bytes: Largest response that is kept.
-        """
+        """Nothing is asked yet."""
         self._probe = probe
         self._most_bytes = most_bytes
         self._clients: dict[tuple[str, str], Any] = {}
@@ -80,8 +70,6 @@ class Asker:
         """Send a request.
 
         Args:
-            service: Fully qualified name.
-            type: Interface name.
             request: Its fields; checked when the order was made.
         """
         client = self._client(service, type)

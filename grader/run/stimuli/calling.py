@@ -29,13 +29,7 @@ class Readiness:
     """Waits until a server of the student's is there and its node spins, or in vain."""
 
     def __init__(self, what: str, service: str, context: StimulusContext) -> None:
-        """Nothing is waited for yet.
-
-        Args:
-            what: Such as ``a service /add``, for the recording.
-            service: Fully qualified name of a service that the server has.
-            context: Knows how calm the graph is.
-        """
+        """Nothing is waited for yet."""
         self._what = what
         self._service = service
         self._context = context
@@ -66,9 +60,6 @@ class Readiness:
         What is asked while a constructor waits for something would be late through no fault of
         the server's: its node has to answer another call first, unless it does not in the time
         that it has to start.
-
-        Args:
-            is_there: Whether it is there now.
         """
         self._began_ns = self._began_ns or time.time_ns()
         if not is_there:
@@ -107,14 +98,7 @@ class Asking(Playing):
     def __init__(
         self, order: RequestOrder, what: str, service: str, context: StimulusContext
     ) -> None:
-        """Take a place in the order of what is asked.
-
-        Args:
-            order: When it is due, and how long to wait for an answer.
-            what: Of the server, in words.
-            service: Fully qualified name of a service that it has.
-            context: Knows the others.
-        """
+        """Take a place in the order of what is asked."""
         self.after_s = order.after_s
         self._within_s = order.within_s
         self._context = context

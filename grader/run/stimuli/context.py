@@ -34,16 +34,6 @@ class StimulusContext:
     """What a stimulus acts on.
 
     Attributes:
-        probe: Whose node publishes and subscribes.
-        graph: What has been seen of the ROS graph.
-        students: The student's processes.
-        meter: Of the host's disturbance.
-        limits: Bounds of the run.
-        start: Starts a process by its name, as it was launched.
-        waits: Bounded waits so far.
-        joins: Late joiners so far, by name.
-        interventions: What was done to processes so far.
-        goals: Goals so far.
         asking: What asks something of a service or an action, in the order of the YAML.
     """
 

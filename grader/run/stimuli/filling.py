@@ -16,9 +16,7 @@ def filled(message: Any, value: Mapping[str, Any], now_ns: int) -> Any:
     """Set the fields of a message.
 
     Args:
-        message: A new one.
         value: Fields by name, nested; checked when the order was made.
-        now_ns: What ``now`` stands for in a field of time.
     """
     types = message.get_fields_and_field_types()
     for name, item in value.items():

@@ -37,14 +37,6 @@ def stimulus_orders(
 ) -> tuple[StimulusOrder, ...]:
     """Make the orders.
 
-    Args:
-        scenario: With its stimuli.
-        commands: What is launched.
-        folder: Of the assignment: files and functions are beside its YAML.
-        prefixes: ament prefixes with message definitions.
-        seed: Of the scenario.
-        drawn: Its random values.
-
     Raises:
         GraderFault: A message of a stimulus cannot be made.
     """

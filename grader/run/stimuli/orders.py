@@ -17,18 +17,8 @@ class PublishOrder:
     """Publish messages.
 
     Attributes:
-        topic: Fully qualified name.
-        type: Interface name.
-        reliability: Offered.
-        durability: Offered.
-        depth: Queue depth.
-        messages: Fields of each.
-        times_s: When each is due, after the first.
-        before_launch: So many of them are published before the student is launched.
-        after_s: Not before so long after the first match.
         repeat_s: Repeat the last one with this period until the end, or None.
         answer: Wait for a message on this topic before the next, or None.
-        within_s: How long to wait for it.
     """
 
     topic: str
@@ -47,17 +37,7 @@ class PublishOrder:
 
 @dataclass(frozen=True)
 class JoinOrder:
-    """Subscribe late.
-
-    Attributes:
-        name: What to record under.
-        topic: Fully qualified name.
-        type: Interface name.
-        reliability: Requested.
-        durability: Requested.
-        depth: Queue depth.
-        after_s: So long after the first match.
-    """
+    """Subscribe late."""
 
     name: str
     topic: str
@@ -74,8 +54,6 @@ class KillOrder:
 
     Attributes:
         process: ``package/executable``.
-        signal: Name of the signal.
-        after_s: So long after the first match.
     """
 
     process: str
@@ -89,7 +67,6 @@ class RestartOrder:
 
     Attributes:
         process: ``package/executable``.
-        after_s: So long after the first match.
     """
 
     process: str
@@ -98,11 +75,7 @@ class RestartOrder:
 
 @dataclass(frozen=True)
 class ListParametersOrder:
-    """Call the parameter services of all nodes of the student.
-
-    Attributes:
-        every_s: Time between two calls to one node.
-    """
+    """Call the parameter services of all nodes of the student."""
 
     every_s: float
 
@@ -112,13 +85,7 @@ class CallOrder:
     """Call a service.
 
     Attributes:
-        service: Fully qualified name.
-        type: Interface name.
-        requests: Fields of each.
-        at_once: How many calls each request makes at the same time.
-        after_s: Not before so long after the first match.
         every_s: Time between two requests; None for the next after the answer.
-        within_s: How long to wait for an answer.
     """
 
     service: str
@@ -135,10 +102,7 @@ class ParametersOrder:
     """Read the parameters of a node, and set some of them.
 
     Attributes:
-        node: Fully qualified name.
         values: What to set; empty to read only.
-        after_s: Not before so long after the first match.
-        within_s: How long to wait for each answer.
     """
 
     node: str
@@ -152,13 +116,7 @@ class GoalOrder:
     """Send a goal to an action.
 
     Attributes:
-        action: Fully qualified name.
-        type: Interface name.
-        goal: Its fields.
-        after_s: Not before so long after the first match.
         cancel_after_s: Ask to cancel it so long after it was accepted, or None.
-        preempt: Send it while the goal before it is worked on.
-        within_s: How long to wait for its result.
     """
 
     action: str

@@ -41,12 +41,7 @@ class Player:
     """Plays every stimulus of a run at its time."""
 
     def __init__(self, orders: Sequence[StimulusOrder], context: StimulusContext) -> None:
-        """Prepare what has to be there before anything of the student's is launched.
-
-        Args:
-            orders: What to play.
-            context: What to act on.
-        """
+        """Prepare what has to be there before anything of the student's is launched."""
         self._playing = [_KINDS[type(order)](order, context) for order in orders]
         self._answers = {
             order.topic: order.answer

@@ -31,7 +31,6 @@ class OutputLimits:
     Attributes:
         head: Bytes kept of its beginning.
         tail: Bytes kept of its end.
-        total: The command is ended when it writes more.
     """
 
     head: int = 64 * 1024
@@ -74,8 +73,6 @@ class Outcome:
         status: Exit status, or minus the signal's number, or None where we ended it.
         ended_by_us: ``time``, ``output`` or what ``excess`` said, the limit that it passed, or
             None.
-        output: What is kept of its standard output and error.
-        duration_s: Wall time.
     """
 
     status: int | None
@@ -97,12 +94,6 @@ def run_bounded(
     """Run a command and wait until it and everything that it started is gone.
 
     Args:
-        command: Program and arguments.
-        cwd: Folder to run it in.
-        environment: Its whole environment.
-        wall_s: It is ended after this time.
-        output: How much output is kept and borne.
-        on_line: Called with each line while the command runs.
         excess: Called several times a second with the id of the process that everything
             descends from; names the limit that was passed, which ends the command.
 

@@ -87,19 +87,9 @@ def build(
     Args:
         located: The submission; its private copy is where the build runs, so read from it what
             you need before.
-        sources: Its packages and what is needed to find whom to blame.
-        ros: Builds with this installation only.
-        only_python: All packages are ament_python.
         cache: Where builds are kept; failed ones too, but not those that were ended by the
             time limit.
-        built_apart: Packages that are built apart from the others, each of them kept as well.
-        is_apart: This is one of them.
-        limits: What is too much.
-        on_progress: Told in a few words what happens.
         sandbox: What the build runs in, or None.
-        stop: Ends the build from another thread when it is set.
-        on_output: Called with each line of colcon's as it comes.
-        is_second: Whether an earlier attempt raised :class:`BuildKilled`.
 
     Raises:
         BuildKilled: A signal ended it that no limit of ours sends.

@@ -43,8 +43,6 @@ class CacheLimits:
     """When old builds are thrown away.
 
     Attributes:
-        total_bytes: The least recently used go when all builds together are larger.
-        age_s: A build goes when it was not used for so long.
         safe_s: A build that was used within this time is never thrown away: it may be running.
     """
 
@@ -71,7 +69,6 @@ class CachedBuild:
     """A build that is in the cache.
 
     Attributes:
-        build: What colcon did.
         install: Its install space, or None where nothing was installed.
     """
 
@@ -87,12 +84,7 @@ class BuildCache:
     """The builds in one cache folder; several processes may use it at once."""
 
     def __init__(self, folder: Path, limits: CacheLimits | None = None) -> None:
-        """Name the folder; it is made when something is stored.
-
-        Args:
-            folder: The caller's cache folder, ``builds`` below it is used.
-            limits: When old builds are thrown away.
-        """
+        """Name the folder; it is made when something is stored."""
         self._folder = folder / BUILDS
         self._limits = limits or CacheLimits()
 
@@ -101,11 +93,7 @@ class BuildCache:
         """Hold a build's lock, so that two who need it do not both build it.
 
         Args:
-            key: The build.
             wait_s: Longest wait; without the lock the same work is done twice, nothing worse.
-
-        Yields:
-            Whether the lock is held.
 
         Raises:
             GraderFault: The cache folder cannot be used.

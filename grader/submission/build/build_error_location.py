@@ -55,11 +55,7 @@ class Sources:
     """What the search needs to know of the submission.
 
     Attributes:
-        files: Paths of all its files.
-        folders: Package -> its folder.
         texts: Lines of each setup.py and interface file, in which quoted names are looked up.
-        malformed: Package -> entry points that setuptools will not accept.
-        manifest_errors: package.xml -> why it cannot be used.
     """
 
     files: Collection[str]
@@ -73,9 +69,7 @@ def find_build_error(log: str, failed: Collection[str], sources: Sources) -> Sou
     """Find the first place in the student's own files that a cleaned log blames.
 
     Args:
-        log: colcon's output with the student's paths, packages built one after another.
         failed: Packages that were not finished; what the log says of others is no reason.
-        sources: The submission.
 
     Returns:
         For a Python traceback the deepest frame in the student's files. None where the log
@@ -99,8 +93,6 @@ def last_started(log: str, sources: Sources, problem: str | None) -> SourceError
     """Blame the build file of the package that was being built when the log ends.
 
     Args:
-        log: As for :func:`find_build_error`.
-        sources: The submission.
         problem: Why the build ended, or None where only the log tells.
     """
     # What a build file prints may look like colcon's own lines.

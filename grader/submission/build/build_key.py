@@ -21,14 +21,7 @@ _TOOLS = ("cc", "c++", "cmake", "ld", "make", "ninja")
 def build_key(
     sha256: str, ros: RosInstallation, *, sandboxed: bool = False, terms: Sequence[str] = ()
 ) -> str:
-    """Name a build by everything that it depends on.
-
-    Args:
-        sha256: The submission's hash.
-        ros: Installing or updating a package changes the times of its files.
-        sandboxed: What a sandbox refuses may fail a build.
-        terms: Limits and libraries of the assignment that are not the usual ones.
-    """
+    """Name a build by everything that it depends on."""
     watched = [prefix / "share/ament_index/resource_index/packages" for prefix in ros.prefixes]
     watched += [ros.python, *site_packages_of(ros), *_tools(ros), *watched_folders()]
     parts = [

@@ -14,12 +14,7 @@ class BuildLimits:
     """How much a build may take.
 
     Attributes:
-        python_s: Wall time where all packages are ament_python.
         other_s: Wall time where one is not.
-        install_bytes: Size of the install space.
-        install_files: Number of files in it.
-        output: What is kept of the log, and how much ends the build.
-        room: What it may take in a sandbox.
     """
 
     python_s: float = 120.0

@@ -34,7 +34,6 @@ def clean(output: str, paths: Mapping[str, str]) -> str:
     """Strip colours and control characters, and map scratch paths back.
 
     Args:
-        output: What colcon wrote.
         paths: Folder as it was in the build -> what the student calls it; ``""`` for the
             submission itself. Longer folders win.
     """

@@ -43,19 +43,9 @@ class Colcon:
     """colcon for one submission.
 
     Attributes:
-        root: Folder of the submission's private copy.
         folders: Of its packages, relative to ``root``.
         scratch: For what a build leaves behind; exists.
-        install: Where it installs to.
-        ros: Builds with this installation only.
-        only_python: All packages are ament_python.
-        is_apart: This is one interface package, built for itself.
-        limits: What is too much.
-        wall_s: Wall time of all that :meth:`build` starts.
-        on_progress: Told in a few words what happens.
         sandbox: What everything runs in, or None.
-        stop: Ends the build from another thread when it is set.
-        on_output: Called with each line of colcon's as it comes.
     """
 
     root: Path

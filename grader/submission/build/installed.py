@@ -31,10 +31,8 @@ class InstallSpace:
     Attributes:
         executables: Package -> what is in ``lib/<package>``, sorted.
         in_bin: What is in ``bin``, sorted.
-        entry_points: Distribution, normalised -> its console scripts.
         python: Path of each Python file -> hash of its content; relative to site-packages, or
             ``lib/<package>/...`` for scripts.
-        origins: Path of each of them -> the student's file that it is a copy of.
         definitions: Package -> the interfaces that it generates, such as ``msg/Bot.msg``, with
             their definitions.
         registered: Packages that are in ament's index of packages, where ROS looks for them.
@@ -50,13 +48,7 @@ class InstallSpace:
 
 
 def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) -> InstallSpace:
-    """Look at an install space; what is not a regular file there does not count.
-
-    Args:
-        install: The install space.
-        packages: The submission's packages.
-        sources: Path of each of the student's Python files -> hash of its content.
-    """
+    """Look at an install space; what is not a regular file there does not count."""
     executables = {}
     definitions = {}
     python: dict[str, str] = {}
@@ -93,12 +85,6 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
     """See that an install space holds nothing that nobody of ours should open or follow.
 
     Symbolic links to what was handed in, or to nothing, go: nobody would find anything there.
-
-    Args:
-        install: The install space, as the student's build files left it.
-        sources: Folder of what was handed in, where it was built.
-        most_bytes: Largest size of all files together.
-        most_files: Largest number of files and folders.
 
     Returns:
         Why it cannot be used at all, in which case it is removed, or None.
@@ -170,10 +156,6 @@ def _is_text(name: str) -> bool:
 
 def match_files(python: Mapping[str, str], sources: Mapping[str, str]) -> dict[str, str]:
     """Find for each installed Python file the student's file that it was copied from.
-
-    Args:
-        python: Installed path -> hash.
-        sources: The student's path -> hash.
 
     Returns:
         Installed path -> student's path: of those with the same content the one whose path ends

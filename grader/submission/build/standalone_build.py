@@ -44,10 +44,6 @@ _PREFIX = re.compile(r'^_colcon_package_sh_COLCON_CURRENT_PREFIX="(/.*)"$', re.M
 def built_apart(packages: Sequence[Package], files: Iterable[SubmissionFile]) -> tuple[str, ...]:
     """Names of the packages of a submission that can be built apart.
 
-    Args:
-        packages: All of them.
-        files: All files of the submission.
-
     Returns:
         None of them where nothing else would be left to build.
     """
@@ -91,13 +87,7 @@ def _asks_for_nothing(package: Package, others: set[str]) -> bool:
 
 
 def as_handed_in(log: str, package: str, folder: str) -> str:
-    """Name the files of a package in a log by where they are in the submission.
-
-    Args:
-        log: Of the build of the package, whose folder had its own name.
-        package: Its name.
-        folder: Where it is.
-    """
+    """Name the files of a package in a log by where they are in the submission."""
     return re.sub(rf"(?<![\w/.-]){package}/(?=[\w.])", lambda _: f"{shown(folder)}/", log)
 
 
@@ -105,7 +95,6 @@ def lay(package: str, built: Path, install: Path) -> None:
     """Put what a package installed into another install space, as if it had been built there.
 
     Args:
-        package: Its name.
         built: Its own install space (merged layout); what leads out of it was taken away.
         install: Where it goes; need not be there.
     """

@@ -25,19 +25,12 @@ _FOLDERS = ("lib/cmake", "lib/*/cmake", "include")
 
 
 def missing_tools(path: str) -> list[str]:
-    """Packages of Debian and Ubuntu with what compiles and is not there.
-
-    Args:
-        path: Where programs are looked for, as in ``PATH``.
-    """
+    """Packages of Debian and Ubuntu with what compiles and is not there."""
     return [package for tool, package in TOOLS.items() if not shutil.which(tool, path=path)]
 
 
 def check_toolchain(path: str) -> None:
     """See that what compiles is there.
-
-    Args:
-        path: Where programs are looked for, as in ``PATH``.
 
     Raises:
         GraderFault: Something is not installed on this machine.
@@ -48,11 +41,7 @@ def check_toolchain(path: str) -> None:
 
 
 def missing_here(names: Collection[str]) -> set[str]:
-    """Those libraries that a build did not find because they are not installed.
-
-    Args:
-        names: What it did not find.
-    """
+    """Those libraries that a build did not find because they are not installed."""
     libraries = set(_LIBRARIES.split()) & set(names)
     headers = PYTHON_HEADERS in names and not has_headers()
     return {name for name in libraries if not _has_library(name)} | (

@@ -37,12 +37,6 @@ def install_prefix(
 ) -> Path:
     """Build interface packages of ours, unless that was done before.
 
-    Args:
-        packages: A folder with ament packages in it, each in a folder of its own name.
-        ros: Builds with this installation.
-        cache: Where builds are kept.
-        on_progress: Told in a few words what happens.
-
     Returns:
         Their install space (merged layout).
 
@@ -85,13 +79,7 @@ def completed(
     """Add to an installation what it lacks of the packages that rosgrade carries.
 
     Args:
-        ros: The installation.
         named: Packages that are used; what is not among them is not built.
-        cache: Where builds are kept.
-        on_progress: Told in a few words what happens.
-
-    Returns:
-        The same installation where nothing is to be added, else one with it as underlay.
 
     Raises:
         GraderFault: It does not build on this machine.

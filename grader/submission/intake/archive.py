@@ -59,9 +59,7 @@ def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> No
     """Unpack a zip or a plain or compressed tar; they are told apart by content.
 
     Args:
-        archive: The file.
         into: An existing, empty folder that nobody else uses.
-        limits: What is too much.
 
     Raises:
         SubmissionError: It is no archive, broken, encrypted, unsafe or too large; names the

@@ -55,13 +55,7 @@ def is_left_out(path: str) -> bool:
 
 
 def is_leftover(name: str, holds: Callable[[str], bool], in_package: bool) -> bool:
-    """Whether a folder is something that a tool left behind.
-
-    Args:
-        name: The folder's.
-        holds: Whether there is something of a name in it.
-        in_package: It is in the folder of a package, or in one of its folders.
-    """
+    """Whether a folder is something that a tool left behind."""
     if name in TOOL_FOLDERS or name.endswith(".egg-info") or holds(_VIRTUAL_ENVIRONMENT):
         return True
     if name not in COLCON_FOLDERS:
@@ -75,7 +69,6 @@ def is_within_leftover(path: str, present: Collection[str]) -> bool:
 
     Args:
         path: Relative.
-        present: All paths that there are.
     """
     in_package = MANIFEST in present
     for folder in reversed(parents(path)):

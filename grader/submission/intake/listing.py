@@ -41,7 +41,6 @@ class SubmissionFile:
     Attributes:
         path: Relative, forward slashes, undecodable bytes as surrogates.
         size: In bytes; 0 for a link.
-        executable: Whether its owner may execute it.
         link: Where a symbolic link leads, relative to the link's folder; None for a file.
     """
 
@@ -53,12 +52,7 @@ class SubmissionFile:
 
 @dataclass
 class Listing:
-    """What was found in a folder.
-
-    Attributes:
-        files: Sorted by path.
-        skipped: Folders that were not looked into, sorted.
-    """
+    """What was found in a folder."""
 
     files: list[SubmissionFile] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
@@ -86,12 +80,7 @@ class ChangedMeanwhile(GraderFault):
 
 
 def unreadable(path: str, error: OSError) -> SubmissionError | GraderFault:
-    """Whose fault it is that a file cannot be read.
-
-    Args:
-        path: Of the file.
-        error: What happened.
-    """
+    """Whose fault it is that a file cannot be read."""
     if error.errno in _CHANGED:
         return ChangedMeanwhile(path)
     if error.errno in _OF_THE_MACHINE:
@@ -101,10 +90,6 @@ def unreadable(path: str, error: OSError) -> SubmissionError | GraderFault:
 
 def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
     """List a folder, the same way on every machine.
-
-    Args:
-        root: The folder.
-        limits: What is too much.
 
     Raises:
         SubmissionError: Too many or too large files, a file that cannot be read, or a symbolic
@@ -211,9 +196,6 @@ def wrapper_of(files: Iterable[SubmissionFile]) -> str:
 
     The same work is packed under another name by everybody who hands it in.
 
-    Args:
-        files: All files of the submission.
-
     Returns:
         The deepest one. ``src`` and what is in it belong to the submission; ``.`` where there is
         no such folder, or no package, or where a link needs it.
@@ -241,9 +223,6 @@ def wrapper_of(files: Iterable[SubmissionFile]) -> str:
 
 def find_packages(paths: Iterable[str]) -> list[str]:
     """Find the package folders, as colcon would.
-
-    Args:
-        paths: All files of the submission.
 
     Returns:
         Folders with a ``package.xml``, sorted, without those inside another package, in hidden

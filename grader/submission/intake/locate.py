@@ -46,7 +46,6 @@ class Located:
     """An opened submission.
 
     Attributes:
-        id: The folder's or archive's name, without the archive's suffix.
         sha256: Hash over the files' paths, contents and executable bits, as hex.
         root: The private copy; holds exactly ``files``.
         files: Sorted by path; folders that are just around all of it are left out of the paths.
@@ -69,10 +68,6 @@ def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Lo
     Args:
         path: A folder (package, ``src``, workspace, clone of a repository, with any number of
             folders around it) or an archive of one.
-        limits: What is too much.
-
-    Yields:
-        The located submission, with its private copy.
 
     Raises:
         UsageError: Nothing is there, or it is a URL.
@@ -106,12 +101,7 @@ def only(located: Located, folder: str, name: str) -> Iterator[Located]:
     """Open one package of a submission for as long as the context lasts, without the others.
 
     Args:
-        located: The submission.
         folder: The package's folder; not the submission itself.
-        name: What the folder is called here, wherever it was.
-
-    Yields:
-        The package as if it had been handed in alone, with a copy of its own.
 
     Raises:
         GraderFault: This machine cannot hold the copy.

@@ -29,14 +29,8 @@ class ArchiveLimits:
     """How much a submission may hold; folders are held to the same sizes and numbers.
 
     Attributes:
-        total_bytes: Sum of the files' sizes, and largest archive file.
         members: Number of files, folders and links. What tools left behind
             (``leftovers.TOOL_FOLDERS``) is not unpacked and may be ten times as much.
-        ratio: Largest allowed unpacked size divided by the archive's size...
-        ratio_from_bytes: ...from this unpacked size on, since small texts compress well.
-        depth: Largest number of folders in a path.
-        path_bytes: Longest path.
-        name_bytes: Longest name of a file or folder.
     """
 
     total_bytes: int = 256 * MIB
@@ -68,11 +62,7 @@ class Member:
 
     Attributes:
         place: Where its reader finds it again: index in a zip, offset of the data in a tar.
-        name: Its name, forward slashes, otherwise untouched.
-        kind: What it is.
         size: Declared size in bytes.
-        executable: Whether anyone may execute it.
-        target: Where a link leads.
     """
 
     place: int
@@ -106,9 +96,6 @@ def admit(
 
     Args:
         members: In the archive's order; read no further than the limits allow.
-        archive: The archive's name, for messages.
-        archive_bytes: Its size.
-        limits: What is too much.
 
     Returns:
         What to unpack. Folders above a file are implied. Links that lead to nothing inside
@@ -220,10 +207,6 @@ class LeadsOut(Exception):
 
 def resolve_link(path: str, links: Mapping[str, str]) -> str | None:
     """Follow a link, and the links on its way, as the file system would.
-
-    Args:
-        path: Where the link is.
-        links: All links: path -> target.
 
     Returns:
         The path it ends at, whether or not something is there; None for a loop and for the

@@ -43,9 +43,6 @@ class _Headers:
 def members(file: IO[bytes]) -> Iterator[Member]:
     """List the members; a hard link is listed as one more file with the same data.
 
-    Args:
-        file: The uncompressed tar, seekable.
-
     Raises:
         Refused: A member is of a kind that no student's tool makes, or the tar ends in garbage.
         tarfile.TarError: It is no tar, or broken.

@@ -21,7 +21,6 @@ def check_directory(file: IO[bytes], limits: ArchiveLimits) -> None:
 
     Args:
         file: The zip; left at its start.
-        limits: What is too much.
 
     Raises:
         Refused: Too many. Each entry begins with this mark, so counting marks cannot be fooled
@@ -39,9 +38,6 @@ def check_directory(file: IO[bytes], limits: ArchiveLimits) -> None:
 
 def members(archive: zipfile.ZipFile) -> Iterator[Member]:
     """List the members; of a link, read where it leads.
-
-    Args:
-        archive: An open zip.
 
     Raises:
         Refused: A member is encrypted or compressed by a rare method.

@@ -55,11 +55,7 @@ class Command:
 
 
 def read_commands(text: str) -> tuple[Command, ...]:
-    """The commands of a CMakeLists.txt in their order; what comes after broken syntax is lost.
-
-    Args:
-        text: The file.
-    """
+    """The commands of a CMakeLists.txt in their order; what comes after broken syntax is lost."""
     variables: dict[str, str] = {}
     found = []
     for name, written, line in _commands(text):

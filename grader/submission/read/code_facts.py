@@ -18,7 +18,6 @@ class SourceClass:
         line: Line from 1.
         bases: As written: ``Node``, ``rclpy.node.Node``; of a call such as ``mixed(Node)`` the
             names in it.
-        documented: It has a docstring.
     """
 
     name: str
@@ -34,10 +33,7 @@ class SourceFunction:
     Attributes:
         name: Qualified in its module, such as ``Bot.callback`` or ``main.<locals>.help``.
         line: Line from 1.
-        documented: It has a docstring.
-        decorators: As written, without arguments.
         unannotated: Parameters without a type hint; ``self`` and ``cls`` are left out.
-        returns: It has a hint for what it returns.
     """
 
     name: str
@@ -53,11 +49,7 @@ class SourceFile:
     """A Python file that runs; at most 2000 of each kind of thing in it.
 
     Attributes:
-        path: In the submission.
         module: Dotted name that it is imported by, such as ``bot.node``.
-        documented: It has a docstring.
-        classes: In the order of their lines.
-        functions: In the order of their lines.
         names: What imports and plain assignments name: local name -> dotted name.
         stars: Modules of ``from module import *``.
         prints: Lines with ``print`` to the console.
@@ -79,9 +71,7 @@ class LintFinding:
 
     Attributes:
         code: Of the rule, such as ``F401``.
-        file: Path in the submission.
         line: Line from 1.
-        message: One line, as ruff says it.
     """
 
     code: str

@@ -41,11 +41,6 @@ _COMMON = frozenset(
 def is_known(name: str, *, installed: Collection[str], submitted: Collection[str]) -> bool | None:
     """Tell whether a ROS package or rosdep key of this name exists.
 
-    Args:
-        name: As written in package.xml.
-        installed: Packages of the ROS installation.
-        submitted: Packages of the submission.
-
     Returns:
         True when it is one of these, of :mod:`grader.submission.read.rosdistro`, or looks like a
         rosdep key of a system package. False when it cannot be the name of either, is known not
@@ -63,10 +58,6 @@ def is_known(name: str, *, installed: Collection[str], submitted: Collection[str
 
 def meant(name: str, more: Iterable[str] = ()) -> str | None:
     """Find the ROS package that was most likely meant by a name that is none.
-
-    Args:
-        name: As written in package.xml.
-        more: Package names beside those of :mod:`grader.submission.read.rosdistro`.
 
     Returns:
         The package that differs only in case, hyphens, a plural or a part such as ``.msg``, or

@@ -27,10 +27,7 @@ class EntryPoint:
     """A console script.
 
     Attributes:
-        name: The executable.
-        module: Dotted name of the module.
         function: Dotted name in the module, empty where none is named.
-        file: Where it is declared, path in the submission.
         line: Line there, or None.
     """
 
@@ -53,7 +50,6 @@ class Setup:
     Attributes:
         name: The distribution's name, or None where it cannot be told.
         entry_points: The console scripts, in order.
-        malformed: Console scripts that setuptools will not accept.
         package_dir: Folder of the Python packages below the package, ``.`` or such as ``src``.
     """
 
@@ -74,8 +70,6 @@ def read_setup(
     Args:
         setup_py: Content of setup.py, or None where there is none.
         setup_cfg: Content of setup.cfg, or None.
-        folder: The package's folder in the submission.
-        allowance: What the Python files of the submission may take together.
     """
     file = join(folder, "setup.py")
     keywords: dict[str, Value] = {}
@@ -112,12 +106,7 @@ def parse_entry_point(text: str, file: str, line: int | None = None) -> EntryPoi
 
 
 def parse_installed(text: str, file: str) -> list[EntryPoint]:
-    """Parse the ``entry_points.txt`` of an installed distribution.
-
-    Args:
-        text: Its content.
-        file: What to name as the place of the declaration.
-    """
+    """Parse the ``entry_points.txt`` of an installed distribution."""
     parser = _Parser()
     try:
         parser.read_string(text)

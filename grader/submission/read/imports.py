@@ -17,9 +17,6 @@ def is_code(path: str) -> bool:
 
     Args:
         path: Relative to the package.
-
-    Returns:
-        False for tests, launch files, documentation, ``setup.py`` and ``conftest.py``.
     """
     *folders, name = path.split("/")
     if folders and folders[0] in _NOT_CODE:
@@ -31,10 +28,6 @@ def is_code(path: str) -> bool:
 
 def find_imports(tree: ast.Module, file: str) -> list[Import]:
     """List the modules that a file imports, each once per line.
-
-    Args:
-        tree: Its syntax tree.
-        file: Its path in the submission.
 
     Returns:
         Absolute imports, also ``importlib.import_module("literal")`` and
@@ -108,16 +101,7 @@ def ros_imports(
     own: Collection[str],
     packages: Mapping[str, str],
 ) -> list[Import]:
-    """Keep the imports that a ROS package must provide.
-
-    Args:
-        imports: What the code imports.
-        own: Modules that the package itself provides.
-        packages: Importable module -> ROS package.
-
-    Returns:
-        The same imports with the ROS package's name in ``module``.
-    """
+    """Keep the imports that a ROS package must provide."""
     return [
         Import(packages[item.module], item.file, item.line, item.optional)
         for item in imports

@@ -70,8 +70,6 @@ def lint(root: Path, files: Collection[str], ruff: Path | None = None) -> Lint:
     """Let ruff look at files; they are neither changed nor run.
 
     Args:
-        root: Folder of the submission's private copy.
-        files: Paths in it.
         ruff: The program, by default the one that is found.
     """
     ruff = ruff or find_ruff()
@@ -95,13 +93,7 @@ def newer_syntax(
     """Find files that only the Python of ROS 2 Jazzy can parse, and not the one that is here.
 
     Args:
-        root: Folder of the submission's private copy.
-        files: Paths in it that the Python here cannot parse.
-        python: Version of the Python here.
         ruff: The program, by default the one that is found.
-
-    Returns:
-        The first syntax in each that is too new for it, with ruff's words.
     """
     ruff = ruff or find_ruff()
     if python >= _PYTHON or ruff is None or not files:

@@ -52,7 +52,6 @@ class Manifest:
         misplaced: Entries that stand inside <export>, where they do not count; their ``kind`` is
             ``export/depend`` and so on.
         groups: Groups that it is a member of (REP-149).
-        asks_for_groups: Whether it depends on whatever is a member of a group.
     """
 
     name: str | None
@@ -88,13 +87,7 @@ class _Refused(Exception):
 
 
 def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Manifest:
-    """Read a package.xml.
-
-    Args:
-        data: Its content.
-        file: Its path in the submission, for errors.
-        environment: What ``condition`` attributes may ask for (``ROS_VERSION``, ...).
-    """
+    """Read a package.xml."""
     document = _parse(data)
     names = [name for name in document.texts("name") if _NAME.fullmatch(name)]
     build_types = document.texts("export/build_type")

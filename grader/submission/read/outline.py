@@ -21,25 +21,14 @@ _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 @dataclass(frozen=True)
 class _Scope:
-    """Where a node stands.
-
-    Attributes:
-        prefix: Of the qualified names of what is defined in it.
-        in_class: Whether it is the body of a class.
-    """
+    """Where a node stands."""
 
     prefix: str = ""
     in_class: bool = False
 
 
 def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
-    """Take the facts from a syntax tree.
-
-    Args:
-        tree: Of the file.
-        path: Of the file in the submission.
-        module: Dotted name that it is imported by.
-    """
+    """Take the facts from a syntax tree."""
     classes: list[SourceClass] = []
     functions: list[SourceFunction] = []
     names: dict[str, str] = {}

@@ -46,16 +46,9 @@ class Package:
     """A package as handed in.
 
     Attributes:
-        name: From package.xml, else from setup.py, else the folder's.
-        folder: In the submission.
-        manifest: What package.xml says.
-        setup: What setup.py and setup.cfg say.
         cmake: Its CMakeLists.txt, or None where it has none.
         texts: Lines of setup.py and the first ones of the interface files, by path in the
             submission.
-        definitions: Interface files, and what lies beside them.
-        hashes: Hash of each Python file and script, by path in the submission.
-        trees: Syntax tree of each, or what is wrong with it.
         lint: What ruff says of what runs, or None where it was not asked.
         newer_syntax: What only the Python of ROS 2 Jazzy can parse, and not the one here.
     """
@@ -119,14 +112,7 @@ def read_package(
     ros: RosInstallation,
     allowance: source.Allowance | None = None,
 ) -> Package:
-    """Read a package from the private copy of its submission.
-
-    Args:
-        located: The submission.
-        folder: The package's folder in it.
-        ros: For conditions in package.xml.
-        allowance: What all its packages together may take.
-    """
+    """Read a package from the private copy of its submission."""
     allowance = allowance or source.Allowance()
     manifest = read_manifest(
         _bytes(located, join(folder, MANIFEST)) or b"",
@@ -181,8 +167,6 @@ def record_packages(
     """Record all packages of a submission.
 
     Args:
-        packages: What was handed in.
-        ros: The installation that they were built with.
         installed: What the build made, or None where nothing was built.
     """
     providers = _providers(packages, ros)

@@ -38,9 +38,6 @@ Value = Union[Text, "list[Value]", "dict[str, Value]"]
 def setup_keywords(tree: ast.Module) -> dict[str, Value]:
     """Evaluate the keyword arguments of the first call of ``setup``.
 
-    Args:
-        tree: The syntax tree of setup.py.
-
     Returns:
         The keywords whose values can be told: strings, lists (also for tuples) and
         dictionaries with string keys. Items of a list that cannot be told are left out.

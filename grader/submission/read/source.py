@@ -47,7 +47,6 @@ class Allowance:
 
     Attributes:
         nodes: Of all trees; what people write has one for eleven bytes.
-        seconds: For all files that are tried apart.
     """
 
     nodes: int = 1_000_000
@@ -58,12 +57,7 @@ def parse(data: bytes, file: str, allowance: Allowance | None = None) -> ast.Mod
     """Parse a file as Python would: encoding cookie, byte order mark and all.
 
     Args:
-        data: Its content.
-        file: Its path in the submission, for the error.
         allowance: Of its submission; what the file takes is taken from it.
-
-    Returns:
-        The tree, or what Python says is wrong.
     """
     left = allowance or Allowance()
     if len(data) > MAX_BYTES:

@@ -44,11 +44,6 @@ def missing_target(
 ) -> SourceError | None:
     """Say what an executable's target lacks.
 
-    Args:
-        entry: The console script.
-        modules: The package's own modules.
-        elsewhere: Top-level modules of others: ROS, the submission's other packages.
-
     Returns:
         None when the target exists or may exist.
     """
