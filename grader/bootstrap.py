@@ -34,7 +34,7 @@ _BUILD_TOOLS = {"setuptools"}
 
 
 class SetupError(Exception):
-    """Something that whoever runs the set-up can put right; the text says how."""
+    """A problem that the user can solve; the text says how."""
 
 
 class Interpreter(NamedTuple):

@@ -108,7 +108,9 @@ class WorldModel(Model):
     """A world file."""
 
     bounds: Rectangle | None = Field(None, description="A wall around everything.")
-    start: PoseInPlane = Field(ORIGIN, description="Where the robot starts if nobody says else.")
+    start: PoseInPlane = Field(
+        ORIGIN, description="Where the robot starts, unless a scenario says otherwise."
+    )
     values: dict[str, int | float | str] = Field(
         default_factory=dict,
         description="What `$name` stands for in this file; a scenario may give other values.",

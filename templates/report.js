@@ -1,6 +1,6 @@
 "use strict";
 // The report is whole without this: it adds the replay, opens what a link points at, and
-// nothing else. It reads the page's own data and asks nobody for more.
+// nothing else. It reads the page's own data and loads nothing from elsewhere.
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
   const DIGITS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";

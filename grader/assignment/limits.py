@@ -72,7 +72,7 @@ class LimitOptions(_Bounds):
     files: int = Field(_DEFAULTS.files, ge=100, description="Files and folders in home and /tmp.")
     output: Size = Field(
         _DEFAULTS.output_bytes,
-        description="What is written to the terminal; whoever writes more is ended.",
+        description="Output to the terminal; a program that writes more is ended.",
         validate_default=False,
     )
 
@@ -109,6 +109,6 @@ class BuildLimitOptions(_Bounds):
     files: int = Field(BUILD.files, ge=100, description="Files and folders that it makes.")
     output: Size = Field(
         BUILD_OUTPUT_BYTES,
-        description="What is written to the terminal; whoever writes more is ended.",
+        description="Output to the terminal; a program that writes more is ended.",
         validate_default=False,
     )

@@ -179,7 +179,7 @@ class Until(Model):
     """When the observation may end early: as soon as everything that is named here holds.
 
     The clock of `elapsed` and `quiet` starts with the first match of an endpoint, never with
-    the launch, so that a slow start costs nobody a point.
+    the launch, so that a slow start costs no point.
     """
 
     messages: int | None = Field(

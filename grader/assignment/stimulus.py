@@ -107,7 +107,7 @@ class Publish(Model):
                 raise ValueError("'count' needs a pace: give 'every' or 'answer'")
         if self.before_launch and self.durability == "volatile":
             raise ValueError(
-                "what is published 'before_launch' is lost for whoever joins later unless the "
+                "what is published 'before_launch' is lost for later subscriptions unless the "
                 "durability is transient_local"
             )
         if self._is_several and not self.paced:

@@ -105,7 +105,7 @@ def why_too_new(package: PackageRecord) -> Cause | None:
     return Cause(
         f"the Python here cannot read {package.newer_syntax[0]}",
         "It is right in ROS 2 Jazzy, which has Python 3.12, and no point is lost by it. Tell "
-        "whoever runs the grader: it needs Python 3.12. Or do without this syntax.",
+        "your instructor: it needs Python 3.12. Or do without this syntax.",
         ours=True,
     )
 
@@ -170,7 +170,7 @@ def _not_here(lacking: list[str]) -> Cause:
     return Cause(
         f"it needs {codes(lacking)} to build, which ROS 2 Jazzy has, but which is not installed "
         "where this is graded",
-        "No point is lost by it. Tell whoever runs the grader: a full ROS 2 Jazzy builds it.",
+        "No point is lost by it. Tell your instructor: a full ROS 2 Jazzy builds it.",
         ours=True,
     )
 

@@ -27,7 +27,7 @@ def why_time_stands_still(recording: Recording, what: str) -> Cause | None:
     periods = listing(format_duration(timer.period_s) for timer in timers)
     return Cause(
         f"{what}: the node takes its time from {code(_CLOCK)} ({code('use_sim_time')} is true), "
-        f"which nobody publishes here, so its timer of {periods} never fires",
+        f"which nothing publishes here, so its timer of {periods} never fires",
         f"Leave {code('use_sim_time')} as it is, in the code and in launch files: it is for a "
         "simulator that publishes its own time.",
         Evidence(moments=endpoints_seen(recording, listeners)),

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     # Reading YAML is not needed to judge; a worker of a batch starts without it.
     from grader.assignment.load import BoundCheck, LoadedAssignment
 
-_NOT_YOURS = "Nothing to fix on your side: tell whoever runs the grader."
+_NOT_YOURS = "Nothing to fix on your side: tell your instructor."
 
 
 def grade(

@@ -83,7 +83,7 @@ class Goal:
         result_ns: When the result was there, or None.
         preempts: It was sent while the goal before it was still being worked on, on purpose.
         preempted: A goal was sent while this one was still being worked on, on purpose.
-        error: Why it could not be sent: ``no server``, or what of ours went wrong.
+        error: Why it could not be sent: ``no server``, or what went wrong in rosgrade.
     """
 
     action: str

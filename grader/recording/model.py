@@ -52,7 +52,7 @@ class Ending(str, Enum):
     NOT_STARTED = "not_started"
     """Nothing could be launched: the executable does not exist."""
     FAULT = "fault"
-    """Something of ours or of the machine ended it (see ``Recording.faults``)."""
+    """A fault of rosgrade or of the machine ended it (see ``Recording.faults``)."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Process:
         exited_ns: When it had ended, or None if it could not be ended at all.
         exit_code: As in :mod:`subprocess`: negative for the signal that ended it.
         stopped_by: ``itself`` (before we asked), ``SIGINT``, ``SIGTERM`` or ``SIGKILL``:
-            the last signal of ours that was needed.
+            the last signal that rosgrade had to send.
         stop_s: Seconds from our SIGINT to its end, less what the host took; None if it
             ended before.
         survivors: Commands of descendants that were still there after it and had to be killed.
@@ -238,7 +238,7 @@ class Call:
         answered_ns: When the answer was there, or None if there was none by the end.
         request: Fields of the request; of the calls to ``list_parameters`` they are not kept.
         response: Fields of the response, or None.
-        error: Why it could not be sent or read: ``no server``, or what of ours went wrong.
+        error: Why it could not be sent or read: ``no server``, or what went wrong in rosgrade.
         servers: How many nodes offered the service then; of the calls to ``list_parameters`` and
             ``get_type_description`` all of them must have answered.
     """
@@ -481,7 +481,7 @@ class Recording:
         interventions: What the probe did to the student's processes.
         breaches: Limits of the sandbox that were reached.
         disturbance: What the host took from the run, sample by sample.
-        faults: What of ours or of the machine went wrong, one sentence each.
+        faults: What went wrong in rosgrade or on the machine, one sentence each.
         truth: The simulated robot, step by step; empty in a scenario without a world.
         incidents: What the simulator noted.
         scene: World and robot, or None in a scenario without a world.

@@ -76,7 +76,7 @@ class TestRequirements:
         assert not result.graded
         finding = result.result("topic").decisive.finding
         assert finding.observed == "“Title of node” could not be judged, so neither could this"
-        assert finding.hint == "Nothing to fix on your side: tell whoever runs the grader."
+        assert finding.hint == "Nothing to fix on your side: tell your instructor."
 
 
 class TestFirstToFix:

@@ -88,7 +88,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
     if not sources:
-        return Finding.error(expected, f"nothing was recorded on {source}, so nobody can tell")
+        return Finding.error(expected, f"nothing was recorded on {source}, so it cannot be judged")
     try:
         made_of = MadeOf.of(
             recording,
@@ -169,7 +169,7 @@ def _untold(recording: Recording, parameters: Follows, expected: str) -> Finding
             ),
         )
     return Finding.error(
-        expected, f"the values on {code(parameters.source)} hardly change, so nobody can tell"
+        expected, f"the values on {code(parameters.source)} hardly change, so it cannot be judged"
     )
 
 

@@ -286,7 +286,7 @@ def _from_start(recording: Recording, parameters: StaysAtRest) -> Finding:
     blind = bool(seen) and step.time_ns < seen[0].stamp_ns
     words = ", before the first scan had come" if blind else ""
     hint = (
-        "Publish no speed before the first scan: until then nobody knows what is ahead."
+        "Publish no speed before the first scan: until then the node cannot know what is ahead."
         if blind
         else "Stand still near an obstacle: linear.x = 0.0, not less."
         if step.linear_m_s < 0.0

@@ -82,8 +82,8 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     Judged by what DDS discovered of every endpoint of the student's on the topic, by the rule
     "requested against offered": reliability, durability, deadline, liveliness and its lease
     duration. With a late joiner as the peer, it is judged by whether the two did match. A
-    subscription that asks for the best available refuses nobody: it requests what the publishers
-    offer that are there when it is made. Only the process tells that.
+    subscription with the policy "best available" matches every publisher: it requests what the
+    publishers offer that are there when it is created. Only the process can declare that.
 
     Explains the policy that decides, and shows the rules as a table.
     """

@@ -128,7 +128,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     not normalized, w first instead of last, degrees, roll and yaw swapped, axes that turn with
     the body instead of fixed ones, the inverse rotation, answers that belong to the message
     before. Explains answers that are missing (a process that died, a callback that is never
-    called), and messages that nobody asked for.
+    called), and messages that answer nothing.
     """
     expected = parameters.words
     sent = recording.sent.get(parameters.stimulus, ())

@@ -378,7 +378,7 @@ def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
     in the style guide of ROS 2, and without any configuration or `# noqa` of the student's.
 
     Explains each place with its file and line in the words of ruff. Without ruff on the machine
-    that grades, it is an error and costs nobody a point.
+    that grades, it is an error, which costs no point.
     """
     wanted = ", ".join(parameters.rules)
     but = f" but {', '.join(parameters.except_)}" if parameters.except_ else ""

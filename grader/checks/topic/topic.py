@@ -21,9 +21,9 @@ class _Named(Parameters):
     topic: TopicName = Field(description="Fully qualified topic name.")
     remap: bool = Field(
         False,
-        description="Where the node has the right type on another topic that nobody asked for, run "
-        "again with that topic remapped to this one. This check fails, and what requires it is "
-        "judged all the same: a wrong name costs the points of one check.",
+        description="If the node uses the right type on a topic that the assignment does not name, "
+        "run again with that topic remapped to this one. This check fails, and the checks that "
+        "require it are judged in the second run: a wrong name costs the points of one check.",
     )
 
 

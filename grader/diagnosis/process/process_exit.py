@@ -242,8 +242,7 @@ def why_it_exited(recording: Recording, process: Process) -> Cause:
             return Cause(
                 f"{ended}: it imports {code(lacking)}{where}, a ROS 2 package that is not "
                 "installed where this is graded",
-                f"No point is lost by it. Tell whoever runs the grader: `sudo apt install "
-                f"{apt_name}`.",
+                f"No point is lost by it. Tell your instructor: `sudo apt install {apt_name}`.",
                 evidence,
                 ours=True,
             )
@@ -252,7 +251,7 @@ def why_it_exited(recording: Recording, process: Process) -> Cause:
         return Cause(
             f"{ended}: it uses {code(newer.name)}{where}, which is not there where this is graded",
             f"It is right in ROS 2 Jazzy, which has {newer.home}, and no point is lost by it. Tell "
-            f"whoever runs the grader: it needs {newer.home}. Or do without this name.",
+            f"your instructor: it needs {newer.home}. Or do without this name.",
             evidence,
             ours=True,
         )

@@ -325,7 +325,7 @@ def _column(export: CanvasExport, wanted: str) -> str:
             f"{dropped[0]!r} in it, as its own totals: give the assignment another title there"
         )
     if re.search(r"read\s+only", export.points.get(title, "")):
-        raise UsageError(f"Canvas skips the column {title!r}: nobody may change it there")
+        raise UsageError(f"Canvas skips the column {title!r}: it is read-only there")
     return title
 
 
