@@ -21,6 +21,7 @@ from pydantic import BaseModel
 
 from grader import resources
 from grader.assignment import asking, limits, model, mutant, stimulus
+from grader.assignment.lesson_checks import FOLDER, lesson_checks
 from grader.checks import finding
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
@@ -198,8 +199,23 @@ def checks_markdown(catalogue: Mapping[str, Check] = CATALOGUE) -> str:
         "of a run.",
         _table(("check", "what it asks for"), rows),
         *(check_markdown(check) for check in catalogue.values()),
+        *_lessons_markdown(),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _lessons_markdown() -> Iterator[str]:
+    """The checks that lie beside the YAML of rosgrade's own assignments."""
+    yield "# Checks of single lessons"
+    yield (
+        "These lie in the folder `checks/` of one assignment, which alone can use them. An "
+        "assignment of yours can have [checks of its own](own-checks.md) in the same way, or "
+        "start with a copy of the folder."
+    )
+    for folder in sorted(resources.assignments().glob(f"*/{FOLDER}")):
+        for check in lesson_checks(folder.parent).values():
+            text = check_markdown(check)
+            yield text.replace("\n\n", f"\n\nOnly in `{folder.parent.name}`. ", 1)
 
 
 def check_markdown(check: Check) -> str:

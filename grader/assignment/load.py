@@ -12,6 +12,7 @@ from grader import resources
 from grader.assignment import expected, interfaces, rules, simulation, stimulation
 from grader.assignment.binding import BoundCheck, bind, tell_apart
 from grader.assignment.draft import Draft
+from grader.assignment.lesson_checks import lesson_checks
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
 from grader.checks.catalogue import CATALOGUE
@@ -141,7 +142,11 @@ def load_assignment(
             f"mutants are read with the {ASSIGNMENT_FILE} that they belong to: name that one"
         )
     assignment, found = source.examine(Assignment)
-    checks, more = _fit(source, catalogue)
+    try:
+        own = lesson_checks(file.parent)
+    except ValueError as error:
+        raise AssignmentError(file, [*found, source.problem(("checks",), str(error))]) from error
+    checks, more = _fit(source, {**catalogue, **own} if own else catalogue)
     found += [problem for problem in more if problem not in found]
     if assignment is not None and not found:
         found += simulation.problems(source, assignment)

@@ -32,7 +32,8 @@ def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, A
         "oneOf": [
             {"const": check.name, "description": check.title}
             for check in sorted(catalogue.values(), key=lambda check: check.name)
-        ],
+        ]
+        + [_own_check(catalogue)],
     }
     entry["properties"]["python"] = {
         "description": entry["properties"]["python"]["description"],
@@ -44,6 +45,15 @@ def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, A
         _parameters_of(check, references[check.parameters]) for check in catalogue.values()
     ]
     return {"$schema": _DRAFT, **references[Assignment], **schema}
+
+
+def _own_check(catalogue: Mapping[str, Check]) -> dict[str, Any]:
+    families = "|".join(sorted({check.family for check in catalogue.values()}))
+    return {
+        "description": "A check of the package `checks/` beside this file.",
+        "type": "string",
+        "pattern": rf"^(?!({families})\.)[a-z]\w*\.[a-z]\w*$",
+    }
 
 
 def mutants_schema() -> dict[str, Any]:

@@ -14,7 +14,6 @@ from types import MappingProxyType, ModuleType
 
 from grader import checks
 from grader.checks.check import Check
-from grader.spec.nearest_name import did_you_mean
 
 
 def gather(modules: Iterable[ModuleType]) -> Mapping[str, Check]:
@@ -65,18 +64,3 @@ class _Catalogue(Mapping[str, Check]):
 
 
 CATALOGUE: Mapping[str, Check] = _Catalogue()
-
-
-def get(name: str) -> Check:
-    """The check of a name.
-
-    Raises:
-        ValueError: There is none; the message names the nearest.
-    """
-    try:
-        return CATALOGUE[name]
-    except KeyError:
-        text = f"unknown check {name!r}." + did_you_mean(name, CATALOGUE)
-        if "Did you mean" not in text:
-            text += f" There are: {', '.join(sorted(CATALOGUE))}."
-        raise ValueError(text) from None

@@ -67,11 +67,12 @@ def schema(
     document: Annotated[Document, typer.Argument(help="Which schema.")] = Document.ASSIGNMENT,
 ) -> None:
     """Print the JSON Schema of a file, for editors."""
+    from grader.assignment.lesson_checks import all_checks
     from grader.assignment.schema import assignment_schema, mutants_schema
     from grader.report.model.result import result_schema
 
     make = {
-        Document.ASSIGNMENT: assignment_schema,
+        Document.ASSIGNMENT: lambda: assignment_schema(all_checks()),
         Document.MUTANTS: mutants_schema,
         Document.RESULT: result_schema,
     }[document]
@@ -85,19 +86,20 @@ def checks(
     from rich.markdown import Markdown
     from rich.table import Table
 
-    from grader.checks.catalogue import CATALOGUE
+    from grader.assignment.lesson_checks import all_checks
     from grader.docs import check_markdown
     from grader.errors import UsageError
     from grader.spec.nearest_name import did_you_mean
 
+    catalogue = all_checks()
     console = output_console()
     if name is None:
         table = Table("CHECK", "WHAT IT JUDGES", box=None, pad_edge=False)
-        for entry in CATALOGUE.values():
+        for entry in catalogue.values():
             table.add_row(entry.name, entry.title)
         console.print(table)
         console.print("\nrosgrade checks NAME tells what a check looks at and its parameters.")
         return
-    if name not in CATALOGUE:
-        raise UsageError(f"no check {name!r}." + did_you_mean(name, CATALOGUE))
-    console.print(Markdown(check_markdown(CATALOGUE[name])))
+    if name not in catalogue:
+        raise UsageError(f"no check {name!r}." + did_you_mean(name, catalogue))
+    console.print(Markdown(check_markdown(catalogue[name])))

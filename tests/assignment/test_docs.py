@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from grader import docs, resources
+from grader.assignment.lesson_checks import all_checks
 from grader.assignment.own_check import load_own_check
-from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check
 from grader.checks.finding import Evidence, Finding
 from grader.recording.interaction import Goal
@@ -38,7 +38,7 @@ def test_a_stale_or_missing_file_is_told_and_mended(
 
 def test_every_check_is_described_with_all_its_parameters() -> None:
     text = docs.checks_markdown()
-    for check in CATALOGUE.values():
+    for check in all_checks().values():
         section = text.split(f"## {check.name}\n")[1].split("\n## ")[0]
         for name, field in check.parameters.model_fields.items():
             assert f"| `{field.alias or name}` |" in section

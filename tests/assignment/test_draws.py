@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from assignments.quaternion.checks.common_mistakes import MISTAKES
+from assignments.quaternion.checks.conversion import (
+    CONVERSIONS,
+    Group,
+    oracle,
+    rotations_of_answers,
+)
 from grader.assignment.drawing import draw_values, world_values
 from grader.assignment.load import load_assignment
 from grader.assignment.own_check import load_function
 from grader.assignment.simulation import read_scenario_world
 from grader.checks.field import value_at
 from grader.checks.log.printed import shows
-from grader.checks.rotation.conversion import (
-    CONVERSIONS,
-    Group,
-    oracle,
-    rotations_of_answers,
-)
-from grader.checks.rotation.rotation_mistakes import MISTAKES
 from sim.lidar import Lidar
 
 Rows = NDArray[np.float64]

@@ -111,7 +111,7 @@ def test_an_own_check_may_have_any_parameters(catalogue: Mapping[str, Check]) ->
 def test_an_editor_can_explain_every_check_and_every_key() -> None:
     schema = assignment_schema()
     uses = schema["$defs"]["CheckSpec"]["properties"]["uses"]["oneOf"]
-    assert {one["const"]: one["description"] for one in uses} == {
+    assert {one["const"]: one["description"] for one in uses if "const" in one} == {
         check.name: check.title for check in CATALOGUE.values()
     }
     for name in ("Assignment", "Package", "Scenario", "Launch", "Until", "CheckSpec"):

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from grader.checks.catalogue import get
+from grader.assignment.lesson_checks import all_checks
 from grader.checks.finding import Finding, Status
 from grader.recording.model import (
     NS,
@@ -48,6 +48,7 @@ from sim.odometry import OdometrySample
 from sim.simulation import Simulation, make_simulation
 from sim.world import parse_world
 
+CHECKS = all_checks()
 LAUNCH_NS = 1_700_000_000 * NS
 FIRST_S = 0.7
 PERIOD_S = 0.3
@@ -63,7 +64,7 @@ RELIABLE = Qos(reliability="reliable", durability="volatile", liveliness="automa
 
 def judge(check: str, subject: Recording | SubmissionRecord, **parameters: Any) -> Finding:
     """Run a check of the catalogue with parameters as YAML has them."""
-    entry = get(check)
+    entry = CHECKS[check]
     finding = entry.judge(subject, entry.parameters.model_validate(parameters))
     assert finding.status is not Status.FAILED or leads_somewhere(finding, subject), finding
     return finding

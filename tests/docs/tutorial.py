@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Collection
 from dataclasses import dataclass
 
 _FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
@@ -43,7 +44,7 @@ def _spaced(text: str) -> str:
     return " ".join(text.split())
 
 
-def steps(page: str) -> list[WriteFile | Command]:
+def steps(page: str, skipped: Collection[str] = ()) -> list[WriteFile | Command]:
     """All steps of a page, in order."""
     found: list[WriteFile | Command] = []
     for language, rest, block in _FENCE.findall(page):
@@ -54,6 +55,6 @@ def steps(page: str) -> list[WriteFile | Command]:
             for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
                 line, _, printed = part.partition("\n")
                 found.append(Command(line, printed))
-        else:
+        elif language not in skipped:
             raise ValueError(f"a block that no step is made of: {language}{rest}")
     return found

@@ -10,7 +10,6 @@ from statistics import median
 from pydantic import Field, model_validator
 
 from grader.checks import declarations
-from grader.checks.callbacks.callback_run import Reports, read_reports, spans
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.need import Published, Recorded
@@ -19,12 +18,14 @@ from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
-from grader.diagnosis.missing_reports import SECONDS_HINT, Reported, why_reports_are_missing
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
+
+from .callback_run import Reports, read_reports, spans
+from .missing_reports import SECONDS_HINT, Reported, why_reports_are_missing
 
 # Between two callbacks of a busy executor.
 _PAUSE_S = 0.1

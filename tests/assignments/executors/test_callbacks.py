@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from assignments.executors.checks.callback_run import read_reports
 from grader.assignment.load import load_assignment
-from grader.checks.callbacks.callback_run import read_reports
 from grader.checks.finding import Status
 from grader.recording.model import Kind
 from tests.checks.builder import (

@@ -7,7 +7,6 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from grader.checks.callbacks.callback_run import Reports, spans
 from grader.checks.check import Parameters
 from grader.checks.finding import Evidence, Moment
 from grader.checks.need import Need, Recorded
@@ -19,6 +18,8 @@ from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.nearest_name import nearest
 from grader.spec.unit import format_duration
+
+from .callback_run import Reports, spans
 
 _FORMAT_HINT = (
     "Publish a String with the name of the callback, a space and `start` as the first thing in "

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from assignments.quaternion.checks.case import rows
+from assignments.quaternion.checks.common_mistakes import MISTAKES
+from assignments.quaternion.checks.conversion import CONVERSIONS, Group, angles_between, oracle
 from grader.assignment.load import find_assignment
 from grader.assignment.own_check import load_function
 from grader.checks.finding import Status
-from grader.checks.rotation.conversion import CONVERSIONS, Group, angles_between, oracle
-from grader.checks.rotation.rotation_case import rows
-from grader.checks.rotation.rotation_mistakes import MISTAKES
 from tests.checks.builder import (
     died,
     endpoint,

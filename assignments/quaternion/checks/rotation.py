@@ -15,16 +15,6 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
 from grader.checks.messages.messages import published
 from grader.checks.need import Published, Recorded
-from grader.checks.rotation.conversion import (
-    CONVERSIONS,
-    Group,
-    WrongMessage,
-    degrees,
-    sine_of_pitch,
-)
-from grader.checks.rotation.rotation_case import Case, Limits, cases
-from grader.checks.rotation.rotation_evidence import evidence_of, right_words, shown
-from grader.checks.rotation.rotation_mistakes import explain, wrong_part
 from grader.checks.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.common_mistakes import was_integer, what_was_put
@@ -37,6 +27,17 @@ from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import QuantityOf
 from grader.spec.unit import Dimension
+
+from .case import Case, Limits, cases
+from .common_mistakes import explain, wrong_part
+from .conversion import (
+    CONVERSIONS,
+    Group,
+    WrongMessage,
+    degrees,
+    sine_of_pitch,
+)
+from .evidence import evidence_of, right_words, shown
 
 # An answer takes a callback of some microseconds; a question that was sent later than this
 # before the end may be unanswered.

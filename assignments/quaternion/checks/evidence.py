@@ -8,16 +8,17 @@ import numpy as np
 
 from grader.checks.finding import Case as CaseError
 from grader.checks.finding import Cases, Evidence, Moment, Table
-from grader.checks.rotation.conversion import (
+from grader.recording.model import Recording
+
+from .case import Answer, Case
+from .common_mistakes import rpy_of
+from .conversion import (
     CONVERSIONS,
     Group,
     answer_words,
     degrees,
     sine_of_pitch,
 )
-from grader.checks.rotation.rotation_case import Answer, Case
-from grader.checks.rotation.rotation_mistakes import rpy_of
-from grader.recording.model import Recording
 
 _ROWS = 12
 

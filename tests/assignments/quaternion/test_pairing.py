@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.rotation.pairing import pair
+from assignments.quaternion.checks.pairing import pair
 
 
 def right_for(answers: list[int | None], questions: int) -> np.ndarray:

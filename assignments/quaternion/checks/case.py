@@ -10,7 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from grader.checks.field import number_at
-from grader.checks.rotation.conversion import (
+from grader.checks.value import NoSuchField
+from grader.recording.model import NS, Message
+
+from .conversion import (
     CONVERSIONS,
     Group,
     Rows,
@@ -19,9 +22,7 @@ from grader.checks.rotation.conversion import (
     oracle,
     rotations_of_answers,
 )
-from grader.checks.rotation.pairing import pair
-from grader.checks.value import NoSuchField
-from grader.recording.model import NS, Message
+from .pairing import pair
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,16 @@ from functools import reduce
 
 from pydantic import Field
 
-from grader.checks.callbacks import concurrency
-from grader.checks.callbacks.callback_run import Reports, Run, read_reports, spans
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.wording import code, codes, counted
-from grader.diagnosis.missing_reports import Reported, why_reports_are_missing
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
+
+from . import concurrency
+from .callback_run import Reports, Run, read_reports, spans
+from .missing_reports import Reported, why_reports_are_missing
 
 # From and until when, in nanoseconds.
 _Stretch = tuple[int, int]

@@ -6,8 +6,16 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from grader.checks.callbacks import concurrency
-from grader.checks.callbacks.callback_run import (
+from grader.checks.check import Subject, check
+from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.wording import code, codes, counted, listing
+from grader.diagnosis.exchanged_executables import why_exchanged
+from grader.recording.model import NS, Recording
+from grader.spec.quantity import Duration
+from grader.spec.unit import format_duration
+
+from . import concurrency
+from .callback_run import (
     Overlap,
     Reports,
     Run,
@@ -15,14 +23,7 @@ from grader.checks.callbacks.callback_run import (
     read_reports,
     spans,
 )
-from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.wording import code, codes, counted, listing
-from grader.diagnosis.exchanged_executables import why_exchanged
-from grader.diagnosis.missing_reports import Reported, why_reports_are_missing
-from grader.recording.model import NS, Recording
-from grader.spec.quantity import Duration
-from grader.spec.unit import format_duration
+from .missing_reports import Reported, why_reports_are_missing
 
 
 class NeverOverlap(Reported):

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from grader.checks.rotation.conversion import (
+from .conversion import (
     Rows,
     angles_between,
     oracle,

@@ -1,0 +1,1 @@
+"""Checks of this lesson alone: the law of a proportional controller."""
