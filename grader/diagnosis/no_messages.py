@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from grader.checks import declarations
 from grader.checks.doubt import was_held_up
@@ -13,6 +13,7 @@ from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.delivery import why_not_delivered
 from grader.diagnosis.destroyed_endpoint import why_unpublished
+from grader.diagnosis.explanation import cause_of, explanation
 from grader.diagnosis.no_answer import why_never_awaited, why_raised
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.blocked_executor import left_s, why_blocked, why_never_spun
@@ -37,48 +38,442 @@ _STARVED = 0.5
 _OWN_S = 2.0
 
 
+@dataclass(frozen=True)
+class NoMessages:
+    """No message was recorded on a topic."""
+
+    recording: Recording
+    topic: str
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        return f"no message on {code(self.topic)}"
+
+    @property
+    def publishers(self) -> tuple[Endpoint, ...]:
+        """The student's publishers on the topic."""
+        return self.recording.student_endpoints(Kind.PUBLISHER, self.topic)
+
+    @property
+    def nodes(self) -> set[str]:
+        """The nodes that have them."""
+        return {item.node for item in self.publishers}
+
+    @property
+    def readers(self) -> list[Endpoint]:
+        """The probe's subscriptions to the topic."""
+        return [
+            item
+            for item in self.recording.endpoints
+            if item.owner is Owner.PROBE
+            and item.kind is Kind.SUBSCRIPTION
+            and item.topic == self.topic
+        ]
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Topics that the probe publishes on and that this one answers, as far as it is said."""
+        answers = self.recording.answers
+        return tuple(
+            name for name in self.recording.sent if answers.get(name, self.topic) == self.topic
+        )
+
+
+@dataclass(frozen=True)
+class FewMessages:
+    """Some messages were recorded on a topic, but fewer than needed."""
+
+    recording: Recording
+    topic: str
+    needed: int
+
+    @property
+    def begin_ns(self) -> int:
+        """When the observation of the topic began."""
+        return self.recording.matched_ns or self.recording.launched_ns
+
+    @property
+    def watched_s(self) -> float:
+        """How long the topic was observed."""
+        return (self.recording.stop_ns - self.begin_ns) / NS
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        number = counted(len(self.recording.on(self.topic)), "message")
+        return f"{number} on {code(self.topic)} in {format_duration(self.watched_s)}"
+
+    @property
+    def moments(self) -> tuple[Moment, ...]:
+        """When the first messages came."""
+        return tuple(
+            Moment(f"message {index}", self.recording.since_launch_s(message.stamp_ns))
+            for index, message in enumerate(self.recording.on(self.topic)[:10], start=1)
+        )
+
+
 def why_silent(recording: Recording, topic: str) -> Cause:
     """Why nothing was recorded on a topic."""
-    cause = why_no_endpoint(recording, Kind.PUBLISHER, topic)
-    if cause is not None:
-        return cause
-    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
-    readers = [
-        item
-        for item in recording.endpoints
-        if item.owner is Owner.PROBE and item.kind is Kind.SUBSCRIPTION and item.topic == topic
-    ]
-    cause = (
-        _other_type(recording, topic, publishers, readers)
-        or _other_definition(recording, topic, publishers)
-        or why_unreadable(recording, topic)
-        or _unmatched(recording, topic, publishers, readers)
-        or _held_in_vain(recording, topic)
+    return cause_of(NoMessages(recording, topic))
+
+
+def why_few(recording: Recording, topic: str, needed: int) -> Cause:
+    """Why fewer messages than needed were recorded on a topic."""
+    if not recording.on(topic):
+        return why_silent(recording, topic)
+    return cause_of(FewMessages(recording, topic, needed))
+
+
+@explanation(NoMessages)
+def no_publisher(symptom: NoMessages) -> Cause | None:
+    """The node has no publisher on the topic."""
+    return why_no_endpoint(symptom.recording, Kind.PUBLISHER, symptom.topic)
+
+
+@explanation(NoMessages)
+def other_type(symptom: NoMessages) -> Cause | None:
+    """The publisher has another message type."""
+    wanted = {item.type for item in symptom.readers}
+    found = {item.type for item in symptom.publishers}
+    if not wanted or not found or wanted & found:
+        return None
+    return Cause(
+        f"no message could be read: {code(symptom.topic)} has the type {codes(sorted(found))}, "
+        f"not {codes(sorted(wanted), last='or')}",
+        "A publisher and a subscription meet only if their types are the same.",
+        Evidence(moments=endpoints_seen(symptom.recording, symptom.publishers)),
     )
-    seen = f"no message on {code(topic)}"
-    cause = cause or why_ended(recording, seen)
-    if cause is not None:
-        return cause
-    asked = _asked_on(recording, topic)
-    nodes = {item.node for item in publishers}
-    begin_ns = [recording.sent[name][0].stamp_ns for name in asked if recording.sent[name]]
-    blocked = why_blocked(recording, seen, nodes, min(begin_ns, default=recording.launched_ns))
-    starved = _starved(recording, topic)
-    own_s = left_s(recording, min(begin_ns), recording.stop_ns) if begin_ns else 0.0
-    guilty = blocked or (_unanswered(recording, topic, asked) if own_s >= _OWN_S else None)
-    return (
-        why_unpublished(recording, topic, seen)
-        or _undelivered(recording, topic, asked)
-        or (_slow(recording, topic) if not asked else None)
-        # A callback that never returns burns what CPU the machine leaves it.
-        or (starved and guilty and replace(guilty, disturbed=True))
-        or starved
-        or why_never_spun(recording, seen, nodes)
-        or why_time_stands_still(recording, seen)
-        or blocked
-        or why_never_awaited(recording, seen)
-        or _unanswered(recording, topic, asked)
-        or _idle(recording, topic)
+
+
+@explanation(NoMessages)
+def other_definition(symptom: NoMessages) -> Cause | None:
+    """The message type has the right name, but other fields than the assignment asks for."""
+    if not symptom.recording.misdefined(symptom.topic):
+        return None
+    return Cause(
+        f"no message on {code(symptom.topic)} could be read: its type "
+        f"{code(symptom.publishers[0].type)} has the right name, but another definition",
+        "Compare the definition with the one that was asked for: the types, names, array bounds "
+        "and order of its fields must be the same.",
+        Evidence(moments=endpoints_seen(symptom.recording, symptom.publishers)),
+    )
+
+
+@explanation(NoMessages)
+def unreadable(symptom: NoMessages) -> Cause | None:
+    """The program publishes bytes that are no message of the type."""
+    return why_unreadable(symptom.recording, symptom.topic)
+
+
+@explanation(NoMessages)
+def incompatible_qos(symptom: NoMessages) -> Cause | None:
+    """The publisher offers less (reliability, durability, deadline) than its reader requests."""
+    publishers, readers = symptom.publishers, symptom.readers
+    reasons = [
+        compatibility.refusals(offered=publisher.qos, requested=reader.qos)
+        for publisher in publishers
+        for reader in readers
+    ]
+    if not reasons or not all(reasons):
+        return None
+    return Cause(
+        f"no message on {code(symptom.topic)}: the publisher's QoS does not match its reader "
+        f"({', '.join(reasons[0])})",
+        "A subscription receives nothing from a publisher that offers less than it requests.",
+        Evidence(
+            moments=endpoints_seen(symptom.recording, publishers),
+            tables=(
+                compatibility.compatibility_table(
+                    offered=publishers[0].qos, requested=readers[0].qos
+                ),
+            ),
+        ),
+    )
+
+
+@explanation(NoMessages)
+def never_matched(symptom: NoMessages) -> Cause | None:
+    """The busy machine kept the publisher and the probe from discovering each other."""
+    if not was_held_up(symptom.recording) or not any(
+        item.data.get("topic") == symptom.topic and item.data.get("matched") is False
+        for item in symptom.recording.declared("held")
+    ):
+        return None
+    return Cause.to_repeat(
+        f"the publisher on {code(symptom.topic)} was not matched by the probe in time, so a "
+        "message could be lost"
+    )
+
+
+@explanation(NoMessages)
+def process_ended(symptom: NoMessages) -> Cause | None:
+    """The process ended before it published."""
+    return why_ended(symptom.recording, symptom.seen)
+
+
+@explanation(NoMessages)
+def publisher_destroyed(symptom: NoMessages) -> Cause | None:
+    """The program destroyed its publisher."""
+    return why_unpublished(symptom.recording, symptom.topic, symptom.seen)
+
+
+@explanation(NoMessages)
+def nothing_to_answer(symptom: NoMessages) -> Cause | None:
+    """The messages that the node should answer did not reach it."""
+    causes = [why_not_delivered(symptom.recording, name) for name in symptom.asked]
+    cause = causes[0] if causes and all(causes) else None
+    return cause and cause.after(
+        f"{symptom.seen}, because what the node should answer, on {code(symptom.asked[0])}, "
+        "never reached it"
+    )
+
+
+@explanation(NoMessages)
+def slow_timer(symptom: NoMessages) -> Cause | None:
+    """The timer's period is longer than the observation: milliseconds were given as seconds."""
+    timer = None if symptom.asked else _slow_timer(symptom.recording)
+    if timer is None:
+        return None
+    recording = symptom.recording
+    watched_s = recording.since_launch_s(recording.stop_ns)
+    return Cause(
+        f"{symptom.seen} in {format_duration(watched_s)}: the process declared a "
+        f"timer of {format_duration(timer.period_s)}",
+        _SECONDS_HINT,
+        Evidence(
+            moments=(
+                Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
+                until_the_end(recording),
+            )
+        ),
+    )
+
+
+@explanation(NoMessages)
+def no_cpu_time(symptom: NoMessages) -> Cause | None:
+    """The machine gave the process too little CPU time; an error, and never a lost point."""
+    recording = symptom.recording
+    begin_ns = recording.matched_ns or recording.launched_ns
+    stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
+    watched_s = (recording.stop_ns - begin_ns) / NS
+    if stolen_s < _STARVED * watched_s:
+        return None
+    # A callback that never returns burns what CPU the machine leaves it.
+    guilty = blocked_executor(symptom)
+    begins_ns = [recording.sent[name][0].stamp_ns for name in symptom.asked if recording.sent[name]]
+    if not guilty and begins_ns and left_s(recording, min(begins_ns), recording.stop_ns) >= _OWN_S:
+        guilty = no_answer(symptom)
+    if guilty:
+        return replace(guilty, disturbed=True)
+    return Cause.to_repeat(
+        f"{symptom.seen}, but the machine took {format_duration(stolen_s)} of "
+        f"{format_duration(watched_s)} from the process"
+    )
+
+
+@explanation(NoMessages)
+def never_spun(symptom: NoMessages) -> Cause | None:
+    """rclpy.spin() is never called, or the node is not given to the executor that spins."""
+    return why_never_spun(symptom.recording, symptom.seen, symptom.nodes)
+
+
+@explanation(NoMessages)
+def time_stands_still(symptom: NoMessages) -> Cause | None:
+    """The node uses simulated time, which no simulator publishes, so its timers never fire."""
+    return why_time_stands_still(symptom.recording, symptom.seen)
+
+
+@explanation(NoMessages)
+def blocked_executor(symptom: NoMessages) -> Cause | None:
+    """A callback does not return, and blocks the executor."""
+    sent = symptom.recording.sent
+    begin_ns = [sent[name][0].stamp_ns for name in symptom.asked if sent[name]]
+    since_ns = min(begin_ns, default=symptom.recording.launched_ns)
+    return why_blocked(symptom.recording, symptom.seen, symptom.nodes, since_ns)
+
+
+@explanation(NoMessages)
+def never_awaited(symptom: NoMessages) -> Cause | None:
+    """A coroutine is called without `await`, so nothing of it runs."""
+    return why_never_awaited(symptom.recording, symptom.seen)
+
+
+@explanation(NoMessages)
+def no_answer(symptom: NoMessages) -> Cause | None:
+    """The subscription's callback gets its message, but does not publish, or raises."""
+    recording = symptom.recording
+    name = next((name for name in symptom.asked if recording.sent[name]), None)
+    if name is None:
+        return None
+    sent = recording.sent[name]
+    seen = (
+        f"{symptom.seen}, although {counted(len(sent), 'message')} on {code(name)} reached the node"
+    )
+    return why_raised(recording, seen, sent[0].stamp_ns) or Cause(
+        seen,
+        "Is publish(msg) reached in the subscription's callback? An `except: pass` hides the error "
+        "that would tell why not, and a lock or a loop that never ends keeps it waiting.",
+        Evidence(
+            moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
+            places=_interrupted(recording),
+        ),
+    )
+
+
+@explanation(NoMessages)
+def callback_without_publish(symptom: NoMessages) -> Cause | None:
+    """The subscription's callback is called, but a condition keeps it from publishing."""
+    heard = _heard(symptom.recording, symptom.topic)
+    if not heard or declarations.said(symptom.recording, "timer"):
+        return None
+    return Cause(
+        f"{_idle(symptom)}, although {heard} reached the node",
+        "Is publish(msg) reached in the subscription's callback? Look for a condition or a "
+        "`return` before it, and for an `except: pass` that hides an error.",
+        _idle_evidence(symptom),
+    )
+
+
+@explanation(NoMessages)
+def no_timer(symptom: NoMessages) -> Cause | None:
+    """No timer was created, so nothing calls the callback that publishes."""
+    recording = symptom.recording
+    if not declarations.traced(recording) or declarations.said(recording, "timer"):
+        return None
+    return Cause(
+        f"{_idle(symptom)}, and the process declared no timer that would call it",
+        "Is publish(msg) reached? Look for a condition before it, and for a loop that waits "
+        "for what never comes, such as subscriptions. A callback publishes only if something "
+        "calls it: self.create_timer(period_in_seconds, self.callback) does.",
+        _idle_evidence(symptom),
+    )
+
+
+@explanation(NoMessages)
+def lambda_without_call(symptom: NoMessages) -> Cause | None:
+    """The timer's callback is a lambda that names the method and does not call it."""
+    timers = _firing(symptom.recording)
+    if not timers or not all(timer.callback.endswith("<lambda>") for timer in timers):
+        return None
+    return Cause(
+        _idle(symptom) + _although(symptom.recording),
+        "A lambda has to call the method, with brackets: `lambda: self.callback()`. Without a "
+        "lambda it is self.callback, without brackets.",
+        _idle_evidence(symptom),
+    )
+
+
+@explanation(NoMessages, general=True)
+def publish_not_reached(symptom: NoMessages) -> Cause:
+    """The publisher is there, but the program does not come to its publish()."""
+    return Cause(
+        _idle(symptom) + _although(symptom.recording),
+        "Is publish(msg) reached in the callback? Printing or logging a message does not send it, "
+        "an `except: pass` hides the error that would tell why not, a lock that is never free "
+        "keeps it waiting, timer.cancel() ends it, and timer.reset() again and again lets its "
+        "period never end.",
+        _idle_evidence(symptom),
+    )
+
+
+def _idle(symptom: NoMessages) -> str:
+    return f"the publisher on {code(symptom.topic)} is there but silent"
+
+
+def _idle_evidence(symptom: NoMessages) -> Evidence:
+    recording = symptom.recording
+    # What it prints after Ctrl+C tells of its end, which any right node may word as a traceback.
+    complaints = [
+        line.text
+        for line in recording.log
+        if line.stream == "stderr" and line.time_ns <= recording.stop_ns
+    ]
+    return Evidence(
+        moments=(
+            *endpoints_seen(recording, symptom.publishers),
+            until_the_end(recording, "still no message when the observation ended"),
+        ),
+        places=_interrupted(recording),
+        log=tuple(complaints[-_LOG_LINES:]),
+    )
+
+
+def _firing(recording: Recording) -> list[declarations.DeclaredTimer]:
+    return [timer for timer in declarations.timers(recording) if _fires(recording, timer)]
+
+
+def _although(recording: Recording) -> str:
+    runs = [format_duration(timer.period_s) for timer in _firing(recording)]
+    if not runs or not declarations.said(recording, "spin"):
+        return ""
+    return f", although the process declared a timer of {listing(runs)}"
+
+
+@explanation(FewMessages)
+def some_unreadable(symptom: FewMessages) -> Cause | None:
+    """Some of what the program publishes is no message of the type."""
+    return why_unreadable(symptom.recording, symptom.topic)
+
+
+@explanation(FewMessages)
+def process_ended_early(symptom: FewMessages) -> Cause | None:
+    """The process ended before it published enough."""
+    return why_ended(symptom.recording, symptom.seen)
+
+
+@explanation(FewMessages)
+def too_little_cpu_time(symptom: FewMessages) -> Cause | None:
+    """With the time that the machine took from the process, it may have published enough."""
+    recording, number = symptom.recording, len(symptom.recording.on(symptom.topic))
+    stolen_s = recording.stolen_s(symptom.begin_ns, recording.stop_ns)
+    left_to_it_s = symptom.watched_s - stolen_s
+    if stolen_s <= 0.0 or number * symptom.watched_s < symptom.needed * left_to_it_s:
+        return None
+    return Cause.to_repeat(
+        f"{symptom.seen}, but the machine took {format_duration(stolen_s)} of them from the process"
+    )
+
+
+@explanation(FewMessages)
+def publisher_destroyed_early(symptom: FewMessages) -> Cause | None:
+    """The program destroyed its publisher too early."""
+    return why_unpublished(symptom.recording, symptom.topic, symptom.seen)
+
+
+@explanation(FewMessages)
+def timer_not_spun(symptom: FewMessages) -> Cause | None:
+    """A timer was created, but rclpy.spin() is never called."""
+    if not declarations.timers(symptom.recording):
+        return None
+    return why_never_spun(symptom.recording, symptom.seen, moments=symptom.moments)
+
+
+@explanation(FewMessages, general=True)
+def timer_stopped_or_slow(symptom: FewMessages) -> Cause | None:
+    """A timer stopped, or its period is too long for as many messages."""
+    recording, seen = symptom.recording, symptom.seen
+    period_s = [timer.period_s for timer in declarations.timers(recording)]
+    if not period_s:
+        return None
+    timers = f"; the process declared a timer of {listing(map(format_duration, period_s))}"
+    silent_s = (recording.stop_ns - recording.on(symptom.topic)[-1].stamp_ns) / NS
+    evidence = Evidence(moments=symptom.moments)
+    if silent_s > _ENDED_PERIODS * max(period_s):
+        return Cause(
+            f"{seen}, none in the last {format_duration(silent_s)}{timers}", ENDED_HINT, evidence
+        )
+    is_slow = symptom.needed * min(period_s) > symptom.watched_s
+    return Cause(seen + timers, _SECONDS_HINT if is_slow else ENDED_HINT, evidence)
+
+
+@explanation(FewMessages, general=True)
+def publishing_stopped(symptom: FewMessages) -> Cause:
+    """The program publishes without a timer, and stops."""
+    return Cause(
+        symptom.seen,
+        "Publish from the callback of a timer, which goes on as long as the node spins.",
+        Evidence(moments=symptom.moments),
     )
 
 
@@ -96,56 +491,6 @@ def why_unreadable(recording: Recording, topic: str) -> Cause | None:
     )
 
 
-def why_few(recording: Recording, topic: str, needed: int) -> Cause:
-    """Why fewer messages than needed were recorded on a topic."""
-    messages = recording.on(topic)
-    if not messages:
-        return why_silent(recording, topic)
-    unreadable = why_unreadable(recording, topic)
-    if unreadable is not None:
-        return unreadable
-    begin_ns = recording.matched_ns or recording.launched_ns
-    watched_s = (recording.stop_ns - begin_ns) / NS
-    seen = f"{counted(len(messages), 'message')} on {code(topic)} in {format_duration(watched_s)}"
-    ended = why_ended(recording, seen)
-    if ended is not None:
-        return ended
-    moments = tuple(
-        Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
-        for index, message in enumerate(messages[:10], start=1)
-    )
-    stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
-    # With the time that was taken from it, the node may have come to as many as are needed.
-    if stolen_s > 0.0 and len(messages) * watched_s >= needed * (watched_s - stolen_s):
-        return Cause.to_repeat(
-            f"{seen}, but the machine took {format_duration(stolen_s)} of them from the process"
-        )
-    destroyed = why_unpublished(recording, topic, seen)
-    if destroyed is not None:
-        return destroyed
-    period_s = [timer.period_s for timer in declarations.timers(recording)]
-    periods = list(map(format_duration, period_s))
-    unspun = why_never_spun(recording, seen, moments=moments) if periods else None
-    if unspun is not None:
-        return unspun
-    timers = f"; the process declared a timer of {listing(periods)}" if periods else ""
-    silent_s = (recording.stop_ns - messages[-1].stamp_ns) / NS
-    if period_s and silent_s > _ENDED_PERIODS * max(period_s):
-        return Cause(
-            f"{seen}, none in the last {format_duration(silent_s)}{timers}",
-            ENDED_HINT,
-            Evidence(moments=moments),
-        )
-    slow = _SECONDS_HINT if needed * min(period_s, default=0.0) > watched_s else ENDED_HINT
-    return Cause(
-        seen + timers,
-        slow
-        if period_s
-        else "Publish from the callback of a timer, which goes on as long as the node spins.",
-        Evidence(moments=moments),
-    )
-
-
 def _slow_timer(recording: Recording) -> declarations.DeclaredTimer | None:
     """A declared timer that could not fire before the end of the observation, if all are such."""
     timers = declarations.timers(recording)
@@ -156,198 +501,6 @@ def _slow_timer(recording: Recording) -> declarations.DeclaredTimer | None:
 
 def _fires(recording: Recording, timer: declarations.DeclaredTimer) -> bool:
     return timer.declared_ns + timer.period_s * NS <= recording.stop_ns
-
-
-def _other_type(
-    recording: Recording, topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
-) -> Cause | None:
-    wanted = {item.type for item in readers}
-    found = {item.type for item in publishers}
-    if not wanted or not found or wanted & found:
-        return None
-    return Cause(
-        f"no message could be read: {code(topic)} has the type {codes(sorted(found))}, "
-        f"not {codes(sorted(wanted), last='or')}",
-        "A publisher and a subscription meet only if their types are the same.",
-        Evidence(moments=endpoints_seen(recording, publishers)),
-    )
-
-
-def _other_definition(
-    recording: Recording, topic: str, publishers: tuple[Endpoint, ...]
-) -> Cause | None:
-    if not recording.misdefined(topic):
-        return None
-    return Cause(
-        f"no message on {code(topic)} could be read: its type {code(publishers[0].type)} has the "
-        "right name, but another definition",
-        "Compare the definition with the one that was asked for: the types, names, array bounds "
-        "and order of its fields must be the same.",
-        Evidence(moments=endpoints_seen(recording, publishers)),
-    )
-
-
-def _unmatched(
-    recording: Recording, topic: str, publishers: tuple[Endpoint, ...], readers: list[Endpoint]
-) -> Cause | None:
-    """No reader of ours could match: each refuses a policy."""
-    if not publishers or not readers:
-        return None
-    reasons = [
-        compatibility.refusals(offered=publisher.qos, requested=reader.qos)
-        for publisher in publishers
-        for reader in readers
-    ]
-    if not all(reasons):
-        return None
-    return Cause(
-        f"no message on {code(topic)}: the publisher's QoS does not match its reader "
-        f"({', '.join(reasons[0])})",
-        "A subscription receives nothing from a publisher that offers less than it requests.",
-        Evidence(
-            moments=endpoints_seen(recording, publishers),
-            tables=(
-                compatibility.compatibility_table(
-                    offered=publishers[0].qos, requested=readers[0].qos
-                ),
-            ),
-        ),
-    )
-
-
-def _held_in_vain(recording: Recording, topic: str) -> Cause | None:
-    """A publisher that our tracer held for its match, and that found none: its message is lost."""
-    if not was_held_up(recording) or not any(
-        item.data.get("topic") == topic and item.data.get("matched") is False
-        for item in recording.declared("held")
-    ):
-        return None
-    return Cause.to_repeat(
-        f"the publisher on {code(topic)} was not matched by the probe in time, so a message could "
-        "be lost"
-    )
-
-
-def _asked_on(recording: Recording, topic: str) -> tuple[str, ...]:
-    """Topics that the probe publishes on and that a topic answers, as far as it is said."""
-    return tuple(name for name in recording.sent if recording.answers.get(name, topic) == topic)
-
-
-def _undelivered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cause | None:
-    """What the node should answer never reached it."""
-    causes = [why_not_delivered(recording, name) for name in asked]
-    cause = causes[0] if causes and all(causes) else None
-    return cause and cause.after(
-        f"no message on {code(topic)}, because what the node should answer, on {code(asked[0])}, "
-        "never reached it"
-    )
-
-
-def _unanswered(recording: Recording, topic: str, asked: tuple[str, ...]) -> Cause | None:
-    """It got what it should answer, and did not."""
-    name = next((name for name in asked if recording.sent[name]), None)
-    if name is None:
-        return None
-    sent = recording.sent[name]
-    seen = (
-        f"no message on {code(topic)}, although {counted(len(sent), 'message')} on {code(name)} "
-        "reached the node"
-    )
-    return why_raised(recording, seen, sent[0].stamp_ns) or Cause(
-        seen,
-        "Is publish(msg) reached in the subscription's callback? An `except: pass` hides the error "
-        "that would tell why not, and a lock or a loop that never ends keeps it waiting.",
-        Evidence(
-            moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
-            places=_interrupted(recording),
-        ),
-    )
-
-
-def _starved(recording: Recording, topic: str) -> Cause | None:
-    begin_ns = recording.matched_ns or recording.launched_ns
-    stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
-    watched_s = (recording.stop_ns - begin_ns) / NS
-    if stolen_s < _STARVED * watched_s:
-        return None
-    return Cause.to_repeat(
-        f"no message on {code(topic)}, but the machine took {format_duration(stolen_s)} of "
-        f"{format_duration(watched_s)} from the process"
-    )
-
-
-def _slow(recording: Recording, topic: str) -> Cause | None:
-    timer = _slow_timer(recording)
-    if timer is None:
-        return None
-    watched_s = recording.since_launch_s(recording.stop_ns)
-    return Cause(
-        f"no message on {code(topic)} in {format_duration(watched_s)}: the process declared a "
-        f"timer of {format_duration(timer.period_s)}",
-        _SECONDS_HINT,
-        Evidence(
-            moments=(
-                Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
-                until_the_end(recording),
-            )
-        ),
-    )
-
-
-def _idle(recording: Recording, topic: str) -> Cause:
-    # What it prints after Ctrl+C tells of its end, which any right node may word as a traceback.
-    complaints = [
-        line.text
-        for line in recording.log
-        if line.stream == "stderr" and line.time_ns <= recording.stop_ns
-    ]
-    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
-    evidence = Evidence(
-        moments=(
-            *endpoints_seen(recording, publishers),
-            until_the_end(recording, "still no message when the observation ended"),
-        ),
-        places=_interrupted(recording),
-        log=tuple(complaints[-_LOG_LINES:]),
-    )
-    heard = _heard(recording, topic)
-    if heard and not declarations.said(recording, "timer"):
-        return Cause(
-            f"the publisher on {code(topic)} is there but silent, although {heard} reached the "
-            "node",
-            "Is publish(msg) reached in the subscription's callback? Look for a condition or a "
-            "`return` before it, and for an `except: pass` that hides an error.",
-            evidence,
-        )
-    traced = declarations.traced(recording)
-    if traced and not declarations.said(recording, "timer"):
-        return Cause(
-            f"the publisher on {code(topic)} is there but silent, and the process declared no "
-            "timer that would call it",
-            "Is publish(msg) reached? Look for a condition before it, and for a loop that waits "
-            "for what never comes, such as subscriptions. A callback publishes only if something "
-            "calls it: self.create_timer(period_in_seconds, self.callback) does.",
-            evidence,
-        )
-    timers = [timer for timer in declarations.timers(recording) if _fires(recording, timer)]
-    runs = [format_duration(timer.period_s) for timer in timers]
-    spins = declarations.said(recording, "spin")
-    though = f", although the process declared a timer of {listing(runs)}" if runs and spins else ""
-    seen = f"the publisher on {code(topic)} is there but silent{though}"
-    if runs and all(timer.callback.endswith("<lambda>") for timer in timers):
-        hint = (
-            "A lambda has to call the method, with brackets: `lambda: self.callback()`. Without a "
-            "lambda it is self.callback, without brackets."
-        )
-        return Cause(seen, hint, evidence)
-    return Cause(
-        seen,
-        "Is publish(msg) reached in the callback? Printing or logging a message does not send it, "
-        "an `except: pass` hides the error that would tell why not, a lock that is never free "
-        "keeps it waiting, timer.cancel() ends it, and timer.reset() again and again lets its "
-        "period never end.",
-        evidence,
-    )
 
 
 def _heard(recording: Recording, topic: str) -> str:
