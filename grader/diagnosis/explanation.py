@@ -21,80 +21,80 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pkgutil import walk_packages
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from grader import diagnosis
-from grader.diagnosis.cause import Cause
 
-S = TypeVar("S")
+A = TypeVar("A")
+S = TypeVar("S", bound="Symptom[Any]")
 _DEFINED: list[Explanation] = []
+
+
+class Symptom(Generic[A]):
+    """What a check saw; its explanations answer with an ``A``, such as a cause."""
 
 
 @dataclass(frozen=True)
 class Explanation:
     """One entry of the catalogue."""
 
-    symptom: type[Any]
-    apply: Callable[[Any], Cause | None]
-    is_general: bool
+    symptom: type[Symptom[Any]]
+    apply: Callable[[Any], Any]
+    module: str
+    sentence: str
+    """What it explains: the text of the documentation."""
+    is_general: bool = False
 
-    @property
-    def name(self) -> str:
-        """Such as ``no_messages.other_type``."""
-        return f"{self.apply.__module__.rpartition('.')[2]}.{self.apply.__name__}"
 
-    @property
-    def sentence(self) -> str:
-        """What it explains, in one sentence."""
-        return " ".join((inspect.getdoc(self.apply) or "").split())
+def add(entry: Explanation) -> None:
+    """Put an explanation into the catalogue."""
+    _DEFINED.append(entry)
 
 
 def explanation(
-    symptom: type[S], *, general: bool = False
-) -> Callable[[Callable[[S], Cause | None]], Callable[[S], Cause | None]]:
+    symptom: type[Symptom[Any]], *, general: bool = False
+) -> Callable[[Callable[[S], A]], Callable[[S], A]]:
     """Put a function into the catalogue.
 
     Args:
         general: Asked after all others: it says only what is there in any case.
     """
 
-    def register(apply: Callable[[S], Cause | None]) -> Callable[[S], Cause | None]:
-        _DEFINED.append(Explanation(symptom, apply, general))
+    def register(apply: Callable[[S], A]) -> Callable[[S], A]:
+        sentence = " ".join((inspect.getdoc(apply) or "").split())
+        add(Explanation(symptom, apply, apply.__module__, sentence, general))
         return apply
 
     return register
 
 
 @cache
-def explanations() -> dict[type[Any], tuple[Explanation, ...]]:
+def explanations() -> dict[type[Symptom[Any]], tuple[Explanation, ...]]:
     """All explanations by their symptom, in the order in which they are asked."""
     for module in walk_packages(diagnosis.__path__, f"{diagnosis.__name__}."):
         import_module(module.name)
-    found: dict[type[Any], list[Explanation]] = defaultdict(list)
+    found: dict[type[Symptom[Any]], list[Explanation]] = defaultdict(list)
     for entry in _DEFINED:
         found[entry.symptom].append(entry)
     return {
         symptom: tuple(
             sorted(
                 entries,
-                key=lambda one: (one.is_general, one.apply.__module__ != symptom.__module__),
+                key=lambda one: (one.is_general, one.module != symptom.__module__),
             )
         )
         for symptom, entries in found.items()
     }
 
 
-def explain(symptom: object) -> Cause | None:
-    """The deepest cause of a symptom that can be seen, or None."""
-    for entry in explanations()[type(symptom)]:
-        cause = entry.apply(symptom)
-        if cause is not None:
-            return cause
-    return None
+def explain(symptom: Symptom[A]) -> A | None:
+    """The deepest explanation of a symptom that applies, or None."""
+    answers = (entry.apply(symptom) for entry in explanations()[type(symptom)])
+    return next((answer for answer in answers if answer is not None), None)
 
 
-def cause_of(symptom: object) -> Cause:
-    """The cause of a symptom that has an explanation that always applies."""
-    cause = explain(symptom)
-    assert cause is not None, symptom
-    return cause
+def cause_of(symptom: Symptom[A]) -> A:
+    """The same of a symptom that has an explanation that always applies."""
+    answer = explain(symptom)
+    assert answer is not None, symptom
+    return answer

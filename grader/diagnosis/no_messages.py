@@ -13,7 +13,7 @@ from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.delivery import why_not_delivered
 from grader.diagnosis.destroyed_endpoint import why_unpublished
-from grader.diagnosis.explanation import cause_of, explanation
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_answer import why_never_awaited, why_raised
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.blocked_executor import left_s, why_blocked, why_never_spun
@@ -39,7 +39,7 @@ _OWN_S = 2.0
 
 
 @dataclass(frozen=True)
-class NoMessages:
+class NoMessages(Symptom[Cause]):
     """No message was recorded on a topic."""
 
     recording: Recording
@@ -81,7 +81,7 @@ class NoMessages:
 
 
 @dataclass(frozen=True)
-class FewMessages:
+class FewMessages(Symptom[Cause]):
     """Some messages were recorded on a topic, but fewer than needed."""
 
     recording: Recording

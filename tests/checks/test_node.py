@@ -559,7 +559,7 @@ class TestAlive:
     def test_the_same_of_its_own(self, raised):
         log = output(traceback(raised).replace(_IN_RCLPY, ""))
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
-        assert "Mend the line that is named here." in failing("node.alive", run)
+        assert "Correct the line that is named here." in failing("node.alive", run)
 
     def test_an_entry_point_that_asks_for_arguments(self):
         raised = "TypeError: main() missing 1 required positional argument: 'args'"
@@ -573,7 +573,7 @@ class TestAlive:
         raised = "TypeError: Bot.tick() takes 1 positional argument but 2 were given"
         log = output(traceback(raised).replace(_IN_RCLPY, ""))
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
-        assert "Mend the line that is named here." in failing("node.alive", run)
+        assert "Correct the line that is named here." in failing("node.alive", run)
 
     @pytest.mark.parametrize(
         ("raised", "source"),
@@ -589,7 +589,7 @@ class TestAlive:
     def test_what_only_looks_like_a_slip_with_rclpy(self, raised, source):
         log = output(traceback(raised, source=source).replace(_IN_RCLPY, ""))
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
-        assert "Mend the line that is named here." in failing("node.alive", run)
+        assert "Correct the line that is named here." in failing("node.alive", run)
 
     def test_a_policy_that_is_a_text(self):
         log = output(traceback("AssertionError").replace(_IN_RCLPY, _IN_QOS))
@@ -604,14 +604,13 @@ class TestAlive:
         log = output(traceback(raised).replace(_IN_RCLPY, _IN_QOS))
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
         found = failing("node.alive", run)
-        assert "QoSProfile has no `queue_size`" in found
-        assert "`reliability`" not in found and "its name as a text" not in found
+        assert "depth is the queue size" in found and "its name as a text" not in found
 
     def test_another_with_is_not_that_of_rclpy(self):
         raised = "TypeError: 'NoneType' object does not support the context manager protocol"
         log = output(traceback(raised, source="with self.lock():").replace(_IN_RCLPY, ""))
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
-        assert "Mend the line that is named here." in failing("node.alive", run)
+        assert "Correct the line that is named here." in failing("node.alive", run)
 
     def test_the_first_of_chained_exceptions_is_the_cause(self):
         log = output(

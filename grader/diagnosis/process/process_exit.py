@@ -10,11 +10,11 @@ from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.process.api_mistakes import mistake_hint
-from grader.diagnosis.process.missing_import import import_hint
-from grader.diagnosis.process.missing_library import lacking_package, library_hint
+from grader.diagnosis.explanation import cause_of
+from grader.diagnosis.process.exceptions import Raised
+from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
-from grader.diagnosis.process.raised import Failure, fatal_failure, student_place, submission_path
+from grader.diagnosis.process.raised import fatal_failure, student_place
 from grader.recording.model import Ending, Process, Recording
 
 _LOG_LINES = 15
@@ -61,71 +61,6 @@ _BREACH_HINTS = {
     "forged report": "Write to no file descriptor that you did not open.",
 }
 
-_HINTS = {
-    "ModuleNotFoundError": "Python does not find this module: check its spelling, that it lies in "
-    "the package's folder, that setup.py installs it (packages=[...]), and that package.xml "
-    "declares the package it belongs to.",
-    "ImportError": "The module is there, but not that name in it: check the spelling and the "
-    "module, as in `from geometry_msgs.msg import Twist`.",
-    "SyntaxError": "Python cannot read this line or the one before it.",
-    "IndentationError": "Indent the lines of a block by the same four spaces.",
-    "TabError": "Indent with spaces only.",
-    "NameError": "The name is used before it is defined, misspelt, or not imported.",
-    "UnboundLocalError": "A name that a function assigns anywhere is its own, and empty until "
-    "then, even where the module has one of the same name. What shall last from call to call "
-    "belongs to the node: self.count.",
-    "NotInitializedException": "Call rclpy.init() before you create the node.",
-    "ParameterNotDeclaredException": "Call self.declare_parameter(name, default) before "
-    "self.get_parameter(name).",
-    "InvalidParameterTypeException": "A parameter has the type of its default: 1.0 takes floats, 1 "
-    "takes integers, 'a' takes texts. Give declare_parameter() a default of the type that is "
-    "asked for.",
-    "InvalidTopicNameException": "A topic name has letters, digits, `_` and `/` only. No part of "
-    "it begins with a digit, and it does not end with `/`.",
-    "InvalidNodeNameException": "A node name has letters, digits and `_` only.",
-    "EOFError": "A launched node has no keyboard, so input() cannot read: take a value from a ROS "
-    "parameter, and keep the node alive with rclpy.spin(node).",
-    "RecursionError": "A function calls itself without end.",
-    "MemoryError": "Look for a list or an image that grows without end.",
-}
-
-
-_EMPTY_HINT = (
-    "The list is empty. After a filter, test `if values:`. A slice such as ranges[-10:10] holds "
-    "nothing, for -10 counts from the end: ranges[-10:] + ranges[:10] is what is around the first."
-)
-
-# What the system says where a limit of the sandbox is in the way, whatever raises it.
-_LIMIT_HINTS = {
-    "[Errno 27]": "The size of a file is limited here: write less, or to several files.",
-    "[Errno 28]": "The space in home, /tmp and /dev/shm is limited here: write less, and remove "
-    "what is not needed any more.",
-    "can't start new thread": "The number of processes and threads is limited here: start fewer, "
-    "and not one for each message.",
-}
-
-# What Python says of slips that its own words do not explain to a beginner.
-_MESSAGE_HINTS = {
-    "min() arg is an empty": _EMPTY_HINT,  # Python 3.11 and before
-    "max() arg is an empty": _EMPTY_HINT,
-    "min() iterable argument is empty": _EMPTY_HINT,
-    "max() iterable argument is empty": _EMPTY_HINT,
-    "zero-size array to reduction": _EMPTY_HINT,
-    "cannot convert float infinity to integer": "inf says that a beam met nothing, and is no "
-    "index and no number of steps: test math.isfinite(value) before int(value).",
-    "cannot convert float NaN to integer": "nan says that there is no value: test "
-    "math.isfinite(value) before int(value).",
-    "Subscription.__init__(): callback should be": "A subscription's callback takes the message: "
-    "def message_callback(self, msg).",
-    "from __future__ imports must occur": "Move this line to the top of the file: nothing but "
-    "comments and the docstring comes before it.",
-    "math domain error": "math.acos and math.asin take -1 to 1, math.sqrt takes 0 or more: limit "
-    "the value first, max(-1.0, min(1.0, value)), for rounding makes 1.0000000000000002 of 1.",
-}
-
-_OTHER_ARGUMENTS = re.compile(
-    r"\(\) (takes \d+ positional arguments? but \d+|missing \d+ required positional argument)"
-)
 # A converter of rclpy met an object of another class; the name is that of the wanted one.
 _OTHER_CLASS = re.compile(r'convert_from_py: Assertion .strncmp\("[\w.]*\.(\w+)"')
 
@@ -257,7 +192,7 @@ def why_it_exited(recording: Recording, process: Process) -> Cause:
         )
     return Cause(
         observed=f"{ended} with {failure}{where}",
-        hint=_exception_hint(failure, recording),
+        hint=cause_of(Raised(failure, recording)),
         evidence=Evidence(
             moments=evidence.moments, places=(place,) if place else (), log=evidence.log
         ),
@@ -306,71 +241,6 @@ def _returned(recording: Recording, process: Process, ended: str, evidence: Evid
         "end everything.",
         evidence,
     )
-
-
-def _exception_hint(failure: Failure, recording: Recording) -> str:
-    if failure.type == "ModuleNotFoundError":
-        hint = library_hint(failure.message, recording)
-        if hint is not None:
-            return hint
-    for said, hint in _LIMIT_HINTS.items():
-        if failure.message.startswith(said):
-            return hint
-    for said, hint in _MESSAGE_HINTS.items():
-        if failure.message.startswith(said):
-            return hint
-    if failure.type == "TypeError" and "CallbackGroup.add_entity()" in failure.message:
-        return (
-            "A callback group is an object, not its class: write ReentrantCallbackGroup() and "
-            "MutuallyExclusiveCallbackGroup(), with brackets."
-        )
-    slip = import_hint(failure.message) if failure.type == "NameError" else mistake_hint(failure)
-    if slip is not None:
-        return slip
-    if _enters_init(failure):
-        return (
-            "In Jazzy rclpy.init() returns nothing that `with` could enter; it does so in later "
-            "releases of ROS, whose tutorial this is from. Write rclpy.init(args=args) on a line "
-            "of its own, without `with`."
-        )
-    if failure.type in _HINTS:
-        return _HINTS[failure.type]
-    if failure.type == "AttributeError" and "'str' has no attribute '_TYPE_SUPPORT'" in (
-        failure.message
-    ):
-        return "Give the class of the message, imported from geometry_msgs.msg, not its name."
-    if failure.type == "AttributeError" and "'_default_callback_group'" in failure.message:
-        return "Call super().__init__('node_name') first in the node's constructor."
-    if failure.type == "AttributeError" and failure.message.startswith("module "):
-        # Where Python itself loads the entry point, the last frame is its own.
-        if submission_path(failure.frames[-1].file, recording.submission):
-            return (
-                "The module has no such name: check its spelling. A module inside of another one "
-                "must be imported itself, as in `from rclpy.node import Node`."
-            )
-        return "setup.py's console_scripts names a function that the module does not have."
-    if failure.type == "TypeError" and "'qos_profile'" in failure.message:
-        return "The third argument is the queue depth: self.create_publisher(Twist, 'cmd_vel', 10)."
-    if failure.type == "TypeError" and _called_by_rclpy(failure):
-        return (
-            "rclpy calls the callback of a timer without arguments and that of a subscription "
-            "with the message: def timer_callback(self), def message_callback(self, msg)."
-        )
-    if student_place(failure, recording.submission):
-        return "Mend the line that is named here."
-    return "Read the traceback from its last line upwards."
-
-
-def _called_by_rclpy(failure: Failure) -> bool:
-    """Whether rclpy called something with arguments that it does not take."""
-    inside = any("/rclpy/" in frame.file for frame in failure.frames[-1:])
-    return inside and _OTHER_ARGUMENTS.search(failure.message) is not None
-
-
-def _enters_init(failure: Failure) -> bool:
-    """Whether it is `with rclpy.init():`; Python 3.10 only names the method that None lacks."""
-    refused = "context manager protocol" in failure.message or failure.message == "__enter__"
-    return refused and any("rclpy.init(" in frame.source for frame in failure.frames[-1:])
 
 
 def _wrong_class(lines: Sequence[str]) -> str:
