@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass
 
 from grader.checks.finding import Evidence
 from grader.checks.first_seen import endpoints_seen
@@ -11,41 +11,130 @@ from grader.checks.qos import compatibility
 from grader.checks.wording import code, codes, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
+from grader.diagnosis.explanation import Symptom, explain, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.process_exit import why_ended
-from grader.diagnosis.type_confusion import explain
+from grader.diagnosis.type_confusion import OtherType
 from grader.recording.model import Endpoint, Kind, Owner, Recording
 
 # Policies that promise something in time, which a publisher without them does not.
 _PROMISES = ("deadline", "liveliness")
 
 
+@dataclass(frozen=True)
+class NotDelivered(Symptom[Cause]):
+    """No message of a topic can have reached a subscription of the student's."""
+
+    recording: Recording
+    topic: str
+
+    @property
+    def subscriptions(self) -> tuple[Endpoint, ...]:
+        """The student's subscriptions to the topic."""
+        return self.recording.student_endpoints(Kind.SUBSCRIPTION, self.topic)
+
+    @property
+    def publishers(self) -> list[Endpoint]:
+        """The probe's publishers on the topic."""
+        return [
+            item
+            for item in self.recording.endpoints
+            if item.owner is Owner.PROBE
+            and item.kind is Kind.PUBLISHER
+            and item.topic == self.topic
+        ]
+
+    @property
+    def carried(self) -> bool:
+        """Whether something was sent while a subscription was there."""
+        carried = self.recording.carried(self.topic)
+        return bool(carried) and any(
+            (item.vanished_ns or math.inf) > carried[0].stamp_ns for item in self.subscriptions
+        )
+
+
 def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
     """Why no message on a topic can have reached the student, or None if it must have."""
-    cause = why_no_endpoint(recording, Kind.SUBSCRIPTION, topic)
-    if cause is not None:
-        return cause
-    subscriptions = recording.student_endpoints(Kind.SUBSCRIPTION, topic)
-    publishers = [
-        item
-        for item in recording.endpoints
-        if item.owner is Owner.PROBE and item.kind is Kind.PUBLISHER and item.topic == topic
-    ]
-    seen = Evidence(moments=endpoints_seen(recording, subscriptions))
-    cause = _other_type(topic, subscriptions, publishers, seen) or _refused(
-        topic, subscriptions, publishers, seen
-    )
-    if cause is not None:
-        return cause
-    carried = recording.carried(topic)
-    if carried and any(
-        (item.vanished_ns or math.inf) > carried[0].stamp_ns for item in subscriptions
-    ):
+    return explain(NotDelivered(recording, topic))
+
+
+@explanation(NotDelivered)
+def no_subscription(symptom: NotDelivered) -> Cause | None:
+    """The node has no subscription to the topic."""
+    return why_no_endpoint(symptom.recording, Kind.SUBSCRIPTION, symptom.topic)
+
+
+@explanation(NotDelivered)
+def other_type(symptom: NotDelivered) -> Cause | None:
+    """The subscription has another message type than the publisher."""
+    sent = sorted({item.type for item in symptom.publishers})
+    wanted = sorted({item.type for item in symptom.subscriptions})
+    if not sent or set(sent) & set(wanted):
         return None
-    return (
-        why_ended(recording)
-        or why_unsubscribed(recording, topic, "nothing was sent while it was there")
-        or Cause.to_repeat(f"nothing was sent on {code(topic)}, so there was nothing to receive")
+    confusion = explain(OtherType(sent[0], wanted[0]))
+    package, _, short = sent[0].split("/")
+    return Cause(
+        f"its callback is never called: {code(symptom.topic)} carries {codes(sent)}, but the "
+        f"subscription is to {codes(wanted)}" + (f" ({confusion})" if confusion else ""),
+        "A publisher and a subscription meet only if their types are the same: "
+        f"`from {package}.msg import {short}`.",
+        Evidence(moments=endpoints_seen(symptom.recording, symptom.subscriptions)),
+    )
+
+
+@explanation(NotDelivered)
+def incompatible_qos(symptom: NotDelivered) -> Cause | None:
+    """The subscription requests more (reliability, durability, deadline) than is offered."""
+    subscriptions, publishers = symptom.subscriptions, symptom.publishers
+    reasons = [
+        compatibility.refusals(offered=publisher.qos, requested=subscription.qos)
+        for subscription in subscriptions
+        for publisher in publishers
+    ]
+    if not reasons or not all(reasons):
+        return None
+    rule = "A subscription receives nothing from a publisher that offers less than it requests."
+    promises = [word for word in _PROMISES if any(item.startswith(word) for item in reasons[0])]
+    return Cause(
+        f"its callback is never called: the subscription's QoS does not match the publisher on "
+        f"{code(symptom.topic)} ({', '.join(reasons[0])})",
+        f"{rule} Leave {listing(map(code, promises))} out of the subscription's QoSProfile."
+        if promises
+        else f"{rule} A number as QoS, such as 10, matches every publisher that is reliable; "
+        "qos_profile_sensor_data matches every one.",
+        Evidence(
+            moments=endpoints_seen(symptom.recording, subscriptions),
+            tables=(
+                compatibility.compatibility_table(
+                    offered=publishers[0].qos, requested=subscriptions[0].qos
+                ),
+            ),
+        ),
+    )
+
+
+@explanation(NotDelivered)
+def process_ended(symptom: NotDelivered) -> Cause | None:
+    """The process ended before anything was sent to it."""
+    return None if symptom.carried else why_ended(symptom.recording)
+
+
+@explanation(NotDelivered)
+def subscription_destroyed(symptom: NotDelivered) -> Cause | None:
+    """The program destroyed its subscription before anything was sent."""
+    if symptom.carried:
+        return None
+    seen = "nothing was sent while it was there"
+    return why_unsubscribed(symptom.recording, symptom.topic, seen)
+
+
+@explanation(NotDelivered, general=True)
+def nothing_sent(symptom: NotDelivered) -> Cause | None:
+    """Nothing was sent; an error, and never a lost point."""
+    if symptom.carried:
+        return None
+    return Cause.to_repeat(
+        f"nothing was sent on {code(symptom.topic)}, so there was nothing to receive"
     )
 
 
@@ -88,58 +177,3 @@ def why_no_history(recording: Recording, topic: str, seen: str) -> Cause | None:
                 ),
             )
     return None
-
-
-def _other_type(
-    topic: str,
-    subscriptions: tuple[Endpoint, ...],
-    publishers: list[Endpoint],
-    evidence: Evidence,
-) -> Cause | None:
-    sent = sorted({item.type for item in publishers})
-    wanted = sorted({item.type for item in subscriptions})
-    if not sent or set(sent) & set(wanted):
-        return None
-    explanation = explain(sent[0], wanted[0])
-    package, _, short = sent[0].split("/")
-    return Cause(
-        f"its callback is never called: {code(topic)} carries {codes(sent)}, but the subscription "
-        f"is to {codes(wanted)}" + (f" ({explanation})" if explanation else ""),
-        "A publisher and a subscription meet only if their types are the same: "
-        f"`from {package}.msg import {short}`.",
-        evidence,
-    )
-
-
-def _refused(
-    topic: str,
-    subscriptions: tuple[Endpoint, ...],
-    publishers: list[Endpoint],
-    evidence: Evidence,
-) -> Cause | None:
-    """Every subscription refuses every publisher, each by a policy."""
-    reasons = [
-        compatibility.refusals(offered=publisher.qos, requested=subscription.qos)
-        for subscription in subscriptions
-        for publisher in publishers
-    ]
-    if not reasons or not all(reasons):
-        return None
-    rule = "A subscription receives nothing from a publisher that offers less than it requests."
-    promises = [word for word in _PROMISES if any(item.startswith(word) for item in reasons[0])]
-    return Cause(
-        f"its callback is never called: the subscription's QoS does not match the publisher on "
-        f"{code(topic)} ({', '.join(reasons[0])})",
-        f"{rule} Leave {listing(map(code, promises))} out of the subscription's QoSProfile."
-        if promises
-        else f"{rule} A number as QoS, such as 10, matches every publisher that is reliable; "
-        "qos_profile_sensor_data matches every one.",
-        replace(
-            evidence,
-            tables=(
-                compatibility.compatibility_table(
-                    offered=publishers[0].qos, requested=subscriptions[0].qos
-                ),
-            ),
-        ),
-    )

@@ -152,7 +152,9 @@ def _why_raised_in(
     where = f" ({place.file}:{place.line})" if place else ""
     return Cause(
         f"{what}: an exception was raised meanwhile, {found[-1]}{where}",
-        "Correct the line that is named here." if place else "Read the traceback from its last line.",
+        "Correct the line that is named here."
+        if place
+        else "Read the traceback from its last line.",
         Evidence(
             moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
             places=(place,) if place else (),

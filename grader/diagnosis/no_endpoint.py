@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from grader.checks import declarations
 from grader.checks.finding import Evidence, Table
@@ -11,6 +12,7 @@ from grader.checks.first_seen import endpoints_seen, nodes_seen
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.exchanged_executables import why_exchanged
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.near_name import Named, why_misnamed
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_it_exited
@@ -28,52 +30,140 @@ _DOES_NOTHING = {Kind.PUBLISHER: "publishes nothing", Kind.SUBSCRIPTION: "subscr
 _OTHER = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.SUBSCRIPTION: Kind.PUBLISHER}
 
 
+@dataclass(frozen=True)
+class NoEndpoint(Symptom[Cause]):
+    """The student's nodes have no such publisher or subscription on a topic."""
+
+    recording: Recording
+    kind: Kind
+    topic: str
+
+    @property
+    def own(self) -> list[Endpoint]:
+        """The student's endpoints of this kind, without those that every node has."""
+        found = self.recording.student_endpoints(self.kind)
+        return [item for item in found if item.topic not in OWN_TOPICS]
+
+    @property
+    def evidence(self) -> Evidence:
+        """What there is instead."""
+        moments = endpoints_seen(self.recording, self.own) or nodes_seen(self.recording)
+        return Evidence(moments=moments, tables=_endpoints_table(self.recording))
+
+    @property
+    def create(self) -> str:
+        """The call that creates such an endpoint."""
+        return f"self.{_CREATE[self.kind]}(...)"
+
+
 def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | None:
     """Why the student has no such endpoint on a topic, or None if there is one."""
     if recording.student_endpoints(kind, topic):
         return None
     if kind is Kind.PUBLISHER and _only_students_publish(recording, topic):
         return None
-    cause = why_no_node(recording)
-    if cause is not None:
-        return cause
-    own = [item for item in recording.student_endpoints(kind) if item.topic not in OWN_TOPICS]
-    evidence = Evidence(
-        moments=endpoints_seen(recording, own) or nodes_seen(recording),
-        tables=_endpoints_table(recording),
-    )
-    ended = crashed(recording)
+    return cause_of(NoEndpoint(recording, kind, topic))
+
+
+@explanation(NoEndpoint)
+def no_node(symptom: NoEndpoint) -> Cause | None:
+    """There is no node at all."""
+    return why_no_node(symptom.recording)
+
+
+@explanation(NoEndpoint)
+def misspelt_topic(symptom: NoEndpoint) -> Cause | None:
+    """The topic's name is misspelt, private, in a namespace, or in other case."""
+    ended, topic = crashed(symptom.recording), symptom.topic
     # What a process that lives has is no misspelling of what a dead one never came to create.
     suspects = [
-        item
-        for item in own
-        if not ended or declarations.process_of(recording, item.node) in (None, *ended)
+        Named(item.topic, item.node)
+        for item in symptom.own
+        if not ended or declarations.process_of(symptom.recording, item.node) in (None, *ended)
     ]
-    near = why_misnamed(
+    return why_misnamed(
         topic,
-        [Named(item.topic, item.node) for item in suspects],
-        f"the node {_DOES[kind]}",
-        f"Write the topic's name as '{topic.rpartition('/')[2]}' in self.{_CREATE[kind]}(...).",
-        evidence,
+        suspects,
+        f"the node {_DOES[symptom.kind]}",
+        f"Write the topic's name as '{topic.rpartition('/')[2]}' in {symptom.create}.",
+        symptom.evidence,
     )
-    if near is not None:
-        return near
-    if ended:
-        return why_it_exited(recording, ended[0])
-    if declarations.declares(recording, kind.value, "topic", topic):
-        return declarations.why_never_appeared(recording, f"a {kind.value} on {code(topic)}")
-    exchanged = why_exchanged(recording)
-    if exchanged is not None:
-        return exchanged.after(f"there is no {kind.value} on {code(topic)}")
-    if recording.student_endpoints(_OTHER[kind], topic):
-        other = _OTHER[kind]
-        return Cause(
-            f"the node {_DOES[other]} {code(topic)} instead: found a {other.value} there, "
-            f"no {kind.value}",
-            f"Use self.{_CREATE[kind]}(...) where the node has self.{_CREATE[other]}(...).",
-            evidence,
-        )
-    return _elsewhere(recording, kind, topic, own, evidence)
+
+
+@explanation(NoEndpoint)
+def process_crashed(symptom: NoEndpoint) -> Cause | None:
+    """The process ended with a failure before it created the endpoint."""
+    ended = crashed(symptom.recording)
+    return why_it_exited(symptom.recording, ended[0]) if ended else None
+
+
+@explanation(NoEndpoint)
+def never_appeared(symptom: NoEndpoint) -> Cause | None:
+    """The process created the endpoint, but it never appeared in the ROS graph."""
+    kind, topic = symptom.kind.value, symptom.topic
+    if not declarations.declares(symptom.recording, kind, "topic", topic):
+        return None
+    return declarations.why_never_appeared(symptom.recording, f"a {kind} on {code(topic)}")
+
+
+@explanation(NoEndpoint)
+def exchanged_executables(symptom: NoEndpoint) -> Cause | None:
+    """In setup.py an executable runs the function of another one."""
+    exchanged = why_exchanged(symptom.recording)
+    seen = f"there is no {symptom.kind.value} on {code(symptom.topic)}"
+    return exchanged and exchanged.after(seen)
+
+
+@explanation(NoEndpoint)
+def publisher_and_subscription_exchanged(symptom: NoEndpoint) -> Cause | None:
+    """The node publishes where it should subscribe, or subscribes where it should publish."""
+    kind, other = symptom.kind, _OTHER[symptom.kind]
+    if not symptom.recording.student_endpoints(other, symptom.topic):
+        return None
+    return Cause(
+        f"the node {_DOES[other]} {code(symptom.topic)} instead: found a {other.value} there, "
+        f"no {kind.value}",
+        f"Use {symptom.create} where the node has self.{_CREATE[other]}(...).",
+        symptom.evidence,
+    )
+
+
+@explanation(NoEndpoint)
+def nothing_created(symptom: NoEndpoint) -> Cause | None:
+    """The node has no publisher, or no subscription, at all."""
+    if symptom.own:
+        return None
+    return Cause(
+        f"the node {codes(node.name for node in symptom.recording.student_nodes)} "
+        f"{_DOES_NOTHING[symptom.kind]} (/rosout and /parameter_events belong to every node)",
+        f"Call {symptom.create} in the node's constructor.",
+        symptom.evidence,
+    )
+
+
+@explanation(NoEndpoint)
+def other_topic(symptom: NoEndpoint) -> Cause | None:
+    """The right type of message is on a topic of another name."""
+    wanted = {item.type for item in _probe_endpoints(symptom.recording, symptom.topic)}
+    same = [item.topic for item in symptom.own if item.type in wanted]
+    if not same:
+        return None
+    return Cause(
+        f"the right type of message, but on another topic: the node {_DOES[symptom.kind]} "
+        f"{codes(same)}",
+        f"Write the topic's name as '{symptom.topic.lstrip('/')}' in {symptom.create}.",
+        symptom.evidence,
+    )
+
+
+@explanation(NoEndpoint, general=True)
+def others_only(symptom: NoEndpoint) -> Cause:
+    """The node has other topics only."""
+    return Cause(
+        f"the node {_DOES[symptom.kind]} {codes(item.topic for item in symptom.own)} only",
+        f"Call {symptom.create} with the topic '{symptom.topic.lstrip('/')}'.",
+        symptom.evidence,
+    )
 
 
 def misnamed(recording: Recording, kind: Kind, topic: str) -> str:
@@ -102,34 +192,6 @@ def _only_students_publish(recording: Recording, topic: str) -> bool:
         for item in recording.endpoints
     )
     return bool(recording.on(topic)) and not any(others)
-
-
-def _elsewhere(
-    recording: Recording, kind: Kind, topic: str, own: list[Endpoint], evidence: Evidence
-) -> Cause:
-    """Nothing near: name what there is, or that there is nothing."""
-    create = f"self.{_CREATE[kind]}(...)"
-    if not own:
-        return Cause(
-            f"the node {codes(node.name for node in recording.student_nodes)} "
-            f"{_DOES_NOTHING[kind]} (/rosout and /parameter_events belong to every node)",
-            f"Call {create} in the node's constructor.",
-            evidence,
-        )
-    wanted = {item.type for item in _probe_endpoints(recording, topic)}
-    same = [item.topic for item in own if item.type in wanted]
-    if same:
-        return Cause(
-            f"the right type of message, but on another topic: the node {_DOES[kind]} "
-            f"{codes(same)}",
-            f"Write the topic's name as '{topic.lstrip('/')}' in {create}.",
-            evidence,
-        )
-    return Cause(
-        f"the node {_DOES[kind]} {codes(item.topic for item in own)} only",
-        f"Call {create} with the topic '{topic.lstrip('/')}'.",
-        evidence,
-    )
 
 
 def _probe_endpoints(recording: Recording, topic: str) -> Iterable[Endpoint]:

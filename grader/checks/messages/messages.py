@@ -22,9 +22,10 @@ from grader.checks.value import (
     tolerance_of,
 )
 from grader.checks.wording import code, codes, counted, value_text
-from grader.diagnosis import common_mistakes
 from grader.diagnosis.delivery import why_not_sent
+from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_silent, why_unreadable
+from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
 from grader.recording.model import Kind, Message, Recording
 from grader.spec.name import TopicName
 
@@ -285,7 +286,7 @@ def _hint(
 ) -> str:
     """What to try, by what was observed of the fields that are wrong in the first such message."""
     found = wrong[first]
-    if any(common_mistakes.was_integer(item.observed) for item in found):
+    if any(was_integer(item.observed) for item in found):
         return "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
     right = len(messages) - len(wrong)
     if right:
@@ -324,11 +325,12 @@ def _explanation(
 ) -> str:
     found = wrong[first]
     series = [leaves(message.value).get(found[0].field) for message in messages]
-    if common_mistakes.accumulates(found[0].expected, series):
+    if accumulates(found[0].expected, series):
         return f"{found[0].field} grows from message to message, as if added up"
-    return common_mistakes.explain(
+    symptom = WrongValue(
         found,
         leaves(messages[first - 1].value),
         tolerance_of(parameters.tolerance, found[0].field),
         always=len(wrong) == len(messages),
     )
+    return explain(symptom) or ""

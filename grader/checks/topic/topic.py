@@ -11,8 +11,9 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Status
 from grader.checks.need import Recorded
 from grader.checks.wording import code, codes
+from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
-from grader.diagnosis.type_confusion import explain
+from grader.diagnosis.type_confusion import OtherType
 from grader.recording.model import Endpoint, Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
 
@@ -134,7 +135,7 @@ def type_(recording: Recording, parameters: Type) -> Finding:
     observed = f"the {kind.value} has the type {code(wrong[0])}"
     if parameters.type in types:
         observed = f"another {kind.value} on the topic has the type {code(wrong[0])}"
-    explanation = explain(parameters.type, wrong[0])
+    explanation = explain(OtherType(parameters.type, wrong[0]))
     package, _, short = parameters.type.split("/")
     return Finding.failed(
         expected,

@@ -13,10 +13,10 @@ from grader.checks.motion.track import has_moved, index_at, is_at_rest
 from grader.checks.qos.compatibility import compatibility_table, refusals
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.common_mistakes import was_integer, what_was_put
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
+from grader.diagnosis.wrong_value import was_integer, what_was_put
 from grader.recording.model import NS, Incident, Kind, Owner, Recording
 from grader.spec.unit import format_duration
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import re
 import signal
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.explanation import cause_of
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
-from grader.diagnosis.process.raised import fatal_failure, student_place
+from grader.diagnosis.process.raised import Failure, fatal_failure, student_place
 from grader.recording.model import Ending, Process, Recording
+from grader.submission.record import SourceError
 
 _LOG_LINES = 15
 
@@ -137,65 +139,212 @@ def why_ended(recording: Recording, seen: str = "") -> Cause | None:
     return cause.after(seen) if cause is not None and seen else cause
 
 
+@dataclass(frozen=True)
+class ProcessExit(Symptom[Cause]):
+    """A process ended before it was asked to."""
+
+    recording: Recording
+    process: Process
+
+    @property
+    def _is_leaving(self) -> bool:
+        return self.process.stopped_by != "itself"
+
+    @property
+    def _when_s(self) -> float:
+        recording = self.recording
+        leaving_ns = declarations.exiting_ns(recording, self.process.name)
+        exited_ns = leaving_ns if self._is_leaving else self.process.exited_ns
+        return recording.since_launch_s(exited_ns or recording.stop_ns)
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        return f"the process {code(self.process.name)} ended {self._when_s:.2f} s after launch"
+
+    @property
+    def evidence(self) -> Evidence:
+        """When it ended, and its last lines of output."""
+        return Evidence(
+            moments=(Moment(f"{self.process.name} ended", self._when_s),),
+            log=_last_lines(self.recording, self.process),
+        )
+
+    @property
+    def killed(self) -> signal.Signals | None:
+        """The signal that ended it."""
+        exit_code = self.process.exit_code
+        return None if exit_code is None else signal_of(exit_code)
+
+    @property
+    def failure(self) -> Failure | None:
+        """The exception that ended it."""
+        return None if self.killed else fatal_failure(self.recording, self.process.name)
+
+    @property
+    def place(self) -> SourceError | None:
+        """The student's line that raised it."""
+        failure = self.failure
+        return student_place(failure, self.recording.submission) if failure else None
+
+    @property
+    def where(self) -> str:
+        """The same in words, with a space before."""
+        return f" ({self.place.file}:{self.place.line})" if self.place else ""
+
+    @property
+    def returned(self) -> bool:
+        """Whether it ended without a failure."""
+        failed = fatal_failure(self.recording, self.process.name)
+        return self.process.exit_code == 0 or (self._is_leaving and failed is None)
+
+
 def why_it_exited(recording: Recording, process: Process) -> Cause:
     """Why a process ended early, with its exception and the student's line if there is one."""
-    left = process.stopped_by != "itself"
-    exited_ns = declarations.exiting_ns(recording, process.name) if left else process.exited_ns
-    when_s = recording.since_launch_s(exited_ns or recording.stop_ns)
-    ended = f"the process {code(process.name)} ended {when_s:.2f} s after launch"
-    evidence = Evidence(
-        moments=(Moment(f"{process.name} ended", when_s),), log=_last_lines(recording, process)
-    )
-    if process.exit_code == 0 or (left and fatal_failure(recording, process.name) is None):
-        return _returned(recording, process, ended, evidence)
-    killed = process.exit_code is not None and signal_of(process.exit_code)
-    breach = next((item for item in recording.breaches if item.ended), None)
-    if killed is signal.SIGKILL and breach is not None:
-        return Cause(f"{ended}: {breach}", _BREACH_HINTS[breach.what], evidence)
-    failure = None if killed else fatal_failure(recording, process.name)
-    if failure is None:
-        hint = ""
-        if killed is signal.SIGABRT:
-            hint = _wrong_class(evidence.log) or _wrong_field(evidence.log)
-        hint = hint or (_SIGNAL_HINTS.get(killed, "") if killed else "")
-        hint = hint or "Run it by hand with `ros2 run` and look at its last lines of output."
-        return Cause(f"{ended} with {exit_words(process.exit_code)}", hint, evidence)
-    if failure.type == "TypeError" and failure.frames[-1].where == "send_response":
-        # The deepest line of the student's is that of spin(), which is right.
-        return Cause(
-            f"{ended} with {failure}: a service's callback did not return a response",
-            "A service's callback ends with `return response`, the object that it was called with.",
-            evidence,
-        )
-    place = student_place(failure, recording.submission)
-    where = f" ({place.file}:{place.line})" if place else ""
-    if failure.type == "ModuleNotFoundError":
-        installed = recording.environment.get("ros_imports", "").split()
-        lacking = lacking_package(failure.message, recording.submission, installed)
-        if lacking is not None:
-            apt_name = f"ros-jazzy-{lacking.replace('_', '-')}"
-            return Cause(
-                f"{ended}: it imports {code(lacking)}{where}, a ROS 2 package that is not "
-                "installed where this is graded",
-                f"No point is lost by it. Tell your instructor: `sudo apt install {apt_name}`.",
-                evidence,
-                ours=True,
-            )
-    newer = newer_name(failure, recording)
-    if newer is not None:
-        return Cause(
-            f"{ended}: it uses {code(newer.name)}{where}, which is not there where this is graded",
-            f"It is right in ROS 2 Jazzy, which has {newer.home}, and no point is lost by it. Tell "
-            f"your instructor: it needs {newer.home}. Or do without this name.",
-            evidence,
-            ours=True,
-        )
+    return cause_of(ProcessExit(recording, process))
+
+
+@explanation(ProcessExit)
+def broken_off(symptom: ProcessExit) -> Cause | None:
+    """os._exit() or os.exec() ends the program in the middle of main()."""
+    process = symptom.process.name
+    if not symptom.returned or not declarations.broke_off(symptom.recording, process):
+        return None
     return Cause(
-        observed=f"{ended} with {failure}{where}",
-        hint=cause_of(Raised(failure, recording)),
-        evidence=Evidence(
-            moments=evidence.moments, places=(place,) if place else (), log=evidence.log
-        ),
+        f"{symptom.seen} with exit code 0, but main() did not return: Python was broken off, as "
+        "os._exit() does",
+        "Look for os._exit() or os.exec...(): they end the program wherever it is. A node "
+        "runs until rclpy.spin(node) returns, at Ctrl-C.",
+        symptom.evidence,
+    )
+
+
+@explanation(ProcessExit)
+def returned_without_node(symptom: ProcessExit) -> Cause | None:
+    """main() returns before it creates a node."""
+    recording, process = symptom.recording, symptom.process.name
+    traced = declarations.traced(recording, process)
+    if not symptom.returned or not traced or declarations.said(recording, "node", process):
+        return None
+    return Cause(
+        f"{symptom.seen} with exit code 0: main() returned before a node was created",
+        "The function that setup.py names in console_scripts must call rclpy.init(), create "
+        "the node and call rclpy.spin(node).",
+        symptom.evidence,
+    )
+
+
+@explanation(ProcessExit)
+def returned_without_spin(symptom: ProcessExit) -> Cause | None:
+    """main() returns without rclpy.spin()."""
+    never_spun = declarations.never_spun(symptom.recording, symptom.process.name)
+    if not symptom.returned or not never_spun:
+        return None
+    return Cause(
+        f"{symptom.seen} with exit code 0: main() returned without rclpy.spin()",
+        "rclpy.spin(node) keeps a node alive and runs its callbacks until Ctrl-C: call it in "
+        "main() after the node was created.",
+        symptom.evidence,
+    )
+
+
+@explanation(ProcessExit)
+def returned(symptom: ProcessExit) -> Cause | None:
+    """main() returns early: spin_once(), a daemon thread, rclpy.shutdown() or sys.exit()."""
+    if not symptom.returned:
+        return None
+    return Cause(
+        f"{symptom.seen} with exit code 0: main() returned, or something called sys.exit()",
+        "rclpy.spin(node) keeps a node alive until Ctrl-C. Look for what ends it: spin_once() "
+        "handles one round only, a daemon thread ends with main(), rclpy.shutdown() and sys.exit() "
+        "end everything.",
+        symptom.evidence,
+    )
+
+
+@explanation(ProcessExit)
+def limit_exceeded(symptom: ProcessExit) -> Cause | None:
+    """It used too much memory, CPU time or output, or did what no node may do."""
+    breach = next((item for item in symptom.recording.breaches if item.ended), None)
+    if symptom.killed is not signal.SIGKILL or breach is None:
+        return None
+    return Cause(f"{symptom.seen}: {breach}", _BREACH_HINTS[breach.what], symptom.evidence)
+
+
+@explanation(ProcessExit)
+def ended_by_signal(symptom: ProcessExit) -> Cause | None:
+    """A signal ended it, such as SIGSEGV, or it ended with an exit code and no traceback."""
+    if symptom.failure is not None:
+        return None
+    killed, evidence = symptom.killed, symptom.evidence
+    hint = ""
+    if killed is signal.SIGABRT:
+        hint = _wrong_class(evidence.log) or _wrong_field(evidence.log)
+    hint = hint or (_SIGNAL_HINTS.get(killed, "") if killed else "")
+    hint = hint or "Run it by hand with `ros2 run` and look at its last lines of output."
+    return Cause(f"{symptom.seen} with {exit_words(symptom.process.exit_code)}", hint, evidence)
+
+
+@explanation(ProcessExit)
+def service_without_response(symptom: ProcessExit) -> Cause | None:
+    """The callback of a service does not return its response."""
+    failure = symptom.failure
+    if not failure or failure.type != "TypeError" or failure.frames[-1].where != "send_response":
+        return None
+    # The deepest line of the student's is that of spin(), which is right.
+    return Cause(
+        f"{symptom.seen} with {failure}: a service's callback did not return a response",
+        "A service's callback ends with `return response`, the object that it was called with.",
+        symptom.evidence,
+    )
+
+
+@explanation(ProcessExit)
+def package_not_installed(symptom: ProcessExit) -> Cause | None:
+    """It imports a ROS 2 package that the machine lacks; an error, and never a lost point."""
+    failure, recording = symptom.failure, symptom.recording
+    if not failure or failure.type != "ModuleNotFoundError":
+        return None
+    installed = recording.environment.get("ros_imports", "").split()
+    lacking = lacking_package(failure.message, recording.submission, installed)
+    if lacking is None:
+        return None
+    apt_name = f"ros-jazzy-{lacking.replace('_', '-')}"
+    return Cause(
+        f"{symptom.seen}: it imports {code(lacking)}{symptom.where}, a ROS 2 package that is not "
+        "installed where this is graded",
+        f"No point is lost by it. Tell your instructor: `sudo apt install {apt_name}`.",
+        symptom.evidence,
+        ours=True,
+    )
+
+
+@explanation(ProcessExit)
+def newer_python(symptom: ProcessExit) -> Cause | None:
+    """It uses a name of a newer Python than the machine has; an error, and never a lost point."""
+    newer = symptom.failure and newer_name(symptom.failure, symptom.recording)
+    if not newer:
+        return None
+    return Cause(
+        f"{symptom.seen}: it uses {code(newer.name)}{symptom.where}, which is not there where "
+        "this is graded",
+        f"It is right in ROS 2 Jazzy, which has {newer.home}, and no point is lost by it. Tell "
+        f"your instructor: it needs {newer.home}. Or do without this name.",
+        symptom.evidence,
+        ours=True,
+    )
+
+
+@explanation(ProcessExit, general=True)
+def raised(symptom: ProcessExit) -> Cause | None:
+    """An exception ended it: see below what exceptions mean."""
+    failure, evidence = symptom.failure, symptom.evidence
+    if failure is None:
+        return None
+    return Cause(
+        f"{symptom.seen} with {failure}{symptom.where}",
+        cause_of(Raised(failure, symptom.recording)),
+        replace(evidence, places=(symptom.place,) if symptom.place else ()),
     )
 
 
@@ -207,40 +356,6 @@ def offence(recording: Recording) -> Cause | None:
             moment = Moment(breach.what, when_s)
             return Cause(str(breach), _BREACH_HINTS[breach.what], Evidence(moments=(moment,)))
     return None
-
-
-def _returned(recording: Recording, process: Process, ended: str, evidence: Evidence) -> Cause:
-    if declarations.broke_off(recording, process.name):
-        return Cause(
-            f"{ended} with exit code 0, but main() did not return: Python was broken off, as "
-            "os._exit() does",
-            "Look for os._exit() or os.exec...(): they end the program wherever it is. A node "
-            "runs until rclpy.spin(node) returns, at Ctrl-C.",
-            evidence,
-        )
-    if declarations.traced(recording, process.name) and not declarations.said(
-        recording, "node", process.name
-    ):
-        return Cause(
-            f"{ended} with exit code 0: main() returned before a node was created",
-            "The function that setup.py names in console_scripts must call rclpy.init(), create "
-            "the node and call rclpy.spin(node).",
-            evidence,
-        )
-    if declarations.never_spun(recording, process.name):
-        return Cause(
-            f"{ended} with exit code 0: main() returned without rclpy.spin()",
-            "rclpy.spin(node) keeps a node alive and runs its callbacks until Ctrl-C: call it in "
-            "main() after the node was created.",
-            evidence,
-        )
-    return Cause(
-        f"{ended} with exit code 0: main() returned, or something called sys.exit()",
-        "rclpy.spin(node) keeps a node alive until Ctrl-C. Look for what ends it: spin_once() "
-        "handles one round only, a daemon thread ends with main(), rclpy.shutdown() and sys.exit() "
-        "end everything.",
-        evidence,
-    )
 
 
 def _wrong_class(lines: Sequence[str]) -> str:

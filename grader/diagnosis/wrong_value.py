@@ -1,0 +1,178 @@
+"""Why a message has other values: swapped fields, wrong sign, wrong unit."""
+
+from __future__ import annotations
+
+import math
+import struct
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations, pairwise, product
+from typing import Any
+
+from grader.checks.value import Difference, same
+from grader.checks.wording import value_text
+from grader.diagnosis.explanation import Symptom, explanation
+
+_FACTORS = {1000.0: "1000 times", 100.0: "100 times", 10.0: "10 times"}
+_FACTOR_TOLERANCE = 1e-6
+# As bits of a numpy.float32 this is a number next to nothing, 1e-38.
+_MOST_DIGITS = 1 << 23
+# Python 3.11 has the number of digits of a negative integer with a minus.
+_LEAST_NEGATIVE = (1 << 64) - (1 << 8)
+
+
+@dataclass(frozen=True)
+class WrongValue(Symptom[str]):
+    """Fields of a message differ from what is expected; explained by a clause.
+
+    Attributes:
+        wrong: At least one difference.
+        observed: All leaves of the message.
+        tolerance: Largest difference of two equal numbers.
+        always: No other message is right.
+    """
+
+    wrong: tuple[Difference, ...]
+    observed: Mapping[str, Any]
+    tolerance: float
+    always: bool = True
+
+    @property
+    def numbers(self) -> list[Difference]:
+        """Differences between numbers."""
+        return [one for one in self.wrong if _is_number(one.expected) and _is_number(one.observed)]
+
+    @property
+    def wanted(self) -> list[Difference]:
+        """Those where another number than 0 is expected."""
+        return [one for one in self.numbers if one.expected != 0]
+
+
+@explanation(WrongValue)
+def integer_in_a_float_field(symptom: WrongValue) -> str | None:
+    """A field of floats was given an integer, a text or a numpy.float32, which ROS misreads."""
+    bad = next((one for one in symptom.numbers if was_integer(one.observed)), None)
+    if bad is None:
+        return None
+    put = what_was_put(bad.observed)
+    return f"{bad.field} is a float field, but {put} was put into it, which ROS misreads"
+
+
+@explanation(WrongValue)
+def not_a_number(symptom: WrongValue) -> str | None:
+    """A number is infinite, or none at all: a division by zero, or the root of a negative one."""
+    bad = next((one for one in symptom.numbers if not math.isfinite(one.observed)), None)
+    if bad is None or not math.isfinite(bad.expected):
+        return None
+    if math.isnan(bad.observed):
+        return f"{bad.field} is not a number: look for 0/0 or the root of a negative number"
+    return f"{bad.field} is infinite: look for a division by zero or a range that sees nothing"
+
+
+@explanation(WrongValue)
+def fields_swapped(symptom: WrongValue) -> str | None:
+    """Two fields are swapped, or the value stands in the field beside."""
+    for one, other in combinations(symptom.numbers, 2):
+        if same(one.expected, other.observed, symptom.tolerance) and same(
+            other.expected, one.observed, symptom.tolerance
+        ):
+            if one.expected and other.expected:
+                return f"{one.field} and {other.field} are swapped"
+            full, empty = (one, other) if one.expected else (other, one)
+            return _stands_in(full, empty.field)
+    return None
+
+
+@explanation(WrongValue)
+def every_number_zero(symptom: WrongValue) -> str | None:
+    """Every number is zero, as in a message that was just created."""
+    numbers = [value for value in symptom.observed.values() if _is_number(value)]
+    if not symptom.wanted or not numbers or any(numbers):
+        return None
+    others = "" if symptom.always else ", although others are right"
+    return f"every number in it is zero, as in a new message{others}"
+
+
+@explanation(WrongValue)
+def in_another_field(symptom: WrongValue) -> str | None:
+    """The value stands in another field."""
+    for one, other in product(symptom.wanted, symptom.numbers):
+        if other is not one and same(one.expected, other.observed, symptom.tolerance):
+            return _stands_in(one, other.field)
+    return None
+
+
+@explanation(WrongValue)
+def wrong_sign_or_unit(symptom: WrongValue) -> str | None:
+    """The sign is wrong, the value is 10, 100 or 1000 times too large, or in degrees."""
+    found = (_scaled(one, symptom.tolerance) for one in symptom.wanted)
+    return next(filter(None, found), None)
+
+
+def _scaled(one: Difference, tolerance: float) -> str | None:
+    if not one.observed:
+        return None
+    ratio = one.observed / one.expected
+    if same(one.expected, -one.observed, tolerance):
+        return f"the sign of {one.field} is wrong"
+    for factor, words in _FACTORS.items():
+        if math.isclose(ratio, factor, rel_tol=_FACTOR_TOLERANCE):
+            return f"{one.field} is {words} too large: a slip of units or of the point"
+        if math.isclose(ratio, 1.0 / factor, rel_tol=_FACTOR_TOLERANCE):
+            return f"{one.field} is {words} too small: a slip of units or of the point"
+    # Three digits, for people type 57.3 and 3.14.
+    if math.isclose(ratio, math.degrees(1.0), rel_tol=2e-3):
+        return f"{one.field} is in degrees: ROS has angles in radians (REP-103)"
+    if math.isclose(ratio, math.radians(1.0), rel_tol=2e-3):
+        return f"{one.field} was taken for degrees and converted, but is in radians already"
+    return None
+
+
+def _stands_in(item: Difference, field: str) -> str:
+    return f"the {value_text(item.expected)} stands in {field} instead of {item.field}"
+
+
+def was_integer(number: Any) -> bool:
+    """Whether a float is what rclpy makes of an integer that was put into a float field.
+
+    rclpy does not check the types of fields (unless ROS_PYTHON_CHECK_FIELDS=1), and takes the
+    bits of Python's integer for a float: a number next to nothing, such as 5e-324, or the NaN of
+    the bits of -1, which no computation makes.
+    """
+    return isinstance(number, float) and (
+        0.0 < abs(number) < sys.float_info.min or _bits(number) >= _LEAST_NEGATIVE
+    )
+
+
+def what_was_put(number: float) -> str:
+    """What was put into a float field in place of a float, for one that :func:`was_integer`.
+
+    Of an integer rclpy takes the number of its digits for a float, or a small integer itself; of
+    a numpy.float32 all of its bits, the exponent among them; of a text how long it is.
+    """
+    bits = _bits(number)
+    if bits < _LEAST_NEGATIVE and _bits(abs(number)) > _MOST_DIGITS:
+        return "a numpy.float32"
+    # Digits are counted from 1 in Python 3.11, in eights in 3.12 with 2 for a negative integer.
+    return "an integer" if bits <= 2 or bits >= _LEAST_NEGATIVE or bits % 8 in (0, 2) else "a text"
+
+
+def _bits(number: float) -> int:
+    (bits,) = struct.unpack("<Q", struct.pack("<d", number))
+    return int(bits)
+
+
+def accumulates(expected: Any, series: list[Any]) -> bool:
+    """Whether a field that should stay the same grows by the same step in every message."""
+    if not _is_number(expected) or len(series) < 3 or not all(map(_is_number, series)):
+        return False
+    steps = [after - before for before, after in pairwise(series)]
+    step = steps[0]
+    if not math.isfinite(step) or step == 0:
+        return False
+    return all(math.isclose(other, step, rel_tol=1e-6) for other in steps)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
