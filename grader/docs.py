@@ -26,6 +26,7 @@ from grader.checks import finding
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance
+from grader.diagnosis.explanation import explanations
 from grader.recording import interaction
 from grader.recording import model as recording
 from grader.spec.unit import UNITS, Dimension, format_duration
@@ -218,6 +219,28 @@ def _lessons_markdown() -> Iterator[str]:
             yield text.replace("\n\n", f"\n\nOnly in `{folder.parent.name}`. ", 1)
 
 
+def explanations_markdown() -> str:
+    """What rosgrade can tell a student, by symptom."""
+    parts = [
+        "# What rosgrade can explain",
+        _MADE,
+        "A check says that something is missing or wrong. Then rosgrade looks for the cause in "
+        "what it recorded. Each list below belongs to one symptom, the deepest causes first: the "
+        "first one that applies is told, with the place in the code where it can be known, and "
+        "with what to try next. Where the fault is not the student's, the check ends as an error, "
+        "and no point is lost.",
+    ]
+    for symptom, entries in sorted(explanations().items(), key=lambda item: _sentence(item[0])):
+        parts.append(f"## {_sentence(symptom)}")
+        parts.append("\n".join(f"- {entry.sentence}" for entry in entries))
+    return "\n\n".join(parts) + "\n"
+
+
+def _sentence(symptom: type[Any]) -> str:
+    """The first line of a symptom's docstring, as a heading."""
+    return (inspect.getdoc(symptom) or symptom.__name__).partition("\n")[0].rstrip(".")
+
+
 def check_markdown(check: Check) -> str:
     """One check: what it asks for, what it explains, its parameters."""
     parts = [f"## {check.name}", _outside_code(check.documentation)]
@@ -386,6 +409,7 @@ def documents() -> dict[str, str]:
     return {
         "assignment-yaml.md": assignment_markdown(),
         "checks.md": checks_markdown(),
+        "explanations.md": explanations_markdown(),
         "recording.md": recording_markdown(),
     }
 

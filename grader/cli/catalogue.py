@@ -81,18 +81,24 @@ def schema(
 
 def checks(
     name: Annotated[str | None, typer.Argument(help="One check; by default all.")] = None,
+    explanations: Annotated[
+        bool, typer.Option("--explanations", help="List what rosgrade can explain to a student.")
+    ] = False,
 ) -> None:
-    """Show the catalogue of checks with their parameters."""
+    """Show the catalogue of checks with their parameters, or of explanations."""
     from rich.markdown import Markdown
     from rich.table import Table
 
     from grader.assignment.lesson_checks import all_checks
-    from grader.docs import check_markdown
+    from grader.docs import check_markdown, explanations_markdown
     from grader.errors import UsageError
     from grader.spec.nearest_name import did_you_mean
 
-    catalogue = all_checks()
     console = output_console()
+    if explanations:
+        console.print(Markdown(explanations_markdown()))
+        return
+    catalogue = all_checks()
     if name is None:
         table = Table("CHECK", "WHAT IT JUDGES", box=None, pad_edge=False)
         for entry in catalogue.values():

@@ -23,7 +23,7 @@ _PROMISES = ("deadline", "liveliness")
 
 @dataclass(frozen=True)
 class NotDelivered(Symptom[Cause]):
-    """No message of a topic can have reached a subscription of the student's."""
+    """A node does not receive the messages of a topic."""
 
     recording: Recording
     topic: str

@@ -32,7 +32,7 @@ _OTHER = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.SUBSCRIPTION: Kind.PUBLISHER}
 
 @dataclass(frozen=True)
 class NoEndpoint(Symptom[Cause]):
-    """The student's nodes have no such publisher or subscription on a topic."""
+    """A publisher or a subscription is missing."""
 
     recording: Recording
     kind: Kind

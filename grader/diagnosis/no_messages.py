@@ -25,13 +25,11 @@ from grader.spec.unit import format_duration
 from grader.submission.record import SourceError
 
 _LOG_LINES = 5
-_SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
+SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
 ENDED_HINT = (
     "Publish in every call of the callback. Look for a counter or a condition that ends it, for "
     "timer.cancel() and timer.reset(), and for a callback that does not return."
 )
-# After so many periods of silence a timer has stopped.
-_ENDED_PERIODS = 3.0
 # Share of the observation that the host may take before silence says nothing any more.
 _STARVED = 0.5
 # Without what the host took: in so long a node answers what it was asked.
@@ -40,7 +38,7 @@ _OWN_S = 2.0
 
 @dataclass(frozen=True)
 class NoMessages(Symptom[Cause]):
-    """No message was recorded on a topic."""
+    """No message came on a topic."""
 
     recording: Recording
     topic: str
@@ -80,49 +78,9 @@ class NoMessages(Symptom[Cause]):
         )
 
 
-@dataclass(frozen=True)
-class FewMessages(Symptom[Cause]):
-    """Some messages were recorded on a topic, but fewer than needed."""
-
-    recording: Recording
-    topic: str
-    needed: int
-
-    @property
-    def begin_ns(self) -> int:
-        """When the observation of the topic began."""
-        return self.recording.matched_ns or self.recording.launched_ns
-
-    @property
-    def watched_s(self) -> float:
-        """How long the topic was observed."""
-        return (self.recording.stop_ns - self.begin_ns) / NS
-
-    @property
-    def seen(self) -> str:
-        """The symptom in words."""
-        number = counted(len(self.recording.on(self.topic)), "message")
-        return f"{number} on {code(self.topic)} in {format_duration(self.watched_s)}"
-
-    @property
-    def moments(self) -> tuple[Moment, ...]:
-        """When the first messages came."""
-        return tuple(
-            Moment(f"message {index}", self.recording.since_launch_s(message.stamp_ns))
-            for index, message in enumerate(self.recording.on(self.topic)[:10], start=1)
-        )
-
-
 def why_silent(recording: Recording, topic: str) -> Cause:
     """Why nothing was recorded on a topic."""
     return cause_of(NoMessages(recording, topic))
-
-
-def why_few(recording: Recording, topic: str, needed: int) -> Cause:
-    """Why fewer messages than needed were recorded on a topic."""
-    if not recording.on(topic):
-        return why_silent(recording, topic)
-    return cause_of(FewMessages(recording, topic, needed))
 
 
 @explanation(NoMessages)
@@ -240,7 +198,7 @@ def slow_timer(symptom: NoMessages) -> Cause | None:
     return Cause(
         f"{symptom.seen} in {format_duration(watched_s)}: the process declared a "
         f"timer of {format_duration(timer.period_s)}",
-        _SECONDS_HINT,
+        SECONDS_HINT,
         Evidence(
             moments=(
                 Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
@@ -408,73 +366,6 @@ def _although(recording: Recording) -> str:
     if not runs or not declarations.said(recording, "spin"):
         return ""
     return f", although the process declared a timer of {listing(runs)}"
-
-
-@explanation(FewMessages)
-def some_unreadable(symptom: FewMessages) -> Cause | None:
-    """Some of what the program publishes is no message of the type."""
-    return why_unreadable(symptom.recording, symptom.topic)
-
-
-@explanation(FewMessages)
-def process_ended_early(symptom: FewMessages) -> Cause | None:
-    """The process ended before it published enough."""
-    return why_ended(symptom.recording, symptom.seen)
-
-
-@explanation(FewMessages)
-def too_little_cpu_time(symptom: FewMessages) -> Cause | None:
-    """With the time that the machine took from the process, it may have published enough."""
-    recording, number = symptom.recording, len(symptom.recording.on(symptom.topic))
-    stolen_s = recording.stolen_s(symptom.begin_ns, recording.stop_ns)
-    left_to_it_s = symptom.watched_s - stolen_s
-    if stolen_s <= 0.0 or number * symptom.watched_s < symptom.needed * left_to_it_s:
-        return None
-    return Cause.to_repeat(
-        f"{symptom.seen}, but the machine took {format_duration(stolen_s)} of them from the process"
-    )
-
-
-@explanation(FewMessages)
-def publisher_destroyed_early(symptom: FewMessages) -> Cause | None:
-    """The program destroyed its publisher too early."""
-    return why_unpublished(symptom.recording, symptom.topic, symptom.seen)
-
-
-@explanation(FewMessages)
-def timer_not_spun(symptom: FewMessages) -> Cause | None:
-    """A timer was created, but rclpy.spin() is never called."""
-    if not declarations.timers(symptom.recording):
-        return None
-    return why_never_spun(symptom.recording, symptom.seen, moments=symptom.moments)
-
-
-@explanation(FewMessages, general=True)
-def timer_stopped_or_slow(symptom: FewMessages) -> Cause | None:
-    """A timer stopped, or its period is too long for as many messages."""
-    recording, seen = symptom.recording, symptom.seen
-    period_s = [timer.period_s for timer in declarations.timers(recording)]
-    if not period_s:
-        return None
-    timers = f"; the process declared a timer of {listing(map(format_duration, period_s))}"
-    silent_s = (recording.stop_ns - recording.on(symptom.topic)[-1].stamp_ns) / NS
-    evidence = Evidence(moments=symptom.moments)
-    if silent_s > _ENDED_PERIODS * max(period_s):
-        return Cause(
-            f"{seen}, none in the last {format_duration(silent_s)}{timers}", ENDED_HINT, evidence
-        )
-    is_slow = symptom.needed * min(period_s) > symptom.watched_s
-    return Cause(seen + timers, _SECONDS_HINT if is_slow else ENDED_HINT, evidence)
-
-
-@explanation(FewMessages, general=True)
-def publishing_stopped(symptom: FewMessages) -> Cause:
-    """The program publishes without a timer, and stops."""
-    return Cause(
-        symptom.seen,
-        "Publish from the callback of a timer, which goes on as long as the node spins.",
-        Evidence(moments=symptom.moments),
-    )
 
 
 def why_unreadable(recording: Recording, topic: str) -> Cause | None:

@@ -2,55 +2,153 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from grader.checks import declarations
-from grader.checks.finding import Evidence
+from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import nodes_seen, until_the_end
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.exchanged_executables import why_exchanged
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.process_exit import crashed, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.nearest_name import nearest
+from grader.submission.record import SourceError
 
 _LOG_LINES = 10
 # How the cell calls the wait for a process that it could not start.
 _START = "start of "
 
 
+@dataclass(frozen=True)
+class NoNode(Symptom[Cause]):
+    """No node of the student's appeared."""
+
+    recording: Recording
+
+    @property
+    def is_launched(self) -> bool:
+        """Whether a process was started."""
+        return self.recording.ending is not Ending.NOT_STARTED and bool(self.recording.processes)
+
+    @property
+    def what(self) -> str:
+        """What could not be started, as ``package/executable: why``; or an empty text."""
+        waits = self.recording.waits
+        start = next((wait.what for wait in waits if wait.what.startswith(_START)), "")
+        return start.removeprefix(_START)
+
+    @property
+    def process(self) -> Process:
+        """The process that ran without a node."""
+        return self.recording.processes[0]
+
+    @property
+    def who(self) -> str:
+        """The same in words."""
+        return f"the process {code(self.process.name)}"
+
+    @property
+    def place(self) -> SourceError | None:
+        """Where it was when it was interrupted."""
+        return interrupted_place(self.recording, self.process.name)
+
+    @property
+    def where(self) -> str:
+        """The same in words, with a space before."""
+        return f" ({self.place.file}:{self.place.line})" if self.place else ""
+
+    @property
+    def evidence(self) -> Evidence:
+        """The place, and its last lines of output."""
+        name = self.process.name
+        lines = tuple(line.text for line in self.recording.log if line.process == name)
+        return Evidence(
+            moments=(self.nothing,),
+            places=(self.place,) if self.place else (),
+            log=lines[-_LOG_LINES:],
+        )
+
+    @property
+    def nothing(self) -> Moment:
+        """That there was still no node."""
+        return until_the_end(self.recording, "still no node when the observation ended")
+
+    def declares(self, kind: str) -> bool:
+        """Whether the process declared something of a kind."""
+        return declarations.said(self.recording, kind, self.process.name)
+
+
+@dataclass(frozen=True)
+class OtherNode(Symptom[Cause]):
+    """A node has another name than is expected."""
+
+    recording: Recording
+    wanted: str
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the student's nodes."""
+        return [node.name for node in self.recording.student_nodes]
+
+    @property
+    def there(self) -> str:
+        """The same in words."""
+        return f"found the node {codes(self.names)}"
+
+    @property
+    def base(self) -> str:
+        """The wanted name without its namespace."""
+        return self.wanted.rpartition("/")[2]
+
+
 def why_no_node(recording: Recording) -> Cause | None:
     """Why the student has no node at all, or None if there is one."""
-    if recording.student_nodes:
-        return None
-    if recording.ending is Ending.NOT_STARTED or not recording.processes:
-        return _not_started(recording)
-    return why_ended(recording) or _hangs(recording, recording.processes[0])
+    return None if recording.student_nodes else cause_of(NoNode(recording))
 
 
 def why_not_node(recording: Recording, name: str) -> Cause | None:
     """Why a certain node did not appear, or None if it did."""
-    names = [node.name for node in recording.student_nodes]
-    if name in names:
+    if name in [node.name for node in recording.student_nodes]:
         return None
-    return why_no_node(recording) or _other_name(recording, name, names)
+    return why_no_node(recording) or cause_of(OtherNode(recording, name))
 
 
-def _not_started(recording: Recording) -> Cause:
-    start = next((w.what for w in recording.waits if w.what.startswith(_START)), "")
-    what, _, why = start.removeprefix(_START).partition(": ")
-    submission, build = recording.submission, recording.submission.build
-    package = what.partition("/")[0]
-    unbuilt = submission.package(package) and why_not_built(submission, package)
-    if unbuilt:
-        return unbuilt.after("nothing was launched")
-    if build is not None and not build.succeeded and not what:
-        return Cause(
-            "nothing was launched, because the packages did not build",
-            "Mend the build first: `colcon build` names the line.",
-            Evidence(places=(build.culprit,) if build.culprit else ()),
-        )
-    installed = [name for package in recording.submission.packages for name in package.executables]
+@explanation(NoNode)
+def package_not_built(symptom: NoNode) -> Cause | None:
+    """The package was not built."""
+    submission = symptom.recording.submission
+    package = symptom.what.partition(":")[0].partition("/")[0]
+    if symptom.is_launched or not submission.package(package):
+        return None
+    cause = why_not_built(submission, package)
+    return cause and cause.after("nothing was launched")
+
+
+@explanation(NoNode)
+def nothing_built(symptom: NoNode) -> Cause | None:
+    """The packages did not build."""
+    build = symptom.recording.submission.build
+    if symptom.is_launched or symptom.what or build is None or build.succeeded:
+        return None
+    return Cause(
+        "nothing was launched, because the packages did not build",
+        "Correct the build first: `colcon build` names the line.",
+        Evidence(places=(build.culprit,) if build.culprit else ()),
+    )
+
+
+@explanation(NoNode)
+def no_executable(symptom: NoNode) -> Cause | None:
+    """The executable does not exist, or cannot be started."""
+    if symptom.is_launched:
+        return None
+    what, _, why = symptom.what.partition(": ")
+    packages = symptom.recording.submission.packages
+    installed = [name for package in packages for name in package.executables]
     there = f"; installed are {codes(installed)}" if installed else ""
     return Cause(
         f"{code(what)} could not be started: {why}{there}"
@@ -60,87 +158,144 @@ def _not_started(recording: Recording) -> Cause:
     )
 
 
-def _hangs(recording: Recording, process: Process) -> Cause:
-    """A process that still ran, but showed no node."""
-    name, who = process.name, f"the process {code(process.name)}"
-    nothing = until_the_end(recording, "still no node when the observation ended")
-    others = recording.environment.get("other_domains")
-    if others:
-        return Cause(
-            f"{who} joined ROS domain {others} and not the one that it was started in",
-            "Do not set ROS_DOMAIN_ID or domain_id in the code: the environment chooses it.",
-            Evidence(moments=(nothing,)),
-        )
-    if declarations.said(recording, "node", name):
-        return declarations.why_never_appeared(recording, "a node")
-    place = interrupted_place(recording, name)
-    evidence = Evidence(
-        moments=(nothing,),
-        places=(place,) if place else (),
-        log=tuple(line.text for line in recording.log if line.process == name)[-_LOG_LINES:],
-    )
-    where = f" ({place.file}:{place.line})" if place else ""
-    if place and "input(" in place.message:
-        return Cause(
-            f"{who} waits for input(){where}, and no node appeared",
-            "A launched node has no keyboard: take the value from a ROS parameter.",
-            evidence,
-        )
-    if declarations.said(recording, "init", name):
-        return Cause(
-            f"{who} called rclpy.init() but created no node until the end{where}",
-            "Create the node right after rclpy.init(): no loop and no sleep before it.",
-            evidence,
-        )
-    if declarations.traced(recording, name):
-        return Cause(
-            f"{who} ran until the end but never called rclpy.init(){where}",
-            "Look for a loop, a sleep or input() at the top level of a module or before "
-            "rclpy.init() in main().",
-            evidence,
-        )
+@explanation(NoNode)
+def process_ended(symptom: NoNode) -> Cause | None:
+    """The process ended before it created a node."""
+    return why_ended(symptom.recording)
+
+
+@explanation(NoNode)
+def other_domain(symptom: NoNode) -> Cause | None:
+    """The program sets ROS_DOMAIN_ID, or joins another domain."""
+    others = symptom.recording.environment.get("other_domains")
+    if not others:
+        return None
     return Cause(
-        f"{who} ran until the end, but no node appeared{where}",
+        f"{symptom.who} joined ROS domain {others} and not the one that it was started in",
+        "Do not set ROS_DOMAIN_ID or domain_id in the code: the environment chooses it.",
+        Evidence(moments=(symptom.nothing,)),
+    )
+
+
+@explanation(NoNode)
+def never_appeared(symptom: NoNode) -> Cause | None:
+    """The process created a node, but it never appeared in the ROS graph."""
+    if not symptom.declares("node"):
+        return None
+    return declarations.why_never_appeared(symptom.recording, "a node")
+
+
+@explanation(NoNode)
+def waits_for_input(symptom: NoNode) -> Cause | None:
+    """The program waits for input() before it creates a node."""
+    if symptom.place is None or "input(" not in symptom.place.message:
+        return None
+    return Cause(
+        f"{symptom.who} waits for input(){symptom.where}, and no node appeared",
+        "A launched node has no keyboard: take the value from a ROS parameter.",
+        symptom.evidence,
+    )
+
+
+@explanation(NoNode)
+def init_without_node(symptom: NoNode) -> Cause | None:
+    """The program calls rclpy.init(), and creates no node."""
+    if not symptom.declares("init"):
+        return None
+    return Cause(
+        f"{symptom.who} called rclpy.init() but created no node until the end{symptom.where}",
+        "Create the node right after rclpy.init(): no loop and no sleep before it.",
+        symptom.evidence,
+    )
+
+
+@explanation(NoNode)
+def no_init(symptom: NoNode) -> Cause | None:
+    """The program does not come to rclpy.init()."""
+    if not declarations.traced(symptom.recording, symptom.process.name):
+        return None
+    return Cause(
+        f"{symptom.who} ran until the end but never called rclpy.init(){symptom.where}",
+        "Look for a loop, a sleep or input() at the top level of a module or before "
+        "rclpy.init() in main().",
+        symptom.evidence,
+    )
+
+
+@explanation(NoNode, general=True)
+def no_node_appeared(symptom: NoNode) -> Cause:
+    """The process runs, but no node appears."""
+    return Cause(
+        f"{symptom.who} ran until the end, but no node appeared{symptom.where}",
         "main() must call rclpy.init() and create the node; nothing may block before that.",
-        evidence,
+        symptom.evidence,
     )
 
 
-def _other_name(recording: Recording, wanted: str, names: list[str]) -> Cause:
-    there = f"found the node {codes(names)}"
-    base = wanted.rpartition("/")[2]
-    evidence = Evidence(moments=nodes_seen(recording))
-    for name in names:
-        if name.lower() == wanted.lower():
-            return Cause(
-                f"{there}: upper and lower case differ",
-                f"Names in ROS are case-sensitive: super().__init__('{base}').",
-                evidence,
-            )
-    for name in names:
-        if name.rpartition("/")[2] == base:
-            namespace = name.rpartition("/")[0] or "/"
-            return Cause(
-                f"{there}: the name is right, but the node is in the namespace {code(namespace)}",
-                "Leave out the namespace argument of Node.__init__ (and any `__ns` remapping) "
-                "unless the assignment asks for it.",
-                evidence,
-            )
-    # Without the namespaces, which make any two names alike.
-    if nearest(base, [name.rpartition("/")[2] for name in names]) is None:
-        ended = crashed(recording)
-        if ended:
-            return why_it_exited(recording, ended[0])
-    # A process may declare anything, also what is no text.
-    declared = {str(item.data.get("node")) for item in recording.declared("node")}
-    # A process that shows as many nodes as it declared only calls them by other names.
-    if wanted in declared and len(declared) > len(set(names)):
-        return declarations.why_never_appeared(recording, f"the node {code(wanted)}").after(there)
-    exchanged = why_exchanged(recording)
-    if exchanged is not None:
-        return exchanged.after(there)
+@explanation(OtherNode)
+def other_case(symptom: OtherNode) -> Cause | None:
+    """Upper and lower case of the node's name differ."""
+    if not any(name.lower() == symptom.wanted.lower() for name in symptom.names):
+        return None
     return Cause(
-        there,
-        f"The node's name is the argument of super().__init__('{base}') in its constructor.",
-        evidence,
+        f"{symptom.there}: upper and lower case differ",
+        f"Names in ROS are case-sensitive: super().__init__('{symptom.base}').",
+        Evidence(moments=nodes_seen(symptom.recording)),
+    )
+
+
+@explanation(OtherNode)
+def in_a_namespace(symptom: OtherNode) -> Cause | None:
+    """The node is in a namespace."""
+    split = [name.rpartition("/") for name in symptom.names]
+    space = next((space for space, _, base in split if base == symptom.base), None)
+    if space is None:
+        return None
+    return Cause(
+        f"{symptom.there}: the name is right, but the node is in the namespace "
+        f"{code(space or '/')}",
+        "Leave out the namespace argument of Node.__init__ (and any `__ns` remapping) "
+        "unless the assignment asks for it.",
+        Evidence(moments=nodes_seen(symptom.recording)),
+    )
+
+
+@explanation(OtherNode)
+def process_crashed(symptom: OtherNode) -> Cause | None:
+    """The process of the node ended with a failure before it created the node."""
+    ended = crashed(symptom.recording)
+    # Without the namespaces, which make any two names alike.
+    bases = [name.rpartition("/")[2] for name in symptom.names]
+    if not ended or nearest(symptom.base, bases) is not None:
+        return None
+    return why_it_exited(symptom.recording, ended[0])
+
+
+@explanation(OtherNode)
+def node_never_appeared(symptom: OtherNode) -> Cause | None:
+    """The process created the node, but it never appeared in the ROS graph."""
+    # A process may declare anything, also what is no text.
+    declared = {str(item.data.get("node")) for item in symptom.recording.declared("node")}
+    # A process that shows as many nodes as it declared only calls them by other names.
+    if symptom.wanted not in declared or len(declared) <= len(set(symptom.names)):
+        return None
+    cause = declarations.why_never_appeared(symptom.recording, f"the node {code(symptom.wanted)}")
+    return cause.after(symptom.there)
+
+
+@explanation(OtherNode)
+def exchanged_executables(symptom: OtherNode) -> Cause | None:
+    """In setup.py an executable runs the function of another one."""
+    exchanged = why_exchanged(symptom.recording)
+    return exchanged and exchanged.after(symptom.there)
+
+
+@explanation(OtherNode, general=True)
+def other_name(symptom: OtherNode) -> Cause:
+    """The node has another name."""
+    return Cause(
+        symptom.there,
+        f"The node's name is the argument of super().__init__('{symptom.base}') in its "
+        "constructor.",
+        Evidence(moments=nodes_seen(symptom.recording)),
     )

@@ -30,7 +30,10 @@ _SUFFIXES = {
 
 @dataclass(frozen=True)
 class OtherType(Symptom[str]):
-    """One type of messages is there where another one is expected; explained by a clause."""
+    """A topic has another message type than is expected.
+
+    The explanations answer with a clause.
+    """
 
     expected: str
     found: str

@@ -24,7 +24,9 @@ _LEAST_NEGATIVE = (1 << 64) - (1 << 8)
 
 @dataclass(frozen=True)
 class WrongValue(Symptom[str]):
-    """Fields of a message differ from what is expected; explained by a clause.
+    """A message has other values than are expected.
+
+    The explanations answer with a clause.
 
     Attributes:
         wrong: At least one difference.

@@ -16,7 +16,8 @@ from grader.checks.messages.source_value import SourceText, SourceValue, mistake
 from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted, listing
-from grader.diagnosis.no_messages import why_few, why_silent
+from grader.diagnosis.few_messages import why_few
+from grader.diagnosis.no_messages import why_silent
 from grader.recording.model import NS, Kind, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration

@@ -24,7 +24,8 @@ from grader.checks.value import (
 from grader.checks.wording import code, codes, counted, value_text
 from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.explanation import explain
-from grader.diagnosis.no_messages import why_few, why_silent, why_unreadable
+from grader.diagnosis.few_messages import why_few
+from grader.diagnosis.no_messages import why_silent, why_unreadable
 from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
 from grader.recording.model import Kind, Message, Recording
 from grader.spec.name import TopicName

@@ -19,7 +19,8 @@ from grader.checks.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.checks.reference import GoalPose
 from grader.checks.wording import percent
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.motion.missed_goal import why_not_aligned, why_not_there
+from grader.diagnosis.motion.missed_goal import why_not_there
+from grader.diagnosis.motion.missed_heading import why_not_aligned
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
 from grader.diagnosis.motion.off_course import why_off_course, why_unsteered
 from grader.recording.model import NS, Recording

@@ -16,7 +16,7 @@ from grader.checks.qos.compatibility import compatibility_table, refusals
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished
-from grader.diagnosis.no_messages import why_few
+from grader.diagnosis.few_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Join, Kind, Message, Recording
 from grader.spec.name import Id, TopicName

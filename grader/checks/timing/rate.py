@@ -13,7 +13,7 @@ from grader.checks.first_seen import first_seen
 from grader.checks.need import Recorded
 from grader.checks.timing.stamps import why_not_believed
 from grader.checks.wording import code, counted
-from grader.diagnosis.no_messages import why_few
+from grader.diagnosis.few_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName

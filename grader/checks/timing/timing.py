@@ -21,7 +21,8 @@ from grader.checks.timing.stamps import why_not_believed
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_messages import ENDED_HINT, why_few
+from grader.diagnosis.few_messages import why_few
+from grader.diagnosis.no_messages import ENDED_HINT
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName

@@ -19,7 +19,10 @@ TABLE = Path(__file__).with_suffix(".yaml")
 
 @dataclass(frozen=True)
 class Raised(Symptom[str]):
-    """A student's program raised an exception; its explanations are hints."""
+    """A program raised an exception.
+
+    The explanations answer with a hint.
+    """
 
     failure: Failure
     recording: Recording
