@@ -15,10 +15,14 @@ demo: setup ## grade the reference solution, then a broken one
 test: lint ## lint, type-check and run every test
 	@$(run) -m pytest -q -rs -n 2 --dist loadgroup
 
-lint: setup ## check style and types
+lint: setup ## check style, types, imports between folders and dead code; print lines by folder
 	@.venv/bin/ruff check --quiet
 	@.venv/bin/ruff format --check --quiet
 	@$(run) -m mypy --no-error-summary
+	@broken=$$(.venv/bin/lint-imports --no-logo --no-cache) || { echo "$$broken"; exit 1; }
+	@.venv/bin/vulture
+	@for folder in $$(ls -d grader/*/) grader sim tests assignments; do \
+		printf '%6d %s\n' "$$(find $$folder -name '*.py' | xargs cat | wc -l)" "$${folder%/}"; done
 
 lock: setup ## regenerate requirements.lock; UPGRADE=1 to newer versions
 	@$(run) -m pip install --quiet "uv>=0.8"

@@ -17,7 +17,7 @@ from grader.report.formats.gradebook import grades_csv
 from grader.report.html.overview import render_overview
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result_model import Result
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 
 GRADES_FILE = "grades.csv"
 OVERVIEW_FILE = "index.html"

@@ -158,6 +158,4 @@ class _GoalAnnotation:
         return [reference.write(item) for reference, item in pairs]
 
 
-LengthOrName = Annotated[float | str, _Reference(Dimension.LENGTH)]
-AngleOrName = Annotated[float | str, _Reference(Dimension.ANGLE)]
 GoalPose = Annotated[Goal, _GoalAnnotation()]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from grader.cli.console import Progress
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType

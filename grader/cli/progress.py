@@ -25,7 +25,6 @@ class ClassProgress:
         self._quiet = quiet
         self._bar: Bar | None = None
         self._task: TaskID | None = None
-        self._work = ""
         self._count = self._total = self._fresh = 0
         self._began_s = 0.0
 
@@ -57,7 +56,7 @@ class ClassProgress:
         Args:
             already: How many of them were done before; they say nothing of the pace.
         """
-        self._work, self._total, self._count, self._fresh = work, total, 0, 0
+        self._total, self._count, self._fresh = total, 0, 0
         self._began_s = time.monotonic()
         if self._bar is not None:
             if self._task is not None:

@@ -29,13 +29,13 @@ from grader.recording.inputs import read_inputs
 from grader.recording.mcap_reader import read_recording
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import NS
-from grader.report.text.clean import clean, one_line
 from grader.run.cell.domain import lock_domain
 from grader.run.cell.probe import import_interface, qos_profile
 from grader.run.cell.type_support import add_type_support
 from grader.run.process.descendants import become_subreaper, kill_descendants
 from grader.run.replay import ORDER_FILE, ReplayOrder
 from grader.run.stimuli.filling import plain
+from grader.safe_text import clean, one_line
 
 NAME = "rosgrade_replay"
 _TICK_S = 0.01

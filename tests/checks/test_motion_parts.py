@@ -12,12 +12,9 @@ from grader.checks.motion.control_law import Law, Sample, examine
 from grader.checks.motion.ground import ahead, edge_m, nearest
 from grader.checks.motion.measure import degrees, metres, point, side, speed
 from grader.checks.reference import (
-    AngleOrName,
     Goal,
     GoalPose,
-    LengthOrName,
     UnknownValue,
-    resolve,
 )
 from grader.recording.model import NS, Scene, Truth
 from sim.motion import ORIGIN, Pose
@@ -35,8 +32,6 @@ from tests.checks.builder import (
 
 class Form(BaseModel):
     goal: GoalPose
-    far: LengthOrName = 0.0
-    turned: AngleOrName = 0.0
 
 
 def read(goal, **fields):
@@ -48,12 +43,10 @@ class TestReferences:
         assert read([1.2, "30 cm", "90 deg"]).goal == Goal(1.2, 0.3, math.pi / 2)
 
     def test_names(self):
-        form = read(["goal_x", 0, "goal_theta"], far="wall", turned="-5 deg")
+        form = read(["goal_x", 0, "goal_theta"])
         pose = form.goal.pose({"goal_x": 0.5, "goal_theta": 4.0})
         assert (pose.x_m, pose.y_m) == (0.5, 0.0)
         assert math.isclose(pose.yaw_rad, 4.0 - math.tau)
-        assert resolve(form.far, {"wall": 1.5}) == 1.5
-        assert math.isclose(resolve(form.turned, {}), -math.pi / 36)
 
     def test_an_unknown_name(self):
         with pytest.raises(UnknownValue, match=r"no random value 'goal_z'\. Did you mean 'goal_x'"):
@@ -82,7 +75,6 @@ class TestReferences:
     def test_described_to_an_editor(self):
         properties = Form.model_json_schema()["properties"]
         assert "names of random values" in properties["goal"]["x-words"]
-        assert "name of a random value" in properties["far"]["x-words"]
 
 
 def scene(outlines, moving=(), lidar=ORIGIN):

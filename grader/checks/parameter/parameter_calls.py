@@ -63,7 +63,6 @@ class Descriptor:
     name: str
     type: str
     read_only: bool
-    dynamic: bool
     range: Range | None
     description: str
 
@@ -122,7 +121,6 @@ def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:
                     name=name,
                     type=TYPES.get(_whole(found.get("type")), "not set"),
                     read_only=found.get("read_only") is True,
-                    dynamic=found.get("dynamic_typing") is True,
                     range=_range(found),
                     description=str(found.get("description", "")),
                 )

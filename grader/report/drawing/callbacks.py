@@ -11,7 +11,7 @@ from grader.checks.wording import counted
 from grader.report.drawing import axis
 from grader.report.drawing.axis import time_axis
 from grader.report.drawing.svg import NARROW, WIDE, Figure, Scale, drawing, element, fitted, label
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 
 ROW, BAR = 38, 16
 SIDE = 6

@@ -25,7 +25,7 @@ from grader.report.drawing.svg import (
     line,
     unit_of,
 )
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 
 HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 250, 62, 12, 26, 42
 FLOOR = 1e-9

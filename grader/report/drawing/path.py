@@ -28,7 +28,7 @@ from grader.report.drawing.svg import (
     label,
     simplified,
 )
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 from sim.motion import Pose, compose
 
 STRIDE = 5

@@ -30,7 +30,7 @@ from grader.report.drawing.svg import (
     ticks,
     unit_of,
 )
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 
 HEIGHT = 232
 LEFT, RIGHT, TOP, BOTTOM = 54, 12, 26, 42

@@ -13,7 +13,7 @@ from functools import cache
 
 from markupsafe import Markup, escape
 
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 
 WIDE, NARROW = 760, 330
 Point = tuple[float, float]

@@ -27,7 +27,7 @@ from grader.report.drawing.svg import (
     label,
 )
 from grader.report.model.sections import printed
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 
 LANE = 36
 TRACK = 12

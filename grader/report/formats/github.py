@@ -16,7 +16,7 @@ from grader.report.formats.markdown import render_markdown
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import explanation, words
-from grader.report.text.clean import clean, one_line
+from grader.safe_text import clean, one_line
 
 MOST_ANNOTATIONS = 10
 """Of each kind and step; the runner drops what comes after."""

@@ -19,7 +19,7 @@ from grader.errors import UsageError
 from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.result_model import Result
 from grader.report.text import words
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 from grader.spec.nearest_name import did_you_mean
 
 # Some spreadsheets take the wide forms of East Asian keyboards for the same.

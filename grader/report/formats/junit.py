@@ -17,7 +17,7 @@ from xml.etree import ElementTree as ET
 from grader.checks.finding import Status
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import explanation, words
-from grader.report.text.clean import clean, one_line
+from grader.safe_text import clean, one_line
 
 _ELEMENT = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "skipped"}
 _TYPE = {Status.FAILED: "check", Status.ERROR: "grader", Status.SKIPPED: "requirement"}

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from grader.checks.finding import Status
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import explanation, words
-from grader.report.text.clean import clean, one_line
+from grader.safe_text import clean, one_line
 
 # Within a word an underscore is no markup; names would be hard to read with it escaped.
 _MARKUP = re.compile(r"[\\`*\[\]~|$]|(?<![^\W_])_|_(?![^\W_])")

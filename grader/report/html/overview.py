@@ -22,8 +22,8 @@ from grader.report.html.policy import content_security_policy
 from grader.report.html.report import asset, environment
 from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.result_model import CheckPart, ScenarioPart
-from grader.report.text.clean import one_line
 from grader.report.text.words import STATUS, number
+from grader.safe_text import one_line
 
 MOST_DISTURBED = 50
 _UNGRADED = (RowStatus.NOT_GRADED, RowStatus.UNREADABLE, RowStatus.MISSING)

@@ -20,7 +20,7 @@ from grader.recording.model import NS, Message, Recording, Scene, Truth
 from grader.report.drawing.ground_plan import places
 from grader.report.model.sections import printed
 from grader.report.model.target import targets
-from grader.report.text.clean import one_line
+from grader.safe_text import one_line
 
 Replay = Mapping[str, Any]
 """One run, ready for JSON; templates/report.js reads it."""

@@ -29,7 +29,7 @@ from grader.report.model.facts import RunFacts
 from grader.report.model.remarks import remarks
 from grader.report.model.sections import ENDINGS, make_sections, shorten
 from grader.report.text import words
-from grader.report.text.clean import clean
+from grader.safe_text import clean
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from grader.checks.finding import Status
-from grader.report.text.clean import encodable
+from grader.safe_text import encodable
 
 SCHEMA: Literal[1] = 1
 

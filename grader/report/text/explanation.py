@@ -10,7 +10,7 @@ from grader.checks.finding import Status
 from grader.grade import first
 from grader.report.model.result_model import CheckPart, FindingPart, PlacePart, Result
 from grader.report.text import words
-from grader.report.text.clean import clean, one_line
+from grader.safe_text import clean, one_line
 
 MOST_NOTES = 20
 """Notes of the runs under one title; a submission can cause any number of them."""

@@ -20,7 +20,7 @@ from grader.recording.model import Recording
 from grader.report.model.changes import Change, changes
 from grader.report.model.remarks import remarks
 from grader.report.text import words
-from grader.report.text.clean import clean, one_line
+from grader.safe_text import clean, one_line
 
 _STYLE = {
     Status.PASSED: "green",

@@ -15,7 +15,6 @@ class Stopwatch:
     def __init__(self, meter: DisturbanceMeter) -> None:
         """Start now."""
         self._meter = meter
-        self.start_ns = time.time_ns()
         self._wall_s = time.monotonic()
         self._stolen_s = meter.stolen_s
 
