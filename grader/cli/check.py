@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated
 
 import typer
@@ -12,14 +13,13 @@ from grader.cli.ahead import while_it_starts
 from grader.cli.console import output_console
 from grader.cli.formats import (
     Classroom50,
+    FormatFiles,
     Formats,
     Github,
-    GradescopeFile,
     GradescopeMetadata,
     JunitFamily,
     JunitFamilyName,
-    JunitFile,
-    MarkdownFile,
+    with_file_formats,
 )
 from grader.cli.live import GradingProgress
 from grader.cli.options import (
@@ -39,6 +39,7 @@ from grader.resources import cache_folder
 FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
 
 
+@with_file_formats
 def check(
     assignment: AssignmentName,
     submission: Annotated[
@@ -52,10 +53,8 @@ def check(
     only: Checks = None,
     seed: Seed = None,
     hidden: Hidden = False,
-    junit: JunitFile = None,
+    files: FormatFiles = MappingProxyType({}),
     junit_family: JunitFamilyName = JunitFamily.XUNIT2,
-    markdown: MarkdownFile = None,
-    gradescope: GradescopeFile = None,
     gradescope_metadata: GradescopeMetadata = None,
     github: Github = False,
     classroom50: Classroom50 = False,
@@ -79,11 +78,9 @@ def check(
     from grader.run.runner import Runner
 
     clock = Clock()
-    formats = Formats(
-        junit, junit_family, markdown, gradescope, gradescope_metadata, github, classroom50
-    )
+    formats = Formats(files, junit_family, gradescope_metadata, github, classroom50)
     refuse_inputs(
-        (report, report / "report.html", json_file, *formats.files),
+        (report, report / "report.html", json_file, *files.values()),
         (*assignment_places(assignment), submission, gradescope_metadata),
     )
     with formats.grading():

@@ -1,19 +1,30 @@
-"""The formats that ``check`` and ``report`` write beside the report, by their options."""
+"""The formats that ``check`` and ``report`` write beside the report, by their options.
+
+A module of :mod:`grader.report.formats` with a function ``render(result, options)`` is a format.
+Its option is its name, and the first line of its docstring is the help.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from enum import Enum
+from functools import wraps
+from importlib import import_module
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
+
+from grader.report import formats
+from grader.report.formats.options import FormatOptions
 
 if TYPE_CHECKING:
     from grader.report.model.result_model import Result
@@ -26,17 +37,11 @@ class JunitFamily(str, Enum):
     XUNIT1 = "xunit1"
 
 
-JunitFile = Annotated[Path | None, typer.Option("--junit", help="Write JUnit XML.")]
+FormatFiles = Mapping[str, Path]
+"""Format -> file; :func:`with_file_formats` makes options of it."""
 JunitFamilyName = Annotated[
     JunitFamily,
     typer.Option(help="xunit2 is valid for Jenkins; xunit1 also has the student's file and line."),
-]
-MarkdownFile = Annotated[
-    Path | None, typer.Option("--markdown", help="Write Markdown, for a comment.")
-]
-GradescopeFile = Annotated[
-    Path | None,
-    typer.Option("--gradescope", help="Write Gradescope's results.json, before the run as well."),
 ]
 GradescopeMetadata = Annotated[
     Path | None, typer.Option(help="Gradescope's submission_metadata.json, for its due date.")
@@ -53,28 +58,69 @@ Classroom50 = Annotated[
 ]
 
 
+_RENDERS = re.compile(r"^def render\(", re.MULTILINE)
+
+
+def file_formats() -> dict[str, str]:
+    """Formats that are written to a file: name of the option -> its help.
+
+    The modules are read and not imported, which takes 0.2 s.
+    """
+    texts = {
+        file.stem: file.read_text() for file in sorted(Path(formats.__file__).parent.glob("*.py"))
+    }
+    return {
+        name: text.partition("\n")[0].strip('"')
+        for name, text in texts.items()
+        if _RENDERS.search(text)
+    }
+
+
+def with_file_formats(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command an option for each format, in place of its parameter ``files``."""
+
+    @wraps(command)
+    def wrapped(**arguments: Any) -> None:
+        files = {name: arguments.pop(name) for name in options}
+        command(**arguments, files={name: file for name, file in files.items() if file})
+
+    options = {
+        name: Annotated[Path | None, typer.Option(f"--{name}", help=text)]
+        for name, text in file_formats().items()
+    }
+    hints = {**get_type_hints(command, include_extras=True), **options}
+    parameters: list[Parameter] = []
+    for name, parameter in signature(command).parameters.items():
+        replaced = options if name == "files" else [name]
+        parameters += [
+            Parameter(
+                one,
+                Parameter.KEYWORD_ONLY,
+                default=None if name == "files" else parameter.default,
+                annotation=hints[one],
+            )
+            for one in replaced
+        ]
+    wrapped.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {one.name: one.annotation for one in parameters}
+    return wrapped
+
+
 @dataclass(frozen=True)
 class Formats:
     """What to write, and where to.
 
     Attributes:
-        gradescope: ``results.json``.
+        files: Format -> the file that it is written to.
         gradescope_metadata: ``submission_metadata.json``.
         classroom50: Whether Classroom 50 started this.
     """
 
-    junit: Path | None = None
+    files: Mapping[str, Path] = field(default_factory=dict)
     junit_family: JunitFamily = JunitFamily.XUNIT2
-    markdown: Path | None = None
-    gradescope: Path | None = None
     gradescope_metadata: Path | None = None
     github: bool = False
     classroom50: bool = False
-
-    @property
-    def files(self) -> tuple[Path | None, ...]:
-        """What is written by name; None for a format that is not asked for."""
-        return (self.junit, self.markdown, self.gradescope)
 
     @contextmanager
     def grading(self) -> Iterator[None]:
@@ -88,11 +134,11 @@ class Formats:
             from grader.report.formats import classroom50
 
             classroom50.identity(os.environ)
-        if self.gradescope is not None:
+        if "gradescope" in self.files:
             from grader.report.files import write_whole
             from grader.report.formats import gradescope
 
-            write_whole(self.gradescope, gradescope.unfinished())
+            write_whole(self.files["gradescope"], gradescope.unfinished())
         if not self.github:
             yield
             return
@@ -113,31 +159,14 @@ class Formats:
         """
         from grader.report.files import write_whole
 
-        if self.junit is not None:
-            from grader.report.formats.junit import render_junit
-
-            xunit1 = self.junit_family is JunitFamily.XUNIT1
-            write_whole(self.junit, render_junit(result, xunit1=xunit1))
-        if self.markdown is not None:
-            from grader.report.formats.markdown import COMMENT_BYTES, render_markdown
-            from grader.report.model.student import for_student
-
-            write_whole(self.markdown, render_markdown(for_student(result), COMMENT_BYTES))
-        if self.gradescope is not None:
-            from grader.report.formats.gradescope import render_gradescope
-
-            metadata = _metadata(self.gradescope_metadata)
-            write_whole(self.gradescope, render_gradescope(result, metadata))
+        options = FormatOptions(self.junit_family is JunitFamily.XUNIT1, self.gradescope_metadata)
+        for name, file in self.files.items():
+            module = import_module(f"{formats.__name__}.{name}")
+            write_whole(file, module.render(result, options))
         if self.github:
             _tell_github(result, submission, os.environ)
         if self.classroom50:
             _write_classroom50(result, Path())
-
-
-def _metadata(file: Path | None) -> Mapping[str, Any] | None:
-    from grader.report.formats.gradescope import read_metadata
-
-    return read_metadata(file) if file is not None else None
 
 
 def _tell_github(result: Result, submission: Path | None, environment: Mapping[str, str]) -> None:

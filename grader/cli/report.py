@@ -3,33 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated
 
 import typer
 
 from grader.cli.console import output_console
 from grader.cli.formats import (
+    FormatFiles,
     Formats,
     Github,
-    GradescopeFile,
     GradescopeMetadata,
     JunitFamily,
     JunitFamilyName,
-    JunitFile,
-    MarkdownFile,
+    with_file_formats,
 )
 
 
+@with_file_formats
 def report(
     out: Annotated[Path, typer.Argument(help="A report folder, or the folder of a class.")],
     assignment: Annotated[
         str | None,
         typer.Argument(help="Id or folder; by default the one that it was graded with."),
     ] = None,
-    junit: JunitFile = None,
+    files: FormatFiles = MappingProxyType({}),
     junit_family: JunitFamilyName = JunitFamily.XUNIT2,
-    markdown: MarkdownFile = None,
-    gradescope: GradescopeFile = None,
     gradescope_metadata: GradescopeMetadata = None,
     github: Github = False,
 ) -> None:
@@ -44,8 +43,8 @@ def report(
     from grader.report.files import refuse_inputs
 
     folders = find_reports(out)
-    formats = Formats(junit, junit_family, markdown, gradescope, gradescope_metadata, github)
-    if len(folders) > 1 and formats != Formats(junit_family=junit_family):
+    formats = Formats(files, junit_family, gradescope_metadata, github)
+    if len(folders) > 1 and (files or gradescope_metadata or github):
         raise UsageError(
             f"{out} has {len(folders)} reports, and a file of one of the formats holds one: "
             "name a report's own folder"
@@ -56,7 +55,7 @@ def report(
             console.print(f"Report: {path}", soft_wrap=True)
         return
     read = [folders[0] / RESULT_FILE, folders[0] / RECORDINGS_FOLDER, gradescope_metadata]
-    refuse_inputs([folders[0] / REPORT_FILE, *formats.files], read)
+    refuse_inputs([folders[0] / REPORT_FILE, *files.values()], read)
     written = render_again(folders[0], assignment)
     console.print(f"Report: {written.report}", soft_wrap=True)
     formats.write(written.result)

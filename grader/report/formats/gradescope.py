@@ -1,4 +1,4 @@
-"""Gradescope's ``results.json``.
+"""Write Gradescope's results.json, before the run as well.
 
 Gradescope itself shows each test to students when its ``visibility`` says so, and the hidden
 ones only to staff; so this is made from the whole result, and only its summary from the
@@ -17,6 +17,7 @@ from typing import Any
 from grader.checks.finding import Status
 from grader.errors import UsageError
 from grader.report.formats import markdown
+from grader.report.formats.options import FormatOptions
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import explanation
@@ -46,6 +47,12 @@ def unfinished() -> str:
             "tests": [],
         }
     )
+
+
+def render(result: Result, options: FormatOptions) -> str:
+    """The whole file."""
+    file = options.gradescope_metadata
+    return render_gradescope(result, read_metadata(file) if file is not None else None)
 
 
 def render_gradescope(result: Result, metadata: Mapping[str, Any] | None = None) -> str:

@@ -1,4 +1,6 @@
-"""JUnit XML: a check is a test case.
+"""Write JUnit XML.
+
+A check is a test case.
 
 A check that failed is a ``failure``, a fault of ours an ``error``, a check that waits for
 another is ``skipped``. So is one that failed without points, or full points would look like a
@@ -15,6 +17,7 @@ from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
 from grader.checks.finding import Status
+from grader.report.formats.options import FormatOptions
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.text import explanation, words
 from grader.safe_text import clean, one_line
@@ -22,6 +25,11 @@ from grader.safe_text import clean, one_line
 _ELEMENT = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "skipped"}
 _TYPE = {Status.FAILED: "check", Status.ERROR: "grader", Status.SKIPPED: "requirement"}
 _WITHOUT_POINTS = "no points"
+
+
+def render(result: Result, options: FormatOptions) -> str:
+    """The whole file."""
+    return render_junit(result, xunit1=options.xunit1)
 
 
 def render_junit(result: Result, *, xunit1: bool = False) -> str:

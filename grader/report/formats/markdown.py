@@ -1,4 +1,6 @@
-"""A result as GitHub-flavoured Markdown: for a comment, a job summary, a release.
+"""Write Markdown, for a comment.
+
+GitHub-flavoured; also for a job summary and a release.
 
 What a student chose is text and never markup: no heading, image, link, table, HTML, mention or
 reference to an issue can be made from it.
@@ -10,7 +12,9 @@ import re
 from collections.abc import Iterator
 
 from grader.checks.finding import Status
+from grader.report.formats.options import FormatOptions
 from grader.report.model.result_model import CheckPart, Result
+from grader.report.model.student import for_student
 from grader.report.text import explanation, words
 from grader.safe_text import clean, one_line
 
@@ -26,6 +30,11 @@ _LOG_LINES = 12
 _LINE_CHARACTERS = 500
 _CELL_BAR = "\\|"
 _MORE = "… the rest is in the report.\n"
+
+
+def render(result: Result, options: FormatOptions) -> str:
+    """The whole file, short enough for a comment."""
+    return render_markdown(for_student(result), COMMENT_BYTES)
 
 
 def render_markdown(result: Result, most_bytes: int | None = None) -> str:
