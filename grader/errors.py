@@ -1,4 +1,4 @@
-"""Every error that rosgrade raises on purpose, one branch per person who can mend it.
+"""Every error that rosgrade raises on purpose, one branch per person who can correct it.
 
 RosgradeError
 ├── UsageError            the caller: wrong argument, missing file
@@ -74,7 +74,7 @@ class AssignmentError(RosgradeError):
 
 
 class SubmissionError(RosgradeError):
-    """What was handed in cannot be read as a submission; the student can mend it."""
+    """What was handed in cannot be read as a submission; the student can correct it."""
 
 
 class GraderFault(RosgradeError):

@@ -4,7 +4,7 @@ The frame is fixed, x and y in metres, yaw counter-clockwise (REP-103). A world 
 
     bounds: [-2, -2, 2, 2]                     # a wall all around: x_min, y_min, x_max, y_max
     start: [0, 0, 90 deg]                      # where the robot starts if nobody says else
-    values: {wall_x: 1.5}                      # what $wall_x stands for if nobody says else
+    values: {wall_x: 1.5}                      # the value of $wall_x by default
     segments:
       - [$wall_x, -1, $wall_x, 1]              # x1, y1, x2, y2
     boxes:

@@ -1,4 +1,4 @@
-"""What is valid in an assignment but looks like a slip: told by ``rosgrade validate``. Pure."""
+"""What is valid in an assignment but looks like a mistake: told by ``rosgrade validate``. Pure."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ def why_unanswered(
     """Why an answer did not come in time.
 
     Args:
-        while_busy: What is said of an executor that does not come round, or does not tell; by
+        while_busy: What is said of an executor that is blocked, or does not tell; by
             default in general words.
     """
     own = offered(recording, server, name)
@@ -64,7 +64,7 @@ def why_unanswered(
         return replace(while_busy, observed=while_busy.observed + where, evidence=evidence)
     if spins is False:
         return Cause(
-            f"{what}: something keeps the executor from coming round{where}; the node's parameter "
+            f"{what}: something blocks the executor{where}; the node's parameter "
             "services answer no call either",
             "A callback must return soon. Look for `while True`, time.sleep() or input() in it, "
             "and for a call() of another service, which waits for an answer that the same "

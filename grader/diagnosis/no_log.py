@@ -302,7 +302,7 @@ def _rounded(value: float, decimals: int) -> str:
 
 def _silent(recording: Recording, topic: str) -> Cause:
     answers = [call for call in recording.calls if call.answered_ns is not None]
-    spins = ", and its executor comes round" if answers else ""
+    spins = ", and its executor spins" if answers else ""
     wrote = next(iter(output_lines(recording)), None)
     other = f"; the process wrote {quote(wrote.text)}" if wrote else ""
     return Cause(

@@ -82,7 +82,7 @@ def why_no_manifest(submission: SubmissionRecord, name: str) -> Cause | None:
 
 def _unusable(seen: str, errors: list[SourceError]) -> Cause:
     return Cause(
-        seen, "Mend package.xml at the line that is named here.", Evidence(places=tuple(errors))
+        seen, "Correct package.xml at the line that is named here.", Evidence(places=tuple(errors))
     )
 
 
@@ -159,7 +159,7 @@ def _never_begun(submission: SubmissionRecord, build: BuildRecord, name: str) ->
         why = f": {build.culprit}" if build.culprit and broken == blamed else ""
         return Cause(
             f"it was not built, because {codes(broken)} failed to build{why}",
-            f"Mend {codes(broken)} first: `colcon build --packages-select {broken[0]}`.",
+            f"Correct {codes(broken)} first: `colcon build --packages-select {broken[0]}`.",
             _evidence(build, broken[0]),
         )
     lacking = sorted({what for one in blamed for what in _lacking(submission, build, one)})
@@ -218,7 +218,7 @@ def _failed(build: BuildRecord, name: str) -> Cause:
         f"`colcon build` failed: {why}" if why else "`colcon build` failed",
         _mend_marker(marker[1], name)
         if marker
-        else f"Run `colcon build --packages-select {name}` in the workspace and mend the first "
+        else f"Run `colcon build --packages-select {name}` in the workspace and correct the first "
         "error that it prints.",
         _evidence(build, name),
     )

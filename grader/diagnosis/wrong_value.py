@@ -120,9 +120,9 @@ def _scaled(one: Difference, tolerance: float) -> str | None:
         return f"the sign of {one.field} is wrong"
     for factor, words in _FACTORS.items():
         if math.isclose(ratio, factor, rel_tol=_FACTOR_TOLERANCE):
-            return f"{one.field} is {words} too large: a slip of units or of the point"
+            return f"{one.field} is {words} too large: a mistake of units or of the decimal point"
         if math.isclose(ratio, 1.0 / factor, rel_tol=_FACTOR_TOLERANCE):
-            return f"{one.field} is {words} too small: a slip of units or of the point"
+            return f"{one.field} is {words} too small: a mistake of units or of the decimal point"
     # Three digits, for people type 57.3 and 3.14.
     if math.isclose(ratio, math.degrees(1.0), rel_tol=2e-3):
         return f"{one.field} is in degrees: ROS has angles in radians (REP-103)"

@@ -178,7 +178,7 @@ class TestBlocked:
 
     def test_a_loop_in_a_callback(self):
         found = failing("executor.responsive", recording(calls=calls(None)))
-        assert "something keeps the executor from coming round" in found
+        assert "something blocks the executor" in found
         assert "never called" not in found
 
     def test_a_timer_of_zero(self):

@@ -467,7 +467,7 @@ class TestSilence:
     def test_a_callback_that_logs_nothing(self):
         found = front(lines("1.37 -0.62", ODOM_TIMES_S))
         assert "nothing is logged when messages come on `/scan`" in found
-        assert "its executor comes round" in found
+        assert "its executor spins" in found
         assert "debug()" in found
 
     def test_no_subscription(self):
@@ -546,11 +546,13 @@ class TestSilence:
     def test_an_executor_that_another_callback_blocks(self):
         calls = (call(0.5, of=BOT), call(1.5, None, of=BOT), call(2.0, None, of=BOT))
         found = front(lines("1.37 -0.62", ODOM_TIMES_S), calls=calls)
-        assert "something keeps the executor from coming round" in found
+        assert "something blocks the executor" in found
         assert "from 1.50 s after launch on the node's parameter service answers no call" in found
         assert "`while True`" in found
         busy = taken(1.0, 4.0, waited_s=2.0)
-        assert "coming round" in front(lines("1.37 -0.62", [1.0]), calls=calls, disturbance=busy)
+        assert "blocks the executor" in front(
+            lines("1.37 -0.62", [1.0]), calls=calls, disturbance=busy
+        )
 
     def test_an_executor_that_answers_is_not_blocked(self):
         calls = (call(1.5, None, of=BOT), call(3.2, of=BOT))

@@ -69,7 +69,7 @@ class TestContains:
     def test_a_timer_that_never_comes_to_log(self):
         blocked = logging(calls=(call(0.5, None), call(1.5, None), call(2.5, None)))
         found = failing("log.contains", blocked, **READY)
-        assert "something keeps the executor from coming round" in found
+        assert "something blocks the executor" in found
         assert "get_logger" not in found
         slow = logging(calls=tuple(call(0.5 + 0.6 * n, 0.55) for n in range(5)))
         found = failing("log.rate", slow, text="ready", at_least="1 Hz")

@@ -130,7 +130,7 @@ class TestResponds:
     def test_a_callback_that_blocks_the_executor(self):
         silent = tuple(call(1.5 + 0.5 * n, None) for n in range(4))
         run = serving(asked(answer_s=None), *silent)
-        assert "keeps the executor from coming round" in failing("service.responds", run, **TRUE)
+        assert "something blocks the executor" in failing("service.responds", run, **TRUE)
 
     def test_nothing_is_said_of_an_executor_that_was_not_asked(self):
         found = failing("service.responds", serving(asked(1.0, None)), **TRUE)

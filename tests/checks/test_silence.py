@@ -123,14 +123,14 @@ class TestNotAnswered:
     def test_an_executor_that_is_blocked(self):
         calls = tuple(call(0.5 * n, None) for n in range(2, 6))
         found = why(asked(listener(), times_s=every(0.3, 5), calls=calls))
-        assert "something keeps the executor from coming round" in found
+        assert "something blocks the executor" in found
         assert "`while True`, time.sleep() or input()" in found
 
     def test_a_callback_that_burns_a_cpu_is_the_student_s_on_a_busy_machine_too(self):
         busy = taken(0.4, 4.4, waited_s=2.5)
         calls = (call(0.2), *(call(0.5 * n, None) for n in range(2, 9)))
         run = asked(listener(), times_s=every(0.3, 5), calls=calls, disturbance=busy)
-        assert "something keeps the executor from coming round" in why(run)
+        assert "something blocks the executor" in why(run)
         # It is run again all the same, and counts if it happens twice.
         assert judge("messages.count", run, topic="/cmd_vel", at_least=1).disturbed
 
@@ -186,4 +186,4 @@ def test_a_blocked_executor_without_a_stimulus():
         calls=tuple(call(0.5 * n, None) for n in range(2, 6)),
         processes=(process(stopped_by="SIGKILL"),),
     )
-    assert "something keeps the executor from coming round" in why(run)
+    assert "something blocks the executor" in why(run)

@@ -341,7 +341,7 @@ class TestMistakes:
     def test_a_callback_that_takes_twice_the_period(self):
         waiting = tuple(call(0.8 + 0.5 * n, 0.4) for n in range(6))
         found = wrong([0.6] * 8, calls=waiting)
-        assert "the executor does not come round to it in time" in found
+        assert "the executor does not call it in time" in found
 
     def test_a_callback_that_takes_longer_than_the_period(self):
         found = wrong([0.42] * 10, calls=tuple(call(0.8 + 0.5 * n, 0.4) for n in range(6)))
@@ -350,7 +350,7 @@ class TestMistakes:
 
     def test_a_timer_that_is_reset_in_its_callback(self):
         found = wrong([0.32] * 10)
-        assert "20 ms too long, although the executor comes round in time" in found
+        assert "20 ms too long, although the executor is not blocked" in found
         assert "timer.reset()" in found and "Keep callbacks short" not in found
 
     def test_a_timer_made_anew_in_each_callback(self):

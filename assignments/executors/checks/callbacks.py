@@ -185,7 +185,7 @@ def _by_chance(
 ) -> Finding | None:
     """The finding where the work alone may have made the period, or None.
 
-    An executor that is never free calls each of its timers when it comes round, however short
+    An executor that is never free calls each of its timers when it can, however short
     their periods are. Only then it matters what the process declared, and it decides nothing.
     """
     begins = [item.begin_ns for item in reports.of(callback)]
@@ -325,7 +325,7 @@ def _judge_messages(
         expected,
         observed,
         "A queue size of 10 keeps the messages that come while the callback works. Look for a "
-        "callback that works too long, for one that keeps the executor from coming round, and for "
+        "callback that works too long, for one that blocks the executor, and for "
         "an `if` that leaves messages out.",
         evidence,
     )

@@ -1,4 +1,4 @@
-"""Checks of the executor: whether callbacks let it come round."""
+"""Checks of the executor: whether callbacks block it."""
 
 from __future__ import annotations
 
@@ -271,7 +271,7 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
             evidence,
         )
     return why_not_given(recording, seen, (group.node,), evidence.moments) or Cause(
-        f"{seen}: something keeps the executor from coming round{where}",
+        f"{seen}: something blocks the executor{where}",
         "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
         "callback, in the constructor or in a loop around spin_once(), and let a timer call again "
         "instead.",

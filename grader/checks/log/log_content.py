@@ -218,7 +218,7 @@ def level(recording: Recording, parameters: Worst) -> Finding:
         expected,
         f"{counted(len(severe), 'log message')} above it, the first {first.level}: "
         f"{quote(first.text)}",
-        "Mend what it complains about; what is no problem is logged with "
+        "Correct what it warns about; what is no problem is logged with "
         "self.get_logger().info('...') or debug('...').",
         _evidence(recording, severe),
     )

@@ -303,8 +303,8 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     return Finding.failed(
         expected,
         " and ".join(seen),
-        "What is in proportion to the error slows down before the goal, with a gain that is not "
-        "too large: look at the commands of the last second before it.",
+        "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
+        "Make the gain smaller, so that linear.x is below its limit before the robot arrives.",
         Evidence(
             moments=(Moment("at the goal", recording.since_launch_s(run.truth[arrival].time_ns)),),
             plots=evidence.plots,

@@ -66,7 +66,7 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
         return Finding.failed(
             expected,
             f"the imports cannot be read: {unreadable}",
-            "Mend the syntax error first.",
+            "Correct the syntax error first.",
             Evidence(places=(unreadable,)),
         )
     missing, unknown = _missing(package), _unknown(submission, package)

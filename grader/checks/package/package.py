@@ -100,12 +100,12 @@ def _why_unreadable(package: PackageRecord) -> Cause | None:
         errors.append(error)
     if not errors:
         return None
-    mend = "Mend this line or the one before it"
+    hint = "Correct this line or the one before it"
     if "null bytes" in errors[0].message:
-        mend = "Save this file as plain text in UTF-8, not in UTF-16"
+        hint = "Save this file as plain text in UTF-8, not in UTF-16"
     return Cause(
         f"Python cannot read {errors[0]}",
-        f"{mend}; `colcon build` prints the error too, but goes on.",
+        f"{hint}; `colcon build` prints the error too, but goes on.",
         Evidence(places=tuple(dict.fromkeys(errors))),
     )
 

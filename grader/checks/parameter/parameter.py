@@ -212,7 +212,7 @@ def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
     return taken or Cause(
         seen,
         "A callback must return soon: no time.sleep() and no waiting in it. The node answers only "
-        "when its executor comes round.",
+        "while its executor spins.",
         Evidence(moments=(Moment("asked", recording.since_launch_s(slow.requested_ns)),)),
     )
 

@@ -45,7 +45,7 @@ class LateJoiner(Parameters):
 
 @check("qos.late_joiner", Subject.RECORDING, LateJoiner)
 def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
-    """Who joins late gets the last messages, and no more.
+    """A late joiner gets the last messages, and no more.
 
     Judged by behaviour: a subscription of the probe joins in the middle of the run, and gets the
     last messages that were published before (`last` of them, or none for 0), as the durability

@@ -51,7 +51,7 @@ def _python_files(submission: SubmissionRecord, name: str) -> PackageRecord | Ca
     if package.syntax_errors:
         return Cause(
             f"Python cannot read {package.syntax_errors[0]}",
-            "Mend this line or the one before it.",
+            "Correct this line or the one before it.",
             Evidence(places=package.syntax_errors[:_MOST_PLACES]),
         )
     if not package.sources:

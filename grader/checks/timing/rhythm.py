@@ -1,4 +1,4 @@
-"""What a wrong rhythm of messages tells: a slip of units, two timers, sleeping, a slow callback."""
+"""What a wrong rhythm of messages tells: wrong units, two timers, sleeping, a slow callback."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def _wrong_period(
         if short_s is not None and short_s < median_s < wanted_s:
             return Explanation(
                 f"the process declared a timer of {format_duration(short_s)}, 1/{factor:g} of the "
-                "expected period, and its callback does not come round that often",
+                "expected period, and its callback is not called that often",
                 _seconds_hint(limits),
             )
     skipped = _skipped(recording, declared, verdict, limits)
@@ -149,7 +149,7 @@ def _wrong_period(
         )
     if right and verdict.regular and _comes_round(recording, limits):
         return Explanation(
-            f"{longer} too long, although the executor comes round in time: the timer of {wanted} "
+            f"{longer} too long, although the executor is not blocked: the timer of {wanted} "
             "is started anew after its callback was called",
             "timer.reset() lets the period begin anew: without it the timer goes on by itself, and "
             "keeps its period whatever the callback needs.",
@@ -157,7 +157,7 @@ def _wrong_period(
     if right:
         return Explanation(
             f"{longer} too long: the process declared a timer of {wanted}, but the executor "
-            "does not come round to it in time",
+            "does not call it in time",
             "Keep callbacks short: no sleep, no loop that waits, no long computation in them, nor "
             "in a loop around spin_once().",
         )

@@ -1,4 +1,4 @@
-"""Whether something keeps an executor from coming round, as the node's own services tell."""
+"""Whether something blocks an executor, as the node's own services tell."""
 
 from __future__ import annotations
 
@@ -83,14 +83,14 @@ def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> C
 def why_blocked(
     recording: Recording, seen: str, nodes: Collection[str], since_ns: int
 ) -> Cause | None:
-    """The cause if an executor never comes round, as unanswered calls to its node tell."""
+    """The cause if an executor is blocked, as unanswered calls to its node tell."""
     call = first_unanswered(recording, nodes, since_ns)
     if call is None:
         return None
     where, evidence = where_blocked(recording, min(nodes), call)
     since_s = recording.since_launch_s(call.requested_ns)
     return Cause(
-        f"{seen}: something keeps the executor from coming round{where}; from {since_s:.2f} s "
+        f"{seen}: something blocks the executor{where}; from {since_s:.2f} s "
         "after launch on the node's parameter service answers no call either",
         HINT,
         evidence,

@@ -115,7 +115,7 @@ def _head(result: Result) -> str:
 
 
 def first_to_fix(result: Result) -> list[str]:
-    """What to mend first, and where; no lines where nothing failed."""
+    """What to correct first, and where; no lines where nothing failed."""
     first = next((check for check in result.checks if check.id == result.first_to_fix), None)
     if first is None:
         return []

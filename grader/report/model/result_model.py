@@ -167,7 +167,7 @@ class FindingPart(_Part):
 class CheckPart(FindingPart):
     """A check: what it said of the scenario that decided, and of the others.
 
-    ``waits_for`` names the checks to mend first where this one was skipped, ``author_hint``
+    ``waits_for`` names the checks to correct first where this one was skipped, ``author_hint``
     is the instructor's own hint to a check that did not pass.
     """
 

@@ -352,7 +352,7 @@ def _patch_events_executor(module: Any) -> None:
 
 
 def _wait_in_slices(executor_class: Any) -> None:
-    """Mend the wheels' EventsExecutor, whose waits without a limit end at once, again and again.
+    """Repair the wheels' EventsExecutor, whose waits without a limit end at once, again and again.
 
     It waits until the latest time that there is, and the standard library of C++ that the wheels
     were built with makes one of it that is over. A wait with a limit is right.

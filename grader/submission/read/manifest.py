@@ -158,7 +158,7 @@ def _parse(data: bytes) -> _Document:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         if error.code in _UNCLOSED and path:
-            # The place to mend is where the element begins, not where expat noticed.
+            # The place to correct is where the element begins, not where expat noticed.
             document.error = (opened[-1], f"invalid XML: <{path[-1]}> is not closed")
         else:
             reason = expat.ErrorString(error.code)
