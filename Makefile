@@ -21,7 +21,7 @@ lint: setup ## check style, types, imports between folders and dead code; print 
 	@$(run) -m mypy --no-error-summary
 	@broken=$$(.venv/bin/lint-imports --no-logo --no-cache) || { echo "$$broken"; exit 1; }
 	@.venv/bin/vulture
-	@for folder in $$(ls -d grader/*/) grader sim tests assignments; do \
+	@for folder in $$(ls -d grader/[a-z]*/) grader sim tests assignments; do \
 		printf '%6d %s\n' "$$(find $$folder -name '*.py' | xargs cat | wc -l)" "$${folder%/}"; done
 
 lock: setup ## regenerate requirements.lock; UPGRADE=1 to newer versions

@@ -20,14 +20,15 @@ from typing import Any
 from pydantic import BaseModel
 
 from grader import resources
-from grader.assignment import asking, limits, model, mutant, stimulus
+from grader.assignment import limits, model, mutant
 from grader.assignment.lesson_checks import FOLDER, lesson_checks
+from grader.assignment.stimuli import request, stimulus
 from grader.checks import finding
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.checks.tolerance import TimeTolerance
 from grader.diagnosis.explanation import explanations
-from grader.recording import interaction
+from grader.recording import event, interaction, simulated
 from grader.recording import model as recording
 from grader.spec.unit import UNITS, Dimension, format_duration
 from sim import description, world_model
@@ -46,11 +47,11 @@ _ASSIGNMENT_SECTIONS: dict[str, type[BaseModel]] = {
     "stimuli: join": stimulus.Join,
     "stimuli: kill": stimulus.Kill,
     "stimuli: restart": stimulus.Restart,
-    "stimuli: call": asking.CallService,
-    "stimuli: call list_parameters": asking.ListParameters,
-    "stimuli: read_parameters": asking.ReadParameters,
-    "stimuli: set_parameters": asking.SetParameters,
-    "stimuli: send_goal": asking.SendGoal,
+    "stimuli: call": request.CallService,
+    "stimuli: call list_parameters": request.ListParameters,
+    "stimuli: read_parameters": request.ReadParameters,
+    "stimuli: set_parameters": request.SetParameters,
+    "stimuli: send_goal": request.SendGoal,
     "until": model.Until,
     "limits": limits.LimitOptions,
     "build_limits": limits.BuildLimitOptions,
@@ -136,12 +137,12 @@ _RECORDED = (
     interaction.Feedback,
     interaction.Service,
     recording.Join,
-    recording.Intervention,
-    recording.Truth,
-    recording.Incident,
-    recording.Scene,
+    event.Intervention,
+    simulated.Truth,
+    simulated.Incident,
+    simulated.Scene,
     recording.Declaration,
-    recording.Disturbance,
+    event.Disturbance,
 )
 _FOUND = (finding.Finding, finding.Evidence, finding.Moment, finding.Plot, finding.Table)
 _READABLE = (FunctionType, property, cached_property)

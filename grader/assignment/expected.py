@@ -9,13 +9,13 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from grader.assignment.asking import CallService, SendGoal
 from grader.assignment.binding import BoundCheck
 from grader.assignment.interfaces import Interfaces
-from grader.assignment.message import Find
 from grader.assignment.model import Assignment, Scenario
-from grader.assignment.requests import SEPARATOR
-from grader.assignment.stimulus import Publish
+from grader.assignment.stimuli.message import Find
+from grader.assignment.stimuli.request import CallService, SendGoal
+from grader.assignment.stimuli.request_values import SEPARATOR
+from grader.assignment.stimuli.stimulus import Publish
 from grader.checks.check import NamedFields
 from grader.checks.field import value_at
 from grader.checks.value import NoSuchField, expected_leaves, tolerance_of, unreachable

@@ -9,11 +9,12 @@ from hashlib import sha256
 from pathlib import Path
 
 from grader import resources
-from grader.assignment import expected, interfaces, rules, simulation, stimulation
+from grader.assignment import expected, interfaces, rules, simulation
 from grader.assignment.binding import BoundCheck, bind, tell_apart
 from grader.assignment.draft import Draft
 from grader.assignment.lesson_checks import lesson_checks
 from grader.assignment.model import Assignment, Scenario
+from grader.assignment.stimuli import stimulus_rules as stimulation
 from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject

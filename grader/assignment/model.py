@@ -12,7 +12,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict, Field, model_validator
 
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
-from grader.assignment.stimulus import Stimulus
+from grader.assignment.stimuli.stimulus import Stimulus
 from grader.spec.name import (
     Durability,
     Id,

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any
 
-from grader.assignment.asking import CallService, ReadParameters, SendGoal, SetParameters
 from grader.assignment.binding import BoundCheck
 from grader.assignment.draft import Draft
 from grader.assignment.model import Package, Scenario
-from grader.assignment.stimulus import Join, Publish
+from grader.assignment.stimuli.request import CallService, ReadParameters, SendGoal, SetParameters
+from grader.assignment.stimuli.stimulus import Join, Publish
 from grader.checks.need import (
     Called,
     GoalSent,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from grader.assignment.drawing import draw_values, fill_in, world_values
 from grader.assignment.model import Assignment, Scenario
+from grader.assignment.random_values import draw_values, fill_in, world_values
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.spec.document import Place
 from grader.spec.source import Source, read_source

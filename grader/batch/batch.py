@@ -14,7 +14,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.batch.executor import BatchExecutor, ExecutorLost
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE
-from grader.batch.intake import HandedIn
+from grader.batch.handed_in import HandedIn
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault

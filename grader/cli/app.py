@@ -31,8 +31,8 @@ from grader.cli import (
     start,
     watch,
 )
-from grader.cli.console import print_error
-from grader.cli.streams import lasting_streams
+from grader.cli.screen.console import print_error
+from grader.cli.screen.streams import lasting_streams
 from grader.errors import GraderFault, RosgradeError, machine_fault
 
 USAGE = 2

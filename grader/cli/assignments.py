@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.console import output_console
 from grader.cli.options import AssignmentName
+from grader.cli.screen.console import output_console
 
 
 def list_command() -> None:

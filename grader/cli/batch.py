@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.console import output_console
 from grader.cli.options import AssignmentName, Quiet, Seed, assignment_places
-from grader.cli.progress import ClassProgress
 from grader.cli.sandbox import Choice, SandboxChoice
+from grader.cli.screen.console import output_console
+from grader.cli.screen.progress import ClassProgress
 from grader.errors import UsageError
 from grader.scratch import Scratch
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from grader.batch.batch import Done
     from grader.batch.executor import BatchExecutor
-    from grader.batch.intake import HandedIn
+    from grader.batch.handed_in import HandedIn
     from grader.batch.roster import Roster
 
 NOT_GRADED = 3

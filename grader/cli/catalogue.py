@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from grader.checks.wording import counted
-from grader.cli.console import output_console, print_error, print_warning
+from grader.cli.screen.console import output_console, print_error, print_warning
 from grader.errors import RosgradeError
 
 

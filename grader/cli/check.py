@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from grader.cli.ahead import while_it_starts
-from grader.cli.console import output_console
 from grader.cli.formats import (
     Classroom50,
     FormatFiles,
@@ -21,7 +20,6 @@ from grader.cli.formats import (
     JunitFamilyName,
     with_file_formats,
 )
-from grader.cli.live import GradingProgress
 from grader.cli.options import (
     AssignmentName,
     Checks,
@@ -34,6 +32,8 @@ from grader.cli.options import (
     assignment_places,
 )
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
+from grader.cli.screen.console import output_console
+from grader.cli.screen.live import GradingProgress
 from grader.resources import cache_folder
 
 FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
@@ -133,7 +133,7 @@ def check(
             console.print(f"Installed: {keep_install(graded, report)}", soft_wrap=True)
     formats.write(written.result, submission)
     if open_report:
-        from grader.cli.browser import open_page
+        from grader.cli.screen.browser import open_page
 
         open_page(written.report.resolve().as_uri())
     grade = graded.grade

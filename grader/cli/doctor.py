@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from grader.cli.console import output_console
+from grader.cli.screen.console import output_console
 
 
 def doctor() -> None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.console import output_console, print_error, print_warning
 from grader.cli.options import AssignmentName
+from grader.cli.screen.console import output_console, print_error, print_warning
 
 if TYPE_CHECKING:
     from grader.report.model.class_row import RowStatus

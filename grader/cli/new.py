@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.console import output_console
+from grader.cli.screen.console import output_console
 
 
 def new(

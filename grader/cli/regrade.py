@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.console import output_console
 from grader.cli.options import Quiet
-from grader.cli.progress import ClassProgress
+from grader.cli.screen.console import output_console
+from grader.cli.screen.progress import ClassProgress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

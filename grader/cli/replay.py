@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.live import GradingProgress
 from grader.cli.options import Quiet
+from grader.cli.screen.live import GradingProgress
 from grader.resources import cache_folder
 from grader.scratch import Scratch
 

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from grader.cli.console import output_console
 from grader.cli.formats import (
     FormatFiles,
     Formats,
@@ -18,6 +17,7 @@ from grader.cli.formats import (
     JunitFamilyName,
     with_file_formats,
 )
+from grader.cli.screen.console import output_console
 
 
 @with_file_formats

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.console import Progress, output_console
 from grader.cli.options import Quiet
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
+from grader.cli.screen.console import Progress, output_console
 from grader.resources import cache_folder
 
 if TYPE_CHECKING:

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.console import output_console, print_error
-from grader.cli.live import GradingProgress
 from grader.cli.options import (
     AssignmentName,
     Checks,
@@ -25,6 +23,8 @@ from grader.cli.options import (
     assignment_places,
 )
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
+from grader.cli.screen.console import output_console, print_error
+from grader.cli.screen.live import GradingProgress
 from grader.resources import cache_folder
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from grader.assignment.load import LoadedAssignment
     from grader.batch.grading import Graded, Grading
-    from grader.cli.page import ReportPage
+    from grader.cli.screen.page import ReportPage
     from grader.errors import RosgradeError
     from grader.grade import Grade
     from grader.run.runner import Runner
@@ -72,8 +72,8 @@ def watch(
     from grader.assignment.load import load_assignment, refuse_swapped
     from grader.assignment.selection import select, visible_part
     from grader.batch.files import refuse_foreign
-    from grader.cli.browser import open_page
-    from grader.cli.page import ReportPage
+    from grader.cli.screen.browser import open_page
+    from grader.cli.screen.page import ReportPage
     from grader.errors import UsageError
     from grader.report.files import check_folder, refuse_inputs
     from grader.run.runner import Runner

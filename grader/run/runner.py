@@ -57,7 +57,7 @@ def scenario_seed(assignment: str, scenario: str, submission_sha256: str, base: 
 
 def ros_arguments(launch: Launch, values: dict[str, float]) -> tuple[str, ...]:
     """Command line arguments of a launch, as ``ros2 run`` passes them on."""
-    from grader.assignment.drawing import fill_in
+    from grader.assignment.random_values import fill_in
 
     rules: list[str] = []
     if launch.name:
@@ -130,7 +130,7 @@ def _until(until: UntilModel) -> Until:
 def _simulator(
     scenario: Scenario, worlds: Path, values: dict[str, float], seed: int
 ) -> SimulatorOrder | None:
-    from grader.assignment.drawing import world_values
+    from grader.assignment.random_values import world_values
     from sim.description import SimulatorOptions
 
     if scenario.world is None:
@@ -316,7 +316,7 @@ class Runner:
         worlds: Path,
         remaps: Sequence[str],
     ) -> CellOrder:
-        from grader.assignment.drawing import draw_values
+        from grader.assignment.random_values import draw_values
 
         scratch = folder / SCRATCH
         scratch.mkdir()

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.asking import CallService, SetParameters
 from grader.assignment.load import load_assignment
-from grader.assignment.requests import requests_of, values_of
+from grader.assignment.stimuli.request import CallService, SetParameters
+from grader.assignment.stimuli.request_values import requests_of, values_of
 from grader.errors import AssignmentError
 
 HEAD = """\

@@ -14,7 +14,8 @@ from grader.assignment.own_check import load_own_check
 from grader.checks.check import Check
 from grader.checks.finding import Evidence, Finding
 from grader.recording.interaction import Goal
-from grader.recording.model import Endpoint, Message, Recording, Scene, Truth
+from grader.recording.model import Endpoint, Message, Recording
+from grader.recording.simulated import Scene, Truth
 
 
 def test_the_files_in_docs_are_up_to_date(capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,9 +20,9 @@ from assignments.quaternion.checks.conversion import (
     oracle,
     rotations_of_answers,
 )
-from grader.assignment.drawing import draw_values, world_values
 from grader.assignment.load import load_assignment
 from grader.assignment.own_check import load_function
+from grader.assignment.random_values import draw_values, world_values
 from grader.assignment.simulation import read_scenario_world
 from grader.checks.field import value_at
 from grader.checks.log.printed import shows

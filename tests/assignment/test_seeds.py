@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from grader.assignment.drawing import draw_values, world_values
 from grader.assignment.load import load_assignment
 from grader.assignment.model import Scenario
+from grader.assignment.random_values import draw_values, world_values
 from grader.assignment.simulation import read_scenario_world
 from grader.checks.messages.following import Follows
 from sim.robot import make_robot

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.drawing import draw_values, fill_in
 from grader.assignment.load import load_assignment
 from grader.assignment.model import Scenario
+from grader.assignment.random_values import draw_values, fill_in
 from grader.errors import AssignmentError, UsageError
 
 YAML = """\

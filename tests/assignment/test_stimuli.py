@@ -10,8 +10,8 @@ import pytest
 from mcap_ros2.writer import Writer
 
 from grader.assignment.load import load_assignment
-from grader.assignment.messages import messages_of
-from grader.assignment.stimulus import Publish
+from grader.assignment.stimuli.stimulus import Publish
+from grader.assignment.stimuli.stimulus_messages import messages_of
 from grader.errors import AssignmentError
 
 HEAD = """\

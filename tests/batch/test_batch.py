@@ -24,7 +24,8 @@ from grader.batch.class_files import class_rows, copies, notes
 from grader.batch.executor import BatchExecutor, ExecutorLost, LocalExecutor
 from grader.batch.files import RESULT_FILE
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Grading
-from grader.batch.intake import HandedIn, take_in
+from grader.batch.handed_in import HandedIn
+from grader.batch.intake import take_in
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.rendering import find_reports
 from grader.batch.roster import parse_roster

@@ -26,8 +26,9 @@ from grader.batch.rendering import find_reports, render_all
 from grader.batch.selftest import Role, Trial, mutation_score, run_trial
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError
+from grader.recording.event import Disturbance
 from grader.recording.mcap_writer import write_recording
-from grader.recording.model import Disturbance, Ending, Endpoint, Kind, Node, Owner, Qos, Recording
+from grader.recording.model import Ending, Endpoint, Kind, Node, Owner, Qos, Recording
 from grader.report.model.facts import Clock
 from grader.run.runner import Runner
 from grader.submission.build.build_limits import BuildLimits

@@ -9,7 +9,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, expect
 
 from grader.assignment.load import load_assignment
-from grader.cli.page import ReportPage
+from grader.cli.screen.page import ReportPage
 from grader.report.html.handout import make_handout, render_handout
 from grader.report.html.report import render_report
 from tests.report.sample import full_points, lost_points

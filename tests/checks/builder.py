@@ -14,14 +14,13 @@ from typing import Any
 
 from grader.assignment.lesson_checks import all_checks
 from grader.checks.finding import Finding, Status
+from grader.recording.event import Disturbance
 from grader.recording.model import (
     NS,
     Call,
     Declaration,
-    Disturbance,
     Ending,
     Endpoint,
-    Incident,
     Join,
     Kind,
     LogLine,
@@ -31,9 +30,8 @@ from grader.recording.model import (
     Process,
     Qos,
     Recording,
-    Scene,
-    Truth,
 )
+from grader.recording.simulated import Incident, Scene, Truth
 from grader.submission.record import (
     BuildRecord,
     Dependency,

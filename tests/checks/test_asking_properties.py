@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.finding import Finding, Status
+from grader.recording.event import Disturbance
 from grader.recording.interaction import Feedback, Goal, Service
-from grader.recording.model import Call, Disturbance, LogLine
+from grader.recording.model import Call, LogLine
 from tests.checks.builder import LAUNCH_NS, NODE, died, judge, process, recording
 from tests.checks.test_catalogue import PARAMETERS
 

@@ -21,7 +21,6 @@ from grader.recording.model import (
     Declaration,
     Ending,
     Endpoint,
-    Incident,
     Kind,
     LogLine,
     Message,
@@ -30,9 +29,8 @@ from grader.recording.model import (
     Process,
     Qos,
     Recording,
-    Scene,
-    Truth,
 )
+from grader.recording.simulated import Incident, Scene, Truth
 from sim.motion import ORIGIN, Pose
 from sim.script import MovingObstacle, Waypoint
 from tests.checks.builder import (

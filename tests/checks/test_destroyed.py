@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.recording.model import Intervention, Kind
+from grader.recording.event import Intervention
+from grader.recording.model import Kind
 from tests.checks.asking import acting, action, asked, goal, parameters_read, service, serving
 from tests.checks.builder import (
     BOT,

@@ -9,7 +9,9 @@ import pytest
 
 from grader.checks.doubt import is_doubtful
 from grader.checks.need import Doubt
-from grader.recording.model import NS, Breach, Call, Disturbance, Recording, Truth
+from grader.recording.event import Breach, Disturbance
+from grader.recording.model import NS, Call, Recording
+from grader.recording.simulated import Truth
 from tests.checks.builder import LAUNCH_NS, process, recording, taken
 
 SERVICE = "/bot_publisher/list_parameters"

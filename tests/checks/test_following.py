@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from grader.checks.finding import Status
 from grader.checks.messages.source_value import yaw
-from grader.recording.model import Kind, Recording, Scene
+from grader.recording.model import Kind, Recording
+from grader.recording.simulated import Scene
 from tests.checks.builder import (
     declarations,
     endpoint,

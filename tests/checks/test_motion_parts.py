@@ -16,7 +16,8 @@ from grader.checks.reference import (
     GoalPose,
     UnknownValue,
 )
-from grader.recording.model import NS, Scene, Truth
+from grader.recording.model import NS
+from grader.recording.simulated import Scene, Truth
 from sim.motion import ORIGIN, Pose
 from sim.script import MovingObstacle, Waypoint
 from tests.checks.builder import (

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
-from grader.recording.model import Incident, Kind, Owner, Qos
+from grader.recording.model import Kind, Owner, Qos
+from grader.recording.simulated import Incident
 from tests.checks.builder import (
     INSTALLED,
     SOURCE,

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.recording.model import Breach, Ending, Intervention, Kind, Owner, Wait
+from grader.recording.event import Breach, Intervention, Wait
+from grader.recording.model import Ending, Kind, Owner
 from grader.submission.record import BuildRecord, SourceError
 from tests.checks.builder import (
     BOT,

@@ -7,7 +7,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
-from grader.recording.model import NS, Disturbance, Ending, Kind
+from grader.recording.event import Disturbance
+from grader.recording.model import NS, Ending, Kind
 from tests.checks.builder import (
     PERIOD_S,
     after,

@@ -13,7 +13,7 @@ from tests.cli.conftest import ROOT, Rosgrade
 from tests.cli.test_check import REFERENCE
 
 URL = "http://127.0.0.1:8123/"
-OPEN = f"from grader.cli.browser import open_page; open_page({URL!r})"
+OPEN = f"from grader.cli.screen.browser import open_page; open_page({URL!r})"
 
 
 def opened(folder: Path, browser: str | None) -> subprocess.CompletedProcess[str]:

@@ -10,8 +10,8 @@ import threading
 import pytest
 from rich.console import Console
 
-from grader.cli import live
-from grader.cli.live import Activity, GradingProgress
+from grader.cli.screen import live
+from grader.cli.screen.live import Activity, GradingProgress
 
 LAUNCHING = {"event": "launching", "process": "bot_publisher/bot_pub"}
 WAITING = {"event": "waiting", "what": "a publisher on /cmd_vel"}

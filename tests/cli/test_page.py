@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.cli.page import ReportPage
+from grader.cli.screen.page import ReportPage
 
 
 @pytest.fixture

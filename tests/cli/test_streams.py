@@ -86,7 +86,7 @@ def test_what_nobody_reads_to_the_end_is_no_fault(tmp_path: Path) -> None:
 def test_a_pipe_that_somebody_made_non_blocking_is_waited_for(tmp_path: Path) -> None:
     program = (
         "import os; os.set_blocking(1, False); os.set_blocking(2, False)\n"
-        "from grader.cli.streams import lasting_streams\n"
+        "from grader.cli.screen.streams import lasting_streams\n"
         "with lasting_streams(): print(os.get_blocking(1), os.get_blocking(2))\n"
     )
     ended = shell(tmp_path, f'{sys.executable} -c "{program}"')
@@ -95,7 +95,7 @@ def test_a_pipe_that_somebody_made_non_blocking_is_waited_for(tmp_path: Path) ->
 
 def test_unbuffered_output_comes_at_once() -> None:
     program = (
-        "from grader.cli.streams import lasting_streams\n"
+        "from grader.cli.screen.streams import lasting_streams\n"
         "with lasting_streams(): print('now'); input(); print('later')\n"
     )
     with subprocess.Popen(

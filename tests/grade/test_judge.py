@@ -10,7 +10,9 @@ from grader.checks.finding import Evidence, Finding, Moment, Status
 from grader.checks.motion.robot_check import RobotParameters
 from grader.errors import GraderFault
 from grader.grade import grade
-from grader.recording.model import NS, Disturbance, Ending, Truth
+from grader.recording.event import Disturbance
+from grader.recording.model import NS, Ending
+from grader.recording.simulated import Truth
 from grader.submission.record import BuildRecord, Import, PackageRecord, SourceError
 from tests.grade.sample import (
     FAIL,

@@ -13,17 +13,15 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from grader.errors import UsageError
+from grader.recording.event import Disturbance, Intervention, Wait
 from grader.recording.interaction import Feedback, Goal, Service
 from grader.recording.mcap_reader import read_recording
 from grader.recording.mcap_writer import RawMessage, write_recording
 from grader.recording.model import (
     Call,
     Declaration,
-    Disturbance,
     Ending,
     Endpoint,
-    Incident,
-    Intervention,
     Join,
     Kind,
     LogLine,
@@ -32,10 +30,8 @@ from grader.recording.model import (
     Process,
     Qos,
     Recording,
-    Scene,
-    Truth,
-    Wait,
 )
+from grader.recording.simulated import Incident, Scene, Truth
 from grader.submission.read.code_facts import (
     Lint,
     LintFinding,

@@ -8,7 +8,8 @@ from dataclasses import replace
 from grader.checks.finding import Case, Cases, Comparison, Evidence, Finding, Moment, Plot, Span
 from grader.checks.motion.track import speed_plot
 from grader.grade import grade
-from grader.recording.model import Breach, Recording
+from grader.recording.event import Breach
+from grader.recording.model import Recording
 from grader.report.html.replay import Replay, make_replay
 from tests.checks.builder import drive, endpoint, on_scan, output, reader
 from tests.grade.sample import Told, make_loaded, make_submission

@@ -7,18 +7,8 @@ from dataclasses import dataclass, replace
 from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import Grade, grade
-from grader.recording.model import (
-    NS,
-    Breach,
-    Call,
-    Disturbance,
-    LogLine,
-    Message,
-    Node,
-    Owner,
-    Process,
-    Recording,
-)
+from grader.recording.event import Breach, Disturbance
+from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Process, Recording
 from grader.report.model.facts import RunFacts
 from grader.submission.record import BuildRecord, SourceError
 from tests.grade.sample import (

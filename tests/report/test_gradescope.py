@@ -10,7 +10,7 @@ import pytest
 from grader.checks.finding import Finding
 from grader.errors import UsageError
 from grader.grade import grade
-from grader.recording.model import Breach
+from grader.recording.event import Breach
 from grader.report.formats.gradescope import late_s, read_metadata, render_gradescope, unfinished
 from grader.report.model.result import make_result
 from tests.assignment.validator import valid

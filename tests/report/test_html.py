@@ -12,7 +12,8 @@ import pytest
 from grader import resources
 from grader.checks.finding import Finding
 from grader.grade import grade
-from grader.recording.model import Breach, LogLine
+from grader.recording.event import Breach
+from grader.recording.model import LogLine
 from grader.report.html.report import render_report
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
 from tests.report.page import Page

@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 
 from grader.checks.finding import Evidence, Finding
 from grader.grade import grade
-from grader.recording.model import Breach
+from grader.recording.event import Breach
 from grader.report.formats.markdown import COMMENT_BYTES, fence, literal, prose, render_markdown
 from grader.report.model.result import make_result
 from tests.grade.sample import Told, make_loaded, make_submission

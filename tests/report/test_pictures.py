@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.checks.finding import Case, Cases, Comparison, Plot, Span
-from grader.recording.model import Breach, Intervention, Qos
+from grader.recording.event import Breach, Intervention
+from grader.recording.model import Qos
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
 from grader.report.drawing.motion import draw_motion, phases

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from grader.recording.event import Breach
 from grader.recording.model import (
-    Breach,
     Declaration,
     Endpoint,
     Kind,

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from grader.checks.finding import Evidence, Finding
 from grader.grade import grade
-from grader.recording.model import Breach
+from grader.recording.event import Breach
 from grader.report.text.terminal import print_grade
 from tests.grade.sample import Told, make_loaded, make_submission
 from tests.report.sample import (

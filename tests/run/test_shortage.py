@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from grader.recording.model import Breach, Process
+from grader.recording.event import Breach
+from grader.recording.model import Process
 from grader.run.host.memory_shortage import Shortage
 
 KILLED = Process("bot_publisher/bot_pub", 7, 0, 1, -9)

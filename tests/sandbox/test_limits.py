@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.errors import GraderFault
-from grader.recording.model import Breach
+from grader.recording.event import Breach
 from grader.run.process.process_sandbox import ProcessSandbox
 from grader.sandbox.limits import BUILD, Limits
 from grader.sandbox.usage import (

@@ -10,7 +10,8 @@ from grader.checks.motion.track import over_time
 from grader.checks.reference import Goal, UnknownValue
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_moved
-from grader.recording.model import Recording, Truth
+from grader.recording.model import Recording
+from grader.recording.simulated import Truth
 from sim.motion import Pose, wrap_angle
 
 NO_SPEED_M_S = 1e-3

@@ -16,7 +16,8 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.blocked_executor import stuck_callback
-from grader.recording.model import NS, Recording, Truth
+from grader.recording.model import NS, Recording
+from grader.recording.simulated import Truth
 
 _HINT = (
     "Stop early enough: the robot needs time to see (a scan comes every 0.2 s) and to brake, and "

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from grader.recording.model import Truth
+from grader.recording.simulated import Truth
 from sim.motion import wrap_angle
 
 WRAP_HINT = (

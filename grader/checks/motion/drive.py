@@ -30,7 +30,8 @@ from grader.checks.motion.track import (
 from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
-from grader.recording.model import NS, Recording, Scene, Truth
+from grader.recording.model import NS, Recording
+from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import PositiveLength, Ratio, Speed
 from grader.spec.unit import format_duration
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from grader.recording.model import Scene, Truth
+from grader.recording.simulated import Scene, Truth
 from sim.motion import Pose, compose
 from sim.shapes import Capsule, point_clearance_m
 

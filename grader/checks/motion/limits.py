@@ -15,7 +15,8 @@ from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_judged, why_rejected
 from grader.diagnosis.no_messages import why_silent
-from grader.recording.model import Recording, Scene
+from grader.recording.model import Recording
+from grader.recording.simulated import Scene
 from grader.spec.quantity import Ratio
 
 # Limits are written down with three digits.

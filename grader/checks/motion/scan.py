@@ -12,7 +12,8 @@ from grader.checks.motion.command import number, scans
 from grader.checks.motion.ground import Sight
 from grader.checks.motion.measure import metres, side
 from grader.checks.wording import code
-from grader.recording.model import NS, Message, Recording, Truth
+from grader.recording.model import NS, Message, Recording
+from grader.recording.simulated import Truth
 
 _CONE_RAD = math.radians(20.0)
 # What the robot drove on with for longer than this is not what stopped it: a filter of some

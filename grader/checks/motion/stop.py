@@ -23,7 +23,8 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
-from grader.recording.model import NS, Recording, Scene, Truth
+from grader.recording.model import NS, Recording
+from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import Length, PositiveLength, Speed
 from grader.spec.unit import format_duration
 

@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from grader.checks.finding import Plot
-from grader.recording.model import NS, Recording, Truth
+from grader.recording.model import NS, Recording
+from grader.recording.simulated import Truth
 from sim.motion import Pose, wrap_angle
 
 REST_M_S = 1e-3

@@ -20,7 +20,8 @@ from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.recording.model import NS, Recording, Truth
+from grader.recording.model import NS, Recording
+from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, PositiveLength, Speed
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."

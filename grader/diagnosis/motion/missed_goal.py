@@ -19,7 +19,8 @@ from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.diagnosis.motion.off_course import why_unsteered
 from grader.diagnosis.process.blocked_executor import stuck_callback
-from grader.recording.model import NS, Ending, Recording, Truth
+from grader.recording.model import NS, Ending, Recording
+from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration
 
 _WEAVES = 4

@@ -16,7 +16,8 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.recording.model import NS, Truth
+from grader.recording.model import NS
+from grader.recording.simulated import Truth
 from sim.motion import wrap_angle
 
 _WEAVES = 4

@@ -17,7 +17,8 @@ from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
 from grader.diagnosis.wrong_value import was_integer, what_was_put
-from grader.recording.model import NS, Incident, Kind, Owner, Recording
+from grader.recording.model import NS, Kind, Owner, Recording
+from grader.recording.simulated import Incident
 from grader.spec.unit import format_duration
 
 _STILL = "the robot never moved"

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from grader.recording.model import NS, Scene
+from grader.recording.model import NS
+from grader.recording.simulated import Scene
 from grader.report.drawing.svg import Point, element, label, line, simplified
 from sim.motion import Pose
 from sim.script import MovingObstacle

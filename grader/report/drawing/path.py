@@ -14,7 +14,8 @@ from grader.checks.motion.ground import ahead
 from grader.checks.motion.measure import metres
 from grader.checks.motion.track import first_rest, has_moved
 from grader.checks.wording import counted, listing
-from grader.recording.model import NS, Recording, Scene, Truth
+from grader.recording.model import NS, Recording
+from grader.recording.simulated import Scene, Truth
 from grader.report.drawing import ground_plan
 from grader.report.drawing.ground_plan import View, disc, in_metres, scale_bar, track
 from grader.report.drawing.svg import (

@@ -16,7 +16,8 @@ from markupsafe import Markup
 
 from grader.assignment.model import Assignment, Scenario
 from grader.checks.motion.measure import metres
-from grader.recording.model import NS, Message, Recording, Scene, Truth
+from grader.recording.model import NS, Message, Recording
+from grader.recording.simulated import Scene, Truth
 from grader.report.drawing.ground_plan import places
 from grader.report.model.sections import printed
 from grader.report.model.target import targets

@@ -11,7 +11,7 @@ from grader.checks.finding import Finding, Status
 from grader.checks.wording import counted
 from grader.grade.model import CheckResult, Grade
 from grader.grade.points import total
-from grader.recording.model import Breach
+from grader.recording.event import Breach
 from grader.report.model.result_model import CheckPart, PlacePart
 from grader.submission.record import SourceError
 

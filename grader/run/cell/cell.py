@@ -10,7 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording, Wait
+from grader.recording.event import Wait
+from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording
 from grader.run.cell.domain import joined_domains
 from grader.run.cell.ending import EndingConditions
 from grader.run.cell.exit_barrier import Leave

@@ -13,7 +13,8 @@ import time
 from pathlib import Path
 
 from grader.errors import GraderFault
-from grader.recording.model import Breach, Ending, Process, Recording
+from grader.recording.event import Breach
+from grader.recording.model import Ending, Process, Recording
 from grader.run.order import CellOrder
 from grader.submission.record import SubmissionRecord
 

@@ -12,7 +12,8 @@ from pathlib import Path
 from rclpy.node import Node
 
 from grader.assignment.simulation import read_scenario_world
-from grader.recording.model import NS, Incident, Scene, Truth
+from grader.recording.model import NS
+from grader.recording.simulated import Incident, Scene, Truth
 from grader.run.order import SimulatorOrder
 from sim.description import SimulatorOptions
 from sim.node import RosSimulator

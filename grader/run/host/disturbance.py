@@ -15,7 +15,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from grader.recording.model import NS, Disturbance
+from grader.recording.event import Disturbance
+from grader.recording.model import NS
 from grader.run.host.cpu_use import CpuMeter, CpuTimes, Interval, interval, others_share
 from grader.run.host.run_delay import RunDelays
 

@@ -10,7 +10,8 @@ import signal
 from collections.abc import Callable, Iterable, Sequence
 
 from grader.out_of_memory import oom_kills
-from grader.recording.model import Breach, Process
+from grader.recording.event import Breach
+from grader.recording.model import Process
 
 
 class Shortage:

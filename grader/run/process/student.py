@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from grader.recording.model import NS, Breach, Process
+from grader.recording.event import Breach
+from grader.recording.model import NS, Process
 from grader.run.host.disturbance import DisturbanceMeter
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.order import Limits

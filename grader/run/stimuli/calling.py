@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 
-from grader.recording.model import NS, Wait
+from grader.recording.event import Wait
+from grader.recording.model import NS
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.asking import NO_SERVER, Asked
 from grader.run.stimuli.context import Playing, StimulusContext

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from grader.recording.event import Intervention, Wait
 from grader.recording.interaction import EXECUTOR_SERVICES
-from grader.recording.model import NS, Endpoint, Intervention, Join, Kind, Owner, Wait
+from grader.recording.model import NS, Endpoint, Join, Kind, Owner
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
 from grader.run.host.disturbance import DisturbanceMeter

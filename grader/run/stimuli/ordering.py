@@ -22,9 +22,9 @@ from grader.run.stimuli.orders import (
 )
 
 if TYPE_CHECKING:
-    from grader.assignment.asking import Asking
     from grader.assignment.model import Scenario
-    from grader.assignment.stimulus import Join, Publish
+    from grader.assignment.stimuli.request import Request
+    from grader.assignment.stimuli.stimulus import Join, Publish
 
 
 def stimulus_orders(
@@ -40,7 +40,8 @@ def stimulus_orders(
     Raises:
         GraderFault: A message of a stimulus cannot be made.
     """
-    from grader.assignment import asking, stimulus
+    from grader.assignment.stimuli import request as asking
+    from grader.assignment.stimuli import stimulus
 
     found: list[StimulusOrder] = []
     for item in scenario.stimuli:
@@ -67,7 +68,7 @@ def _publish(
     seed: int,
     drawn: Mapping[str, float],
 ) -> PublishOrder:
-    from grader.assignment.messages import StimulusError, messages_of
+    from grader.assignment.stimuli.stimulus_messages import StimulusError, messages_of
 
     find = definition_finder(Path(prefix) for prefix in prefixes)
     try:
@@ -95,10 +96,10 @@ def _publish(
     )
 
 
-def _asking(item: Asking, prefixes: Sequence[str], drawn: Mapping[str, float]) -> StimulusOrder:
-    from grader.assignment.asking import CallService, ReadParameters, SetParameters
-    from grader.assignment.messages import StimulusError
-    from grader.assignment.requests import goal_of, requests_of, values_of
+def _asking(item: Request, prefixes: Sequence[str], drawn: Mapping[str, float]) -> StimulusOrder:
+    from grader.assignment.stimuli.request import CallService, ReadParameters, SetParameters
+    from grader.assignment.stimuli.request_values import goal_of, requests_of, values_of
+    from grader.assignment.stimuli.stimulus_messages import StimulusError
 
     find = definition_finder(Path(prefix) for prefix in prefixes)
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import time
 
-from grader.recording.model import Intervention
+from grader.recording.event import Intervention
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.context import Playing, StimulusContext
 from grader.run.stimuli.orders import KillOrder, RestartOrder

@@ -8,8 +8,9 @@ from typing import Any
 from rclpy.serialization import serialize_message
 
 from grader.checks.qos.compatibility import refusals
+from grader.recording.event import Wait
 from grader.recording.mcap_writer import RawMessage
-from grader.recording.model import Kind, Qos, Wait
+from grader.recording.model import Kind, Qos
 from grader.run.cell.probe import import_interface, qos_profile
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.answers import Answers

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from grader.assignment.asking import (
+from grader.assignment.stimuli.request import (
     CallService,
     ListParameters,
     ReadParameters,

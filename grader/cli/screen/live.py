@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from grader.cli.console import Progress
+from grader.cli.screen.console import Progress
 from grader.safe_text import one_line
 
 if TYPE_CHECKING:

@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from grader.assignment.asking import Asking, CallService, SendGoal, SetParameters
-from grader.assignment.drawing import fill_in
-from grader.assignment.message import Find, MessageError, read_message
-from grader.assignment.messages import StimulusError
+from grader.assignment.random_values import fill_in
+from grader.assignment.stimuli.message import Find, MessageError, read_message
+from grader.assignment.stimuli.request import CallService, Request, SendGoal, SetParameters
+from grader.assignment.stimuli.stimulus_messages import StimulusError
 from grader.errors import UsageError
 from grader.spec.document import Place
 
@@ -54,7 +54,7 @@ def values_of(settings: SetParameters, drawn: Mapping[str, float]) -> dict[str, 
     }
 
 
-def mistakes(item: Asking, find: Find, drawn: Mapping[str, float]) -> Iterator[tuple[Place, str]]:
+def mistakes(item: Request, find: Find, drawn: Mapping[str, float]) -> Iterator[tuple[Place, str]]:
     """What does not fit in a stimulus, as far as it can be told here."""
     folders = {CallService: "srv", SendGoal: "action"}
     folder = folders.get(type(item))

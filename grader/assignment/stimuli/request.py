@@ -130,4 +130,4 @@ class SendGoal(Model):
     )
 
 
-Asking = CallService | ReadParameters | SetParameters | SendGoal
+Request = CallService | ReadParameters | SetParameters | SendGoal

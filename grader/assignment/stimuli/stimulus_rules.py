@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from grader.assignment.asking import Asking
-from grader.assignment.drawing import draw_values
 from grader.assignment.interfaces import Interfaces
-from grader.assignment.message import Find
-from grader.assignment.messages import StimulusError, messages_of
 from grader.assignment.model import Assignment, Scenario
-from grader.assignment.requests import mistakes
-from grader.assignment.stimulus import Join, Kill, Publish, Restart
+from grader.assignment.random_values import draw_values
+from grader.assignment.stimuli.message import Find
+from grader.assignment.stimuli.request import Request
+from grader.assignment.stimuli.request_values import mistakes
+from grader.assignment.stimuli.stimulus import Join, Kill, Publish, Restart
+from grader.assignment.stimuli.stimulus_messages import StimulusError, messages_of
 from grader.errors import Problem
 from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean
@@ -34,7 +34,7 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
                 yield from _join(source, place, scenario, item, names)
             elif isinstance(item, Kill | Restart):
                 yield from _process(source, place, item, assignment, scenario)
-            elif isinstance(item, Asking):
+            elif isinstance(item, Request):
                 for inside, text in mistakes(item, known.find, draw_values(scenario, 0)):
                     yield source.problem((*place, *inside), text)
             after = getattr(item, "after", None)
@@ -50,7 +50,7 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
 def _has_end(item: object) -> bool:
     if isinstance(item, Publish):
         return item.message is None or item.every is None or item.count is not None
-    return isinstance(item, Join | Kill | Restart | Asking)
+    return isinstance(item, Join | Kill | Restart | Request)
 
 
 def _publish(

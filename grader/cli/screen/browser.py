@@ -7,7 +7,7 @@ import sys
 import threading
 import webbrowser
 
-from grader.cli.console import print_warning
+from grader.cli.screen.console import print_warning
 
 _SETTLED_S = 2.0
 """A browser that has not failed by then is one that stays."""

@@ -1,0 +1,102 @@
+"""What a student handed in: a row of the class."""
+
+from __future__ import annotations
+
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from grader.submission.intake.archive import SUFFIXES
+from grader.submission.read.manifest import MANIFEST
+
+# Archives that cannot be read: whoever handed one in is told so, and has a row.
+FOREIGN = (".rar", ".7z")
+
+_IGNORED = ("__MACOSX",)
+BARE = "is a bare git repository; give a clone of it, or name it as file://… in a roster"
+
+
+@dataclass(frozen=True)
+class HandedIn:
+    """A row of the class.
+
+    Attributes:
+        key: What the student is called in results; unique.
+        path: What was handed in, or None for nothing; those of a team have the same.
+        name: The student's, as people write it, or empty.
+        problem: Why there is nothing to grade, or what the instructor should look at.
+    """
+
+    key: str
+    path: Path | None
+    name: str = ""
+    late: bool = False
+    problem: str = ""
+    fault: str = ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Something in the folder, with the names that it has for its author."""
+
+    key: str
+    path: Path
+    names: tuple[str, ...]
+    name: str = ""
+    late: bool = False
+    fault: str = ""
+
+
+def row_of(entry: Entry) -> HandedIn:
+    """The row of an entry, before a roster says whose it is."""
+    fault = entry.fault or (BARE if is_bare(entry.path) else "")
+    path = None if fault else _archive_in(entry.path) or entry.path
+    return HandedIn(entry.key, path, entry.name, entry.late, fault=fault)
+
+
+def stem_of(item: Path) -> str:
+    """The name of a file or folder without the suffix of an archive."""
+    known = (*SUFFIXES, *FOREIGN)
+    suffix = next((s for s in known if item.is_file() and item.name.lower().endswith(s)), "")
+    return item.name[: len(item.name) - len(suffix)] or item.name
+
+
+def with_problem(row: HandedIn, problem: str) -> HandedIn:
+    """The row with a problem more."""
+    return replace(row, problem="; ".join(part for part in (problem, row.problem) if part))
+
+
+def is_bare(path: Path) -> bool:
+    """Whether it is a repository without its files: what git itself looks for."""
+    try:
+        return all((path / part).exists() for part in ("HEAD", "objects", "refs"))
+    except OSError:
+        # Why it cannot be read is told by whoever reads it.
+        return False
+
+
+def _archive_in(folder: Path) -> Path | None:
+    """What was handed in where a platform has made a folder for it, as Moodle does, or None."""
+    try:
+        inside = list(folder.iterdir()) if folder.is_dir() else []
+        # What a student has in a repository is as they meant it.
+        if any(item.name == ".git" for item in inside):
+            return None
+        return only_archive({item.name: item for item in inside if not is_ignored(item)})
+    except OSError:
+        # Why it cannot be read is told by whoever reads it.
+        return None
+
+
+def only_archive(files: Mapping[str, Path]) -> Path | None:
+    """The archive that somebody handed in, perhaps with a report beside it; else None."""
+    archives = [file for name, file in files.items() if name.lower().endswith(SUFFIXES)]
+    # A link may lead to somebody else's.
+    plain = all(stat.S_ISREG(file.lstat().st_mode) for file in files.values())
+    return archives[0] if len(archives) == 1 and plain and MANIFEST not in files else None
+
+
+def is_ignored(item: Path) -> bool:
+    """Whether a file is left aside: hidden, or of macOS."""
+    return item.name.startswith(".") or item.name in _IGNORED

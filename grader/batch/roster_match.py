@@ -1,0 +1,165 @@
+"""Which student of a roster handed in what, by the names of files and folders."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+
+from grader.batch.handed_in import Entry, HandedIn, row_of, stem_of, with_problem
+from grader.batch.roster import Roster, Student, name_forms, resemblance, written
+from grader.checks.wording import listing
+from grader.submission.intake.paths import shown
+
+# No name of a repository has so many in earnest.
+_MOST_HYPHENS = 12
+_MOST_TWICE = 10
+
+
+class _Names:
+    """Who of a roster a name names.
+
+    Attributes:
+        prefix: What stands before the login in the names of repositories, or empty.
+    """
+
+    def __init__(self, students: Sequence[Student], entries: Sequence[Entry]) -> None:
+        """Learn the names of a class."""
+        self._alike: dict[str, list[Student]] = {}
+        for student in students:
+            for form in student.resembling:
+                self._alike.setdefault(form, []).append(student)
+        self.prefix = self._find_prefix([stem_of(entry.path) for entry in entries])
+
+    def _find_prefix(self, stems: Sequence[str]) -> str:
+        """GitHub Classroom's ``<assignment>-``, where both that and logins may hold hyphens.
+
+        It is what most of the names share; where they share several, logins of the roster must
+        stand behind only one of them, more than once.
+        """
+        known: dict[str, int] = {}
+        shared: Counter[str] = Counter()
+        for stem in stems:
+            parts = stem.split("-")[:_MOST_HYPHENS]
+            for end in range(1, len(parts)):
+                prefix = "-".join(parts[:end]) + "-"
+                shared[prefix] += 1
+                if self._by_login(stem[len(prefix) :]):
+                    known[prefix] = known.get(prefix, 0) + 1
+        most = max(shared.values(), default=0)
+        found = [prefix for prefix, count in shared.items() if count == most > 1]
+        if most <= len(stems) / 2:
+            return ""
+        fitting = [prefix for prefix in found if prefix in known]
+        if len(fitting) != 1 or (len(found) > 1 and known[fitting[0]] == 1):
+            return ""
+        return fitting[0]
+
+    def exact(self, entry: Entry) -> set[str]:
+        """Students whom its names name; several where two of its names contradict each other."""
+        keys: set[str] = set()
+        for name in entry.names:
+            found = {
+                student.key
+                for form in name_forms(name)
+                for student in self._alike.get(resemblance(form), ())
+                if written(form) in student.logins or written(form) in student.names
+            }
+            keys = keys & found or keys | found
+        if keys:
+            return keys
+        stem = stem_of(entry.path)
+        if self.prefix and stem.startswith(self.prefix):
+            return self._by_login(stem.removeprefix(self.prefix))
+        return set()
+
+    def alike(self, entry: Entry) -> set[str]:
+        """Students whom it may be of: their name is written alike, or its name ends with it."""
+        parts = stem_of(entry.path).split("-")[-_MOST_HYPHENS:]
+        ends = ["-".join(parts[first:]) for first in range(1, len(parts))]
+        forms = map(resemblance, (*entry.names, *ends))
+        return {student.key for form in forms for student in self._alike.get(form, ())}
+
+    def _by_login(self, login: str) -> set[str]:
+        alike = self._alike.get(resemblance(login), ())
+        return {student.key for student in alike if written(login) in student.logins}
+
+
+def matched(
+    entries: list[Entry], roster: Roster, on_prefix: Callable[[str], None]
+) -> list[HandedIn]:
+    """Give each entry to the student of the roster that it names.
+
+    What only resembles a name is given to nobody, and is told on its own row and on theirs.
+    """
+    names = _Names(roster.students, entries)
+    if names.prefix:
+        on_prefix(names.prefix)
+    named: dict[str, set[str]] = {}
+    students = {student.key: student for student in roster.students}
+    for student in roster.students:
+        if student.submission:
+            file = PurePosixPath(student.submission).name.removesuffix(".git")
+            named.setdefault(file, set()).add(student.key)
+    rows: list[HandedIn] = []
+    handed: dict[str, list[tuple[int, str]]] = {}
+    doubtful: dict[str, list[str]] = {}
+    given: set[Path] = set()
+    for entry in entries:
+        # What the roster says itself needs no guess, and a team may have handed in one for all.
+        told = named.get(entry.path.name, set()) | named.get(stem_of(entry.path), set())
+        if told and entry.path in given:
+            # Gradescope's export names a team too; the roster has named all of it already.
+            continue
+        given.add(entry.path)
+        keys = told or names.exact(entry)
+        if not told and len(keys) != 1:
+            may_be = sorted(keys or names.alike(entry))
+            for key in may_be:
+                doubtful.setdefault(key, []).append(shown(entry.path.name))
+            parts = ["" if keys else "not in the roster"]
+            parts.append(f"may be {listing(may_be, 'or')}" if may_be else "")
+            rows.append(replace(row_of(entry), problem="; ".join(filter(None, parts))))
+            continue
+        for key in sorted(keys):
+            student = students[key]
+            handed.setdefault(key, []).append((len(rows), shown(entry.path.name)))
+            row = replace(row_of(entry), key=key, name=student.name, problem=student.problem)
+            rows.append(row)
+    for key, found in handed.items():
+        for at, file in found if len(found) > 1 else ():
+            others = [other for _, other in found[:_MOST_TWICE] if other != file] or [file]
+            rows[at] = with_problem(rows[at], f"handed in twice: {listing(others)} too")
+        for at, _ in found if key in doubtful else ():
+            rows[at] = with_problem(rows[at], f"{listing(doubtful[key])} may be theirs too")
+    missing = [_missing(student) for student in roster.students if student.key not in handed]
+    return rows + [
+        replace(row, problem=f"{row.problem}; {listing(doubtful[row.key])} may be theirs")
+        if row.key in doubtful
+        else row
+        for row in missing
+    ]
+
+
+def _missing(student: Student) -> HandedIn:
+    why = "handed in nothing"
+    if student.submission:
+        why += f": {shown(student.submission)} is not among the submissions"
+    return with_problem(HandedIn(student.key, None, student.name, problem=student.problem), why)
+
+
+def unique(rows: list[HandedIn]) -> list[HandedIn]:
+    """Rows sorted by key, with a number behind a key that is there already."""
+    # A browser numbers what it saves in the same way, so `ana (2)` may be there as well.
+    taken = {row.key for row in rows}
+    counts: dict[str, int] = {}
+    found = []
+    for row in sorted(rows, key=lambda item: item.key):
+        key, number = row.key, counts.get(row.key, 0) + 1
+        while number > 1 and (key := f"{row.key} ({number})") in taken:
+            number += 1
+        counts[row.key] = number
+        taken.add(key)
+        found.append(replace(row, key=key))
+    return found

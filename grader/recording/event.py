@@ -1,0 +1,100 @@
+"""What happened to a run: what the scenario did to processes, limits, waits, disturbance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Intervention:
+    """Something that the probe did to a process of the student because the scenario says so.
+
+    Attributes:
+        time_ns: When.
+        process: ``package/executable``.
+        action: ``kill`` (a signal was sent) or ``restart`` (it was started again).
+        signal: Name of the signal, or empty.
+    """
+
+    time_ns: int
+    process: str
+    action: str
+    signal: str = ""
+
+
+_ENDING = (
+    *("memory", "cpu time", "open files", "descriptors in flight", "escaped processes"),
+    *("sessions", "output"),
+)
+
+
+@dataclass(frozen=True)
+class Breach:
+    """A limit of the sandbox that the student's processes reached, or what they must never do.
+
+    Attributes:
+        time_ns: When it was first seen.
+        what: Of a limit: ``memory``, ``cpu time``, ``processes``, ``escaped processes``, ``open
+            files``, ``descriptors in flight``, ``sessions``, ``output``, ``disk``, ``shared
+            memory``, ``files in disk`` or ``files in shared memory``. Else ``forbidden call``,
+            ``forbidden name``, ``forbidden packets`` or ``forged report``.
+        taken: Such as ``1056 MiB of memory``; without a limit what they did, such as ``called
+            `reboot```.
+        allowed: Such as ``1024 MiB``; empty where there is no limit, because it is never allowed.
+    """
+
+    time_ns: int
+    what: str
+    taken: str
+    allowed: str
+
+    @property
+    def ended(self) -> bool:
+        """Whether the processes were ended for it; the kernel itself bounds the others."""
+        return not self.allowed or self.what in _ENDING
+
+    @property
+    def deed(self) -> str:
+        """What the processes did, to follow who they are."""
+        if not self.allowed:
+            return f"{self.taken}, which is never allowed"
+        return f"took {self.taken}, {self.allowed} are allowed"
+
+    def __str__(self) -> str:
+        """Say it in words."""
+        return f"its processes {self.deed}"
+
+
+@dataclass(frozen=True)
+class Wait:
+    """A bounded wait of the probe and how it ended.
+
+    Attributes:
+        what: Such as ``a publisher on /cmd_vel``.
+        limit_s: How long it would have lasted at most, host disturbance not counted.
+        began_ns: When it began.
+        met_ns: When it was met, or None.
+    """
+
+    what: str
+    limit_s: float
+    began_ns: int
+    met_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """One sample of what the host took from us since the sample before.
+
+    Attributes:
+        time_ns: When the sample was taken.
+        late_ns: How much later the probe's metronome woke up than it asked to.
+        waited_ns: How long threads of the student that were ready to run had to wait for a
+            CPU (the kernel's run delay, /proc/PID/schedstat), the worst thread.
+
+    Of both only what others than the student's own processes can have taken.
+    """
+
+    time_ns: int
+    late_ns: int
+    waited_ns: int

@@ -1,0 +1,87 @@
+"""What a recording holds of the simulator: the robot's true motion, and the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from sim.motion import ORIGIN, Pose
+from sim.script import MovingObstacle
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The simulated robot after one step of 10 ms, straight from the simulator's memory.
+
+    Attributes:
+        time_ns: End of the step, the same clock as the stamps of its messages.
+        x_m: Position in the world's frame (REP-103: x forward, y left).
+        y_m: Position in the world's frame.
+        yaw_rad: Heading, counter-clockwise from the x axis, in (-pi, pi].
+        linear_m_s: True speed ahead.
+        angular_rad_s: True turn, counter-clockwise.
+        command_m_s: Commanded speed in force, before any limit.
+        command_rad_s: Commanded turn in force, before any limit.
+        contact: What the robot touches, such as ``boxes[2]``, or None.
+    """
+
+    time_ns: int
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    linear_m_s: float
+    angular_rad_s: float
+    command_m_s: float
+    command_rad_s: float
+    contact: str | None = None
+
+
+@dataclass(frozen=True)
+class Incident:
+    """Something that the simulator noted.
+
+    Attributes:
+        time_ns: When.
+        kind: ``contact_began``, ``contact_ended``, ``command_rejected``, ``command_timeout``,
+            ``pushed`` or ``late`` (steps that the host did not let us do in time and that were
+            caught up).
+        text: For people.
+        value: For ``late`` how late in seconds, else None.
+    """
+
+    time_ns: int
+    kind: str
+    text: str
+    value: float | None = None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is needed to draw a run and to judge it: the world and the robot.
+
+    Attributes:
+        radius_m: Of the robot's circular footprint.
+        max_linear_m_s: Limit of the robot.
+        max_angular_rad_s: Limit of the robot.
+        outlines: Name of each thing that stands still -> its capsules: x1, y1, x2, y2, radius.
+        moving: Everything that moves, with its shape and its script; where it is at a time is
+            a pure function of simulated time.
+        began_ns: When simulated time began.
+        lidar: Where the LiDAR sits, in the robot's frame.
+        command_topic: The velocity commands that the robot obeys.
+        odometry_topic: Where it tells its odometry.
+        scan_topic: Where it tells its scans.
+        acceleration_m_s2: Limit of the robot, speeding up or braking.
+    """
+
+    radius_m: float
+    max_linear_m_s: float
+    max_angular_rad_s: float
+    outlines: Mapping[str, tuple[tuple[float, float, float, float, float], ...]]
+    moving: tuple[MovingObstacle, ...]
+    began_ns: int
+    lidar: Pose = ORIGIN
+    command_topic: str = "/cmd_vel"
+    odometry_topic: str = "/odom"
+    scan_topic: str = "/scan"
+    acceleration_m_s2: float = 1.0
