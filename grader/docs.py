@@ -22,7 +22,7 @@ from pydantic import BaseModel
 from grader import resources
 from grader.assignment import limits, model, mutant
 from grader.assignment.lesson_checks import FOLDER, lesson_checks
-from grader.assignment.stimuli import request, stimulus
+from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.checks import finding
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
@@ -43,15 +43,7 @@ _ASSIGNMENT_SECTIONS: dict[str, type[BaseModel]] = {
     "scenarios": model.Scenario,
     "launch": model.Launch,
     "record": model.RecordedTopic,
-    "stimuli: publish": stimulus.Publish,
-    "stimuli: join": stimulus.Join,
-    "stimuli: kill": stimulus.Kill,
-    "stimuli: restart": stimulus.Restart,
-    "stimuli: call": request.CallService,
-    "stimuli: call list_parameters": request.ListParameters,
-    "stimuli: read_parameters": request.ReadParameters,
-    "stimuli: set_parameters": request.SetParameters,
-    "stimuli: send_goal": request.SendGoal,
+    **{f"stimuli: {one.heading or one.key}": one for one in stimulus_models()},
     "until": model.Until,
     "limits": limits.LimitOptions,
     "build_limits": limits.BuildLimitOptions,

@@ -13,9 +13,7 @@ from grader.assignment.binding import BoundCheck
 from grader.assignment.interfaces import Interfaces
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.stimuli.message import Find
-from grader.assignment.stimuli.request import CallService, SendGoal
 from grader.assignment.stimuli.request_values import SEPARATOR
-from grader.assignment.stimuli.stimulus import Publish
 from grader.checks.check import NamedFields
 from grader.checks.field import value_at
 from grader.checks.value import NoSuchField, expected_leaves, tolerance_of, unreachable
@@ -57,14 +55,7 @@ def _types(assignment: Assignment, bound: BoundCheck, endpoint: str) -> list[str
 
 
 def _type(scenario: Scenario, endpoint: str) -> str | None:
-    used: dict[str, str] = {}
-    for one in scenario.stimuli:
-        if isinstance(one, Publish):
-            used[one.publish] = one.type
-        elif isinstance(one, CallService):
-            used[one.call] = one.type
-        elif isinstance(one, SendGoal):
-            used[one.send_goal] = one.type
+    used = dict(one.exchanged for one in scenario.stimuli if one.exchanged)
     return {**used, **scenario.recorded_types}.get(endpoint)
 
 

@@ -9,7 +9,8 @@ from pydantic import BaseModel
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, Scenario, Visibility
 from grader.assignment.mutant import Mutant
-from grader.assignment.stimuli.stimulus import Join, Publish
+from grader.assignment.stimuli.kinds.join import Join
+from grader.assignment.stimuli.kinds.publish import Publish
 from grader.checks.need import Recorded
 from grader.checks.tolerance import TimeTolerance
 from grader.checks.wording import percent

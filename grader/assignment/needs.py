@@ -13,8 +13,14 @@ from typing import Any
 from grader.assignment.binding import BoundCheck
 from grader.assignment.draft import Draft
 from grader.assignment.model import Package, Scenario
-from grader.assignment.stimuli.request import CallService, ReadParameters, SendGoal, SetParameters
-from grader.assignment.stimuli.stimulus import Join, Publish
+from grader.assignment.stimuli.kinds.join import Join
+from grader.assignment.stimuli.kinds.publish import Publish
+from grader.assignment.stimuli.kinds.request import (
+    CallService,
+    ReadParameters,
+    SendGoal,
+    SetParameters,
+)
 from grader.checks.need import (
     Called,
     GoalSent,

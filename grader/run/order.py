@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from grader.run.process.process_sandbox import ProcessSandbox
-from grader.run.stimuli.orders import StimulusOrder, from_dict, to_dict
 
 ORDER_FILE = "order.json"
 RECORDING_FILE = "recording.mcap"
@@ -112,7 +111,7 @@ class CellOrder:
     environment: dict[str, str]
     prefixes: tuple[str, ...]
     topics: tuple[Topic, ...]
-    stimuli: tuple[StimulusOrder, ...]
+    stimuli: tuple[dict[str, Any], ...]
     until: Until
     limits: Limits
     scratch: str
@@ -126,8 +125,7 @@ class CellOrder:
 
     def to_json(self) -> str:
         """As one line."""
-        stimuli = [to_dict(order) for order in self.stimuli]
-        return json.dumps({**dataclasses.asdict(self), "stimuli": stimuli})
+        return json.dumps(dataclasses.asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> CellOrder:
@@ -137,7 +135,7 @@ class CellOrder:
             Command(item["name"], tuple(item["argv"])) for item in data["commands"]
         )
         data["topics"] = tuple(Topic(**item) for item in data["topics"])
-        data["stimuli"] = tuple(from_dict(item) for item in data["stimuli"])
+        data["stimuli"] = tuple(data["stimuli"])
         data["until"] = Until.from_dict(data["until"])
         if data["simulator"] is not None:
             data["simulator"] = SimulatorOrder(**data["simulator"])

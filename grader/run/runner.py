@@ -26,7 +26,7 @@ from grader.run.environment import RMW, student_environment
 from grader.run.host.load import cpu_count
 from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
 from grader.run.sandboxed_order import sandboxed
-from grader.run.stimuli.ordering import stimulus_orders
+from grader.run.stimulus_orders import stimulus_orders
 from grader.sandbox.python_tree import unlisted
 from grader.submission.record import SubmissionRecord
 

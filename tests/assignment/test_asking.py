@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.assignment.load import load_assignment
-from grader.assignment.stimuli.request import CallService, SetParameters
+from grader.assignment.stimuli.kinds.request import CallService, SetParameters
 from grader.assignment.stimuli.request_values import requests_of, values_of
 from grader.errors import AssignmentError
 

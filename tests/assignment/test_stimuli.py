@@ -10,7 +10,7 @@ import pytest
 from mcap_ros2.writer import Writer
 
 from grader.assignment.load import load_assignment
-from grader.assignment.stimuli.stimulus import Publish
+from grader.assignment.stimuli.kinds.publish import Publish
 from grader.assignment.stimuli.stimulus_messages import messages_of
 from grader.errors import AssignmentError
 
@@ -98,7 +98,7 @@ def test_good_ones_are_read(mistakes: Callable[[str], list[str]], stimuli: str) 
 
 ONE_WAY = "give the messages in one way of message, messages, from, python"
 FORM = [
-    ("      - {after: 1 s}\n", "14: .*its first key tells what it does: publish, join, kill"),
+    ("      - {after: 1 s}\n", "14: .*its first key tells what it does: call, join, kill, publish"),
     ("      - {pubish: /a, type: a/msg/B, message: {}}\n", "unknown key 'pubish'. Did you mean"),
     (publish("after: 1 s"), f"14: .*{ONE_WAY}, but none of them is there"),
     (publish("message: {}\nmessages: [{}]"), f"{ONE_WAY}, not message and messages"),

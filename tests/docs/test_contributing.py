@@ -51,7 +51,8 @@ def python(copy: Path, code: str) -> None:
 
 
 def test_the_walks_are_one_file_each() -> None:
-    assert [path.split("/")[1] for path in FILES] == ["checks", "diagnosis", "report"]
+    folders = [path.split("/")[1] for path in FILES]
+    assert folders == ["checks", "diagnosis", "report", "assignment", "run"]
 
 
 def test_a_new_check_is_listed_validated_and_judges(copy: Path) -> None:
@@ -82,3 +83,21 @@ def test_a_new_explanation_is_listed_and_found_without_a_list(copy: Path) -> Non
 def test_a_new_output_format_is_an_option(copy: Path) -> None:
     assert "--points" in rosgrade(copy, "check", "--help")
     assert "Write the points, a line for each check" in rosgrade(copy, "report", "--help")
+
+
+def test_a_new_stimulus_is_valid_described_and_played(copy: Path) -> None:
+    folder = copy / "simple_publisher"
+    shutil.copytree(copy / "assignments/simple_publisher", folder, dirs_exist_ok=True)
+    yaml = folder / "assignment.yaml"
+    text = yaml.read_text(encoding="utf-8")
+    stimuli = "    stimuli:\n      - {mark: half of it, after: 1 s}\n    record:\n"
+    yaml.write_text(text.replace("    record:\n", stimuli, 1), encoding="utf-8")
+    assert "valid" in rosgrade(copy, "validate", str(folder))
+    assert '"Mark a moment in the recording.' in rosgrade(copy, "schema")
+    python(
+        copy,
+        "from grader.docs import assignment_markdown\n"
+        "from grader.run.stimuli.player import PLAYS\n"
+        "assert '## stimuli: mark' in assignment_markdown()\n"
+        "assert 'MarkOrder' in [order.__name__ for order in PLAYS]\n",
+    )

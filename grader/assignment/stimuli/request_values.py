@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from grader.assignment.random_values import fill_in
+from grader.assignment.stimuli.kinds.request import CallService, Request, SendGoal, SetParameters
 from grader.assignment.stimuli.message import Find, MessageError, read_message
-from grader.assignment.stimuli.request import CallService, Request, SendGoal, SetParameters
 from grader.assignment.stimuli.stimulus_messages import StimulusError
 from grader.errors import UsageError
 from grader.spec.document import Place

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from grader.assignment.own_check import load_function
+from grader.assignment.stimuli.kinds.publish import MCAP_SUFFIX, MOST_MESSAGES, Publish
 from grader.assignment.stimuli.message import Find, MessageError, UnknownField, read_message
-from grader.assignment.stimuli.stimulus import MCAP_SUFFIX, MOST_MESSAGES, Publish
 from grader.spec.document import Place
 
 _NS = 1e-9

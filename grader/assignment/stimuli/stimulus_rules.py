@@ -7,10 +7,12 @@ from collections.abc import Iterator
 from grader.assignment.interfaces import Interfaces
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.random_values import draw_values
+from grader.assignment.stimuli.kinds.join import Join
+from grader.assignment.stimuli.kinds.process import Kill, Restart
+from grader.assignment.stimuli.kinds.publish import Publish
+from grader.assignment.stimuli.kinds.request import Request
 from grader.assignment.stimuli.message import Find
-from grader.assignment.stimuli.request import Request
 from grader.assignment.stimuli.request_values import mistakes
-from grader.assignment.stimuli.stimulus import Join, Kill, Publish, Restart
 from grader.assignment.stimuli.stimulus_messages import StimulusError, messages_of
 from grader.errors import Problem
 from grader.spec.document import Place
@@ -42,15 +44,9 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
                 shown, timeout = format_duration(after), format_duration(scenario.timeout)
                 text = f"{shown} is not before the timeout of {timeout} ends the scenario"
                 yield source.problem((*place, "after"), text)
-        if scenario.until.stimuli is not None and not any(map(_has_end, scenario.stimuli)):
+        if scenario.until.stimuli is not None and not any(one.has_end for one in scenario.stimuli):
             text = "no stimulus of the scenario has an end"
             yield source.problem(("scenarios", index, "until", "stimuli"), text)
-
-
-def _has_end(item: object) -> bool:
-    if isinstance(item, Publish):
-        return item.message is None or item.every is None or item.count is not None
-    return isinstance(item, Join | Kill | Restart | Request)
 
 
 def _publish(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 from grader.recording.event import Wait
 from grader.recording.model import NS
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.asking import NO_SERVER, Asked
-from grader.run.stimuli.context import Playing, StimulusContext
-from grader.run.stimuli.orders import CallOrder, GoalOrder, ParametersOrder
+from grader.run.stimuli.context import Playing, StimulusContext, plays
 
 _POLL_S = 0.02
 # The server may match the client, for its answers, a moment later than the client the server.
@@ -23,7 +24,34 @@ _UNCALLABLE_S = 1.0
 MARGIN_S = 0.25
 """What is waited for is waited for a little longer, so that its time has passed in every clock."""
 
-RequestOrder = CallOrder | ParametersOrder | GoalOrder
+
+class RequestOrder(Protocol):
+    """What the orders have in common that ask something of a node."""
+
+    @property
+    def after_s(self) -> float:
+        """Not before so long after the first match."""
+
+    @property
+    def within_s(self) -> float:
+        """How long to wait for an answer."""
+
+
+@dataclass(frozen=True)
+class CallOrder:
+    """Call a service.
+
+    Attributes:
+        every_s: Time between two requests; None for the next after the answer.
+    """
+
+    service: str
+    type: str
+    requests: tuple[dict[str, Any], ...]
+    at_once: int = 1
+    after_s: float = 0.0
+    every_s: float | None = None
+    within_s: float = 2.0
 
 
 class Readiness:
@@ -158,6 +186,7 @@ class Asking(Playing):
             self._ready.look()
 
 
+@plays(CallOrder)
 class Calling(Asking):
     """Requests to one service, one after another or several at once."""
 

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from grader.recording.event import Intervention, Wait
 from grader.recording.interaction import EXECUTOR_SERVICES
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 _SET_UP_S = 0.5
 # A node whose other services were seen so long ago has no parameter services.
 _SETTLED_NS = NS // 2
+
+P = TypeVar("P", bound="Playing")
 
 
 @dataclass
@@ -109,7 +111,14 @@ class StimulusContext:
 
 
 class Playing(ABC):
-    """One stimulus being played; its clock starts with the first match."""
+    """One stimulus being played; its clock starts with the first match.
+
+    A subclass in a module of this package says with :func:`plays` what it plays. It is created
+    with its order and with the context of the run.
+    """
+
+    answer: str | None = None
+    """Topic on which answers to what it publishes are expected."""
 
     topic: str | None = None
     """Topic on which a subscription of the student's counts as the first match."""
@@ -148,3 +157,17 @@ class Playing(ABC):
     def keeps_run(self) -> bool:
         """Whether the run goes on although no process of the student's runs any more."""
         return False
+
+
+PLAYS: dict[type[Any], type[Playing]] = {}
+"""Class of an order -> what plays it."""
+
+
+def plays(order_type: type[Any]) -> Callable[[type[P]], type[P]]:
+    """Say which orders a class plays."""
+
+    def register(playing: type[P]) -> type[P]:
+        PLAYS[order_type] = playing
+        return playing
+
+    return register

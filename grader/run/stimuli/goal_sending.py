@@ -11,9 +11,8 @@ from grader.recording.interaction import Feedback, Goal
 from grader.run.cell.probe import import_interface
 from grader.run.stimuli.asking import NO_SERVER
 from grader.run.stimuli.calling import Asking
-from grader.run.stimuli.context import StimulusContext
+from grader.run.stimuli.context import StimulusContext, plays
 from grader.run.stimuli.filling import filled, plain
-from grader.run.stimuli.orders import GoalOrder
 
 _MOST_FEEDBACK = 5000
 _ACCEPT_S = 1.0
@@ -27,6 +26,23 @@ _STATUSES = {
     5: "canceled",
     6: "aborted",
 }
+
+
+@dataclass(frozen=True)
+class GoalOrder:
+    """Send a goal to an action.
+
+    Attributes:
+        cancel_after_s: Ask to cancel it so long after it was accepted, or None.
+    """
+
+    action: str
+    type: str
+    goal: dict[str, Any]
+    after_s: float = 0.0
+    cancel_after_s: float | None = None
+    preempt: bool = False
+    within_s: float = 10.0
 
 
 @dataclass
@@ -68,6 +84,7 @@ class SentGoal:
         )
 
 
+@plays(GoalOrder)
 class SendingGoal(Asking):
     """One goal, from its sending to its result."""
 

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from grader.recording.model import Join, Qos
 from grader.run.cell.probe import qos_profile
-from grader.run.stimuli.context import Playing, StimulusContext
-from grader.run.stimuli.orders import JoinOrder
+from grader.run.stimuli.context import Playing, StimulusContext, plays
 
 # What a publisher keeps for late joiners arrives within this of the match.
 _HISTORY_S = 0.5
 _POLL_S = 0.02
 
 
+@dataclass(frozen=True)
+class JoinOrder:
+    """Subscribe late."""
+
+    name: str
+    topic: str
+    type: str
+    reliability: str
+    durability: str
+    depth: int
+    after_s: float
+
+
+@plays(JoinOrder)
 class Joining(Playing):
     """A late joiner."""
 

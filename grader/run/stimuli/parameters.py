@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 
 from grader.recording.model import Owner
-from grader.run.stimuli.context import Playing, StimulusContext
-from grader.run.stimuli.orders import ListParametersOrder
+from grader.run.stimuli.context import Playing, StimulusContext, plays
 
 
+@dataclass(frozen=True)
+class ListParametersOrder:
+    """Call the parameter services of all nodes of the student."""
+
+    every_s: float
+
+
+@plays(ListParametersOrder)
 class ListingParameters(Playing):
     """Calls ``list_parameters`` of every node, or what stands in for it; it has no end."""
 

@@ -3,51 +3,39 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
 
-from grader.run.stimuli.calling import Calling
-from grader.run.stimuli.context import Playing, StimulusContext
-from grader.run.stimuli.goal_sending import SendingGoal
-from grader.run.stimuli.joining import Joining
-from grader.run.stimuli.orders import (
-    CallOrder,
-    GoalOrder,
-    JoinOrder,
-    KillOrder,
-    ListParametersOrder,
-    ParametersOrder,
-    PublishOrder,
-    RestartOrder,
-    StimulusOrder,
-)
-from grader.run.stimuli.parameters import ListingParameters
-from grader.run.stimuli.processes import Killing, Restarting
-from grader.run.stimuli.publishing import Publishing
-from grader.run.stimuli.setting import SettingParameters
+from grader.run import stimuli
+from grader.run.stimuli.context import PLAYS, Playing, StimulusContext
 
-_KINDS: dict[type, Callable[..., Playing]] = {
-    PublishOrder: Publishing,
-    JoinOrder: Joining,
-    KillOrder: Killing,
-    RestartOrder: Restarting,
-    ListParametersOrder: ListingParameters,
-    CallOrder: Calling,
-    ParametersOrder: SettingParameters,
-    GoalOrder: SendingGoal,
-}
+for _module in iter_modules(stimuli.__path__):
+    if _module.name != "player":
+        import_module(f"{stimuli.__name__}.{_module.name}")
+_ORDERS = {order_type.__name__: order_type for order_type in PLAYS}
+
+
+def _played(order: Mapping[str, Any], context: StimulusContext) -> Playing:
+    """The stimulus of an order, of whose tuples JSON made lists."""
+    values = {
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in order.items()
+        if key != "kind"
+    }
+    order_type = _ORDERS[order["kind"]]
+    kind: Any = PLAYS[order_type]
+    playing: Playing = kind(order_type(**values), context)
+    return playing
 
 
 class Player:
     """Plays every stimulus of a run at its time."""
 
-    def __init__(self, orders: Sequence[StimulusOrder], context: StimulusContext) -> None:
+    def __init__(self, orders: Sequence[Mapping[str, Any]], context: StimulusContext) -> None:
         """Prepare what has to be there before anything of the student's is launched."""
-        self._playing = [_KINDS[type(order)](order, context) for order in orders]
-        self._answers = {
-            order.topic: order.answer
-            for order in orders
-            if isinstance(order, PublishOrder) and order.answer is not None
-        }
+        self._playing = [_played(order, context) for order in orders]
         self._began_s: float | None = None
 
     @property
@@ -58,7 +46,7 @@ class Player:
     @property
     def answers(self) -> dict[str, str]:
         """Topic that is published on -> topic on which its answers are expected."""
-        return dict(self._answers)
+        return {one.topic: one.answer for one in self._playing if one.topic and one.answer}
 
     @property
     def asks(self) -> bool:

@@ -4,13 +4,39 @@ from __future__ import annotations
 
 import signal
 import time
+from dataclasses import dataclass
 
 from grader.recording.event import Intervention
 from grader.run.host.stopwatch import Stopwatch
-from grader.run.stimuli.context import Playing, StimulusContext
-from grader.run.stimuli.orders import KillOrder, RestartOrder
+from grader.run.stimuli.context import Playing, StimulusContext, plays
 
 
+@dataclass(frozen=True)
+class RestartOrder:
+    """End a process if it still runs, and start it again.
+
+    Attributes:
+        process: ``package/executable``.
+    """
+
+    process: str
+    after_s: float
+
+
+@dataclass(frozen=True)
+class KillOrder:
+    """Send a signal to a process.
+
+    Attributes:
+        process: ``package/executable``.
+    """
+
+    process: str
+    signal: str
+    after_s: float
+
+
+@plays(KillOrder)
 class Killing(Playing):
     """Sends a signal to a process."""
 
@@ -47,6 +73,7 @@ class Killing(Playing):
             )
 
 
+@plays(RestartOrder)
 class Restarting(Playing):
     """Ends a process if it still runs, in steps, and starts it again."""
 

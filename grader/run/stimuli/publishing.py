@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.serialization import serialize_message
@@ -14,15 +15,38 @@ from grader.recording.model import Kind, Qos
 from grader.run.cell.probe import import_interface, qos_profile
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.stimuli.answers import Answers
-from grader.run.stimuli.context import Playing, StimulusContext
+from grader.run.stimuli.context import Playing, StimulusContext, plays
 from grader.run.stimuli.filling import filled
-from grader.run.stimuli.orders import PublishOrder
 
 _POLL_S = 0.02
 # Of a node that declares nothing to us, the writer that answers may match a moment later.
 _GRACE_S = 0.1
 
 
+@dataclass(frozen=True)
+class PublishOrder:
+    """Publish messages.
+
+    Attributes:
+        repeat_s: Repeat the last one with this period until the end, or None.
+        answer: Wait for a message on this topic before the next, or None.
+    """
+
+    topic: str
+    type: str
+    reliability: str
+    durability: str
+    depth: int
+    messages: tuple[dict[str, Any], ...]
+    times_s: tuple[float, ...]
+    before_launch: int = 0
+    after_s: float = 0.0
+    repeat_s: float | None = None
+    answer: str | None = None
+    within_s: float = 1.0
+
+
+@plays(PublishOrder)
 class Publishing(Playing):
     """A publisher of the probe with its messages."""
 
@@ -33,6 +57,7 @@ class Publishing(Playing):
             ImportError: The interface does not exist.
         """
         self.topic = order.topic
+        self.answer = order.answer
         self._order = order
         self._context = context
         self._class = import_interface(order.type)

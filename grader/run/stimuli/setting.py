@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from grader.run.stimuli.asking import NO_SERVER, Asked
 from grader.run.stimuli.calling import Asking
-from grader.run.stimuli.context import StimulusContext
-from grader.run.stimuli.orders import ParametersOrder
+from grader.run.stimuli.context import StimulusContext, plays
 
 _EVERY: Mapping[str, Any] = {"prefixes": [], "depth": 0}
 _TYPES = {
@@ -19,6 +19,21 @@ _TYPES = {
 }
 
 
+@dataclass(frozen=True)
+class ParametersOrder:
+    """Read the parameters of a node, and set some of them.
+
+    Attributes:
+        values: What to set; empty to read only.
+    """
+
+    node: str
+    values: dict[str, Any]
+    after_s: float = 0.0
+    within_s: float = 2.0
+
+
+@plays(ParametersOrder)
 class SettingParameters(Asking):
     """One round of calls to the parameter services of a node; each waits for the one before."""
 

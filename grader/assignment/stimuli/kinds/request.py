@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
 from grader.spec.name import InterfaceName, QualifiedNodeName, TopicName
 from grader.spec.quantity import Duration, DurationOrZero
-from grader.spec.source import Model
 
 MOST_CALLS = 1000
 
@@ -26,7 +27,8 @@ _Within = Annotated[
 ]
 
 
-class ListParameters(Model):
+@kind
+class ListParameters(StimulusModel):
     """Call the parameter service `list_parameters` of every node of the student.
 
     It answers only while the node's executor spins, and so shows from outside whether a
@@ -34,17 +36,37 @@ class ListParameters(Model):
     `get_type_description` instead.
     """
 
+    key = "call"
+    heading = "call list_parameters"
+
     call: Literal["list_parameters"] = Field(description="Always `list_parameters`.")
     every: Duration = Field(description="Time between two calls to one node.")
 
+    @classmethod
+    def accepts(cls, value: Mapping[str, Any]) -> bool:
+        """Whether it names the one service that every node has."""
+        return not str(value.get("call", "")).startswith("/")
 
-class CallService(Model):
+    @property
+    def has_end(self) -> bool:
+        """It is called until the run ends."""
+        return False
+
+    def order(self, making: Making) -> dict[str, Any]:
+        """The calls."""
+        return {"kind": "ListParametersOrder", "every_s": self.every}
+
+
+@kind
+class CallService(StimulusModel):
     """Call a service.
 
     The first call goes out when the service is there and its node spins. What was asked and
     answered is in the recording's `calls`. Values may use `$name` of `random` and quantities
     such as `30 deg` (in SI units); a field that is left out is zero.
     """
+
+    key = "call"
 
     call: TopicName = Field(description="Fully qualified service name.")
     type: InterfaceName = Field(description="Interface, such as std_srvs/srv/SetBool.")
@@ -81,9 +103,37 @@ class CallService(Model):
         """Every request, in order."""
         return self.requests or ((self.request or {},) * (self.count or 1))
 
+    @classmethod
+    def accepts(cls, value: Mapping[str, Any]) -> bool:
+        """Whether it names a service in full."""
+        return str(value.get("call", "")).startswith("/")
 
-class ReadParameters(Model):
+    @property
+    def exchanged(self) -> tuple[str, str]:
+        """The service and its type."""
+        return self.call, self.type
+
+    def order(self, making: Making) -> dict[str, Any]:
+        """The requests."""
+        from grader.assignment.stimuli.request_values import requests_of
+
+        return {
+            "kind": "CallOrder",
+            "service": self.call,
+            "type": self.type,
+            "requests": list(requests_of(self, making.find, making.drawn)),
+            "at_once": self.at_once,
+            "after_s": self.after,
+            "every_s": self.every,
+            "within_s": self.within,
+        }
+
+
+@kind
+class ReadParameters(StimulusModel):
     """Read every parameter of a node: its descriptor and its value."""
+
+    key = "read_parameters"
 
     read_parameters: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
@@ -91,12 +141,19 @@ class ReadParameters(Model):
     after: _After = 0.0
     within: _Within = 2.0
 
+    def order(self, making: Making) -> dict[str, Any]:
+        """The node, and nothing that is set."""
+        return _of_parameters(self.read_parameters, {}, self.after, self.within)
 
-class SetParameters(Model):
+
+@kind
+class SetParameters(StimulusModel):
     """Set parameters of a node, as `ros2 param set` does, and read them before and after.
 
     The type of a value is that of the YAML: `1` is an integer, `1.0` a double.
     """
+
+    key = "set_parameters"
 
     set_parameters: dict[str, Any] = Field(
         min_length=1, description="Name -> value; all are set in one call."
@@ -107,13 +164,34 @@ class SetParameters(Model):
     after: _After = 0.0
     within: _Within = 2.0
 
+    def order(self, making: Making) -> dict[str, Any]:
+        """The node, and what is set."""
+        from grader.assignment.stimuli.request_values import values_of
 
-class SendGoal(Model):
+        return _of_parameters(self.node, values_of(self, making.drawn), self.after, self.within)
+
+
+def _of_parameters(
+    node: str, values: Mapping[str, Any], after_s: float, within_s: float
+) -> dict[str, Any]:
+    return {
+        "kind": "ParametersOrder",
+        "node": node,
+        "values": dict(values),
+        "after_s": after_s,
+        "within_s": within_s,
+    }
+
+
+@kind
+class SendGoal(StimulusModel):
     """Send a goal to an action.
 
     It goes out when the action is there and, unless it is to `preempt`, when the goal before it
     has ended. What became of it is in the recording's `goals`.
     """
+
+    key = "send_goal"
 
     send_goal: TopicName = Field(description="Fully qualified action name.")
     type: InterfaceName = Field(
@@ -128,6 +206,26 @@ class SendGoal(Model):
     within: Duration = Field(
         10.0, description="How long to wait for its result.", validate_default=False
     )
+
+    @property
+    def exchanged(self) -> tuple[str, str]:
+        """The action and its type."""
+        return self.send_goal, self.type
+
+    def order(self, making: Making) -> dict[str, Any]:
+        """The goal."""
+        from grader.assignment.stimuli.request_values import goal_of
+
+        return {
+            "kind": "GoalOrder",
+            "action": self.send_goal,
+            "type": self.type,
+            "goal": goal_of(self, making.find, making.drawn),
+            "after_s": self.after,
+            "cancel_after_s": self.cancel_after,
+            "preempt": self.preempt,
+            "within_s": self.within,
+        }
 
 
 Request = CallService | ReadParameters | SetParameters | SendGoal

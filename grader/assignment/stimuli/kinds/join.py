@@ -1,0 +1,43 @@
+"""The stimulus that joins a topic late."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field
+
+from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.spec.name import Durability, Id, InterfaceName, Reliability, TopicName
+from grader.spec.quantity import DurationOrZero
+
+
+@kind
+class Join(StimulusModel):
+    """Join late: a further subscription of the probe, created in the middle of the run.
+
+    Its messages are recorded under its own name, apart from those of `record`. Where `record`
+    leaves the topic out, it is the first subscription to it.
+    """
+
+    key = "join"
+
+    join: TopicName = Field(description="Topic to subscribe to.")
+    type: InterfaceName = Field(description="Interface, such as std_msgs/msg/Int64.")
+    name: Id = Field(description="Name of what it records, for the checks.")
+    after: DurationOrZero = Field(description="When: so long after the first match.")
+    reliability: Reliability = Field("reliable", description="Requested reliability.")
+    durability: Durability = Field("volatile", description="Requested durability.")
+    depth: int = Field(100, ge=1, le=10_000, description="Queue depth of the subscription.")
+
+    def order(self, making: Making) -> dict[str, Any]:
+        """The subscription."""
+        return {
+            "kind": "JoinOrder",
+            "name": self.name,
+            "topic": self.join,
+            "type": self.type,
+            "reliability": self.reliability,
+            "durability": self.durability,
+            "depth": self.depth,
+            "after_s": self.after,
+        }

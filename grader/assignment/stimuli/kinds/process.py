@@ -1,0 +1,51 @@
+"""The stimuli that end a process of the student, or start it again."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.spec.name import PackageName
+from grader.spec.quantity import DurationOrZero
+
+Signal = Literal["SIGINT", "SIGTERM", "SIGKILL"]
+
+
+@kind
+class Kill(StimulusModel):
+    """Send a signal to a process of the student."""
+
+    key = "kill"
+
+    kill: str = Field(description="Name of the executable.")
+    package: PackageName | None = Field(None, description="Its package, where several have it.")
+    after: DurationOrZero = Field(description="When: so long after the first match.")
+    signal: Signal = Field("SIGINT", description="The signal: SIGINT is Ctrl-C.")
+
+    def order(self, making: Making) -> dict[str, Any]:
+        """The signal."""
+        process = making.process(self.kill, self.package)
+        return {
+            "kind": "KillOrder",
+            "process": process,
+            "signal": self.signal,
+            "after_s": self.after,
+        }
+
+
+@kind
+class Restart(StimulusModel):
+    """Start a process of the student again, as it was launched; one that still runs is ended."""
+
+    key = "restart"
+
+    restart: str = Field(description="Name of the executable.")
+    package: PackageName | None = Field(None, description="Its package, where several have it.")
+    after: DurationOrZero = Field(description="When: so long after the first match.")
+
+    def order(self, making: Making) -> dict[str, Any]:
+        """The process."""
+        process = making.process(self.restart, self.package)
+        return {"kind": "RestartOrder", "process": process, "after_s": self.after}

@@ -1,0 +1,143 @@
+"""The stimulus that publishes messages."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import Field, model_validator
+
+from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.spec.name import Durability, InterfaceName, Reliability, TopicName
+from grader.spec.quantity import Duration, DurationOrZero
+
+MCAP_SUFFIX = ".mcap"
+MOST_MESSAGES = 10_000
+
+
+@kind
+class Publish(StimulusModel):
+    """Publish messages.
+
+    The first one goes out when a subscription of the student has matched, and never before.
+    What was published is in the recording's `sent`. The values may use `$name` of `random`, and
+    quantities such as `30 deg` (in SI units); a field that is left out is zero. A time may be
+    `now`. Give the messages in one way: `message`, `messages`, `from` or `python`.
+    """
+
+    key = "publish"
+
+    publish: TopicName = Field(description="Topic to publish on; it is not in `record`.")
+    type: InterfaceName = Field(description="Interface, such as std_msgs/msg/String.")
+    message: dict[str, Any] | None = Field(None, description="One message: its fields.")
+    messages: tuple[dict[str, Any], ...] = Field((), description="Several, one after another.")
+    from_: str | None = Field(
+        None,
+        alias="from",
+        description="A CSV file beside assignment.yaml with a message in each row (its first row "
+        "names the fields: `linear.x`, `data[0]`), or an MCAP file with messages on this topic.",
+    )
+    python: str | None = Field(
+        None,
+        description="An own function, `file.py:function`, beside assignment.yaml: it takes the "
+        "scenario's seed and returns a list of messages, each a dict of its fields.",
+    )
+    after: DurationOrZero = Field(
+        0.0, description="Not before so long after the first match.", validate_default=False
+    )
+    every: Duration | None = Field(
+        None,
+        description="Time between two messages. One `message` is repeated with it, `count` times "
+        "or until the end. Messages of an MCAP file have the times of the file by default.",
+    )
+    count: int | None = Field(
+        None, ge=1, le=MOST_MESSAGES, description="How often one `message` is published."
+    )
+    answer: TopicName | None = Field(
+        None,
+        description="Send the next message only when one was received on this recorded topic, or "
+        "when `within` has passed. One that is the same as before may be a copy, and counts a "
+        "moment later.",
+    )
+    within: Duration = Field(
+        1.0, description="How long to wait for an `answer`.", validate_default=False
+    )
+    before_launch: int = Field(
+        0,
+        ge=0,
+        le=MOST_MESSAGES,
+        description="So many of the messages are published at once, before anything of the "
+        "student's is launched; the others follow when a subscription has matched.",
+    )
+    reliability: Reliability = Field("reliable", description="Offered reliability.")
+    durability: Durability = Field("volatile", description="Offered durability.")
+    depth: int = Field(100, ge=1, le=10_000, description="Queue depth of the publisher.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Publish:
+        given = {
+            "message": self.message is not None,
+            "messages": bool(self.messages),
+            "from": self.from_ is not None,
+            "python": self.python is not None,
+        }
+        names = [name for name, there in given.items() if there]
+        if len(names) != 1:
+            told = f"not {' and '.join(names)}" if names else "but none of them is there"
+            raise ValueError(f"give the messages in one way of {', '.join(given)}, {told}")
+        if self.count is not None:
+            if self.message is None:
+                raise ValueError("'count' says how often one 'message' is published")
+            if self.count > max(1, self.before_launch) and not self.paced:
+                raise ValueError("'count' needs a pace: give 'every' or 'answer'")
+        if self.before_launch and self.durability == "volatile":
+            raise ValueError(
+                "what is published 'before_launch' is lost for later subscriptions unless the "
+                "durability is transient_local"
+            )
+        if self._is_several and not self.paced:
+            raise ValueError("several messages need a pace: give 'every' or 'answer'")
+        return self
+
+    @property
+    def _is_several(self) -> bool:
+        """Whether more than one message may follow the launch, without times of their own."""
+        read = self.from_ is not None and not self.from_.endswith(MCAP_SUFFIX)
+        if read or self.python is not None:
+            return not self.before_launch
+        return len(self.messages) > self.before_launch + 1
+
+    @property
+    def paced(self) -> bool:
+        """Whether it is said when the next message follows."""
+        return self.every is not None or self.answer is not None
+
+    @property
+    def has_end(self) -> bool:
+        """Whether it publishes a last message."""
+        return self.message is None or self.every is None or self.count is not None
+
+    @property
+    def exchanged(self) -> tuple[str, str]:
+        """The topic and its type."""
+        return self.publish, self.type
+
+    def order(self, making: Making) -> dict[str, Any]:
+        """The messages with their times."""
+        from grader.assignment.stimuli.stimulus_messages import messages_of
+
+        due = messages_of(self, making.folder, making.find, making.seed, making.drawn)
+        return {
+            "kind": "PublishOrder",
+            "topic": self.publish,
+            "type": self.type,
+            "reliability": self.reliability,
+            "durability": self.durability,
+            "depth": self.depth,
+            "messages": [one.value for one in due],
+            "times_s": [one.time_s for one in due],
+            "before_launch": self.before_launch,
+            "after_s": self.after,
+            "repeat_s": None if self.has_end else self.every,
+            "answer": self.answer,
+            "within_s": self.within,
+        }
