@@ -20,7 +20,7 @@ from grader.spec.unit import Dimension, format_duration
 from grader.submission.read.dependencies import is_known, meant
 
 
-def doubts(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterator[str]:
+def lint_warnings(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterator[str]:
     """Find what an author should look at once more.
 
     Args:

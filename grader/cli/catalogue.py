@@ -30,7 +30,7 @@ def validate(
 
     Tells of every mistake its file, its line, and what is allowed.
     """
-    from grader.assignment.lint_warnings import doubts
+    from grader.assignment.lint_warnings import lint_warnings
     from grader.assignment.load import load_assignment
     from grader.assignment.mutation import MUTANTS_FILE, load_mutants
     from grader.assignment.reference import reference_problems
@@ -50,10 +50,10 @@ def validate(
             print_error(str(error))
             broken += 1
             continue
-        told = [*doubts(loaded, mutants.mutants if mutants else None)]
+        told = [*lint_warnings(loaded, mutants.mutants if mutants else None)]
         told += not_installed(loaded.assignment.libraries)
-        for doubt in told:
-            print_warning(f"{loaded.file}: {doubt}")
+        for warning in told:
+            print_warning(f"{loaded.file}: {warning}")
         tested = f", {counted(len(mutants.mutants), 'mutant')}" if mutants else ""
         typer.echo(
             f"{loaded.file}: {counted(len(loaded.assignment.scenarios), 'scenario')}, "

@@ -54,7 +54,7 @@ class Breach:
         return not self.allowed or self.what in _ENDING
 
     @property
-    def deed(self) -> str:
+    def violation(self) -> str:
         """What the processes did, to follow who they are."""
         if not self.allowed:
             return f"{self.taken}, which is never allowed"
@@ -62,7 +62,7 @@ class Breach:
 
     def __str__(self) -> str:
         """Say it in words."""
-        return f"its processes {self.deed}"
+        return f"its processes {self.violation}"
 
 
 @dataclass(frozen=True)

@@ -258,8 +258,8 @@ class Runner:
                 cell.abandon()
         for cell in ready:
             cell.close()
-        for nursery in (*self._retired, *filter(None, (self._server,))):
-            nursery.close()
+        for prefork_server in (*self._retired, *filter(None, (self._server,))):
+            prefork_server.close()
 
     def successor(self) -> Runner:
         """End every cell, and hand what is warm on to a runner that begins anew.
@@ -268,14 +268,14 @@ class Runner:
         """
         with self._lock:
             self._aborted = True
-            nursery, self._server = self._server, None
+            prefork_server, self._server = self._server, None
         self.close()
         return replace(
             self,
             _ready=[],
             _cells=set(),
             _lock=threading.Lock(),
-            _server=nursery,
+            _server=prefork_server,
             _retired=[],
             _aborted=False,
         )

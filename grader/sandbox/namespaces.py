@@ -1,6 +1,6 @@
-"""A forked process goes into namespaces of its own: each cell of a nursery does.
+"""A forked process goes into namespaces of its own: each cell of a prefork server does.
 
-The nursery is in a sandbox already. A cell in it gets its own network (only a loopback
+The prefork server is in a sandbox already. A cell in it gets its own network (only a loopback
 interface), processes, shared memory and scratch, and sees of all cells' folders its own alone.
 """
 

@@ -175,7 +175,7 @@ class Sandbox:
         environment: Mapping[str, str],
         shown: Sequence[Bind] = (),
     ) -> list[str]:
-        """The command line of a nursery whose cells can go into namespaces of their own."""
+        """The command line of a prefork server whose cells can go into namespaces of their own."""
         # Students' interpreters start there as well, so Python is what they see of it; what runs
         # for us finds ours beside.
         binds = self.student_view(ros)

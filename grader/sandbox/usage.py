@@ -39,13 +39,13 @@ class CpuAccount:
 
     def __init__(self) -> None:
         """Nothing was seen yet."""
-        self._unwaited = OrphanCpu()
+        self._orphan_cpu = OrphanCpu()
 
     def stolen_s(self, usages: Iterable[Usage]) -> float:
         """What was taken so far, at least."""
         there = {Process(one.pid, one.started): one.taken for one in usages}
-        self._unwaited.look(there)
-        return (sum(map(sum, there.values())) + self._unwaited.ticks) / _TICKS_PER_S
+        self._orphan_cpu.look(there)
+        return (sum(map(sum, there.values())) + self._orphan_cpu.ticks) / _TICKS_PER_S
 
 
 def usage_of(roots: Iterable[int]) -> list[Usage]:

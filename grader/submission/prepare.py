@@ -18,7 +18,7 @@ from grader.submission.build.build_cache import BuildCache, CacheLimits
 from grader.submission.build.build_error_location import Sources
 from grader.submission.build.build_limits import BuildLimits
 from grader.submission.build.installed import inspect
-from grader.submission.build.standalone_build import built_apart
+from grader.submission.build.standalone_build import standalone
 from grader.submission.build.underlay import completed
 from grader.submission.intake.archive import SUFFIXES
 from grader.submission.intake.locate import Located, check_path, opened, submission_id
@@ -187,7 +187,7 @@ def _prepare(
         ros,
         only_python=all(package.build_type == "ament_python" for package in packages),
         cache=cache,
-        built_apart=built_apart(packages, located.files),
+        standalone=standalone(packages, located.files),
         limits=limits.build,
         on_progress=on_progress,
         sandbox=sandbox,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.lint_warnings import doubts
+from grader.assignment.lint_warnings import lint_warnings
 from grader.assignment.load import load_assignment
 from grader.assignment.mutant import Mutant
 from grader.errors import AssignmentError
@@ -140,12 +140,12 @@ def test_doubts(mistakes: Callable[..., list[str]], tmp_path: Path) -> None:
     assert mistakes("topic.published", "topic: /sped") == []
     loaded = load_assignment(tmp_path / "lesson")
     mutant = Mutant.model_validate({"id": "dies", "title": "Dies", "loses": ["alive"]})
-    assert list(doubts(loaded, [mutant])) == [
+    assert list(lint_warnings(loaded, [mutant])) == [
         "the check 'it' is about '/sped', which the scenario 'run' neither records nor sends. "
         "Did you mean '/speed'?",
         "no mutant loses the check 'it': nothing shows that it can fail",
     ]
-    assert any("there is no mutants.yaml" in doubt for doubt in doubts(loaded, None))
+    assert any("there is no mutants.yaml" in doubt for doubt in lint_warnings(loaded, None))
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_a_topic_that_a_check_names_on_the_way_may_be_misspelt_too(
 ) -> None:
     assert mistakes(uses, parameters) == []
     mutant = Mutant.model_validate({"id": "dies", "title": "Dies", "loses": ["alive", "it"]})
-    told = list(doubts(load_assignment(tmp_path / "lesson"), [mutant]))
+    told = list(lint_warnings(load_assignment(tmp_path / "lesson"), [mutant]))
     assert [one.partition(" is about ")[2].partition(",")[0] for one in told] == [
         repr(topic) for topic in doubtful
     ]

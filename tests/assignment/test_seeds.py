@@ -90,9 +90,9 @@ def _wrong_share(
     for back in range(int(within_s / period_s) + 1):
         earlier = np.roll(right, back, axis=1)
         earlier[:, :back] = np.nan
-        apart = np.abs(found - earlier)
-        apart[2] = np.abs(np.mod(found[2] - earlier[2] + math.pi, math.tau) - math.pi)
-        fits |= np.all(apart <= tolerance, axis=0)
+        standalone_build = np.abs(found - earlier)
+        standalone_build[2] = np.abs(np.mod(found[2] - earlier[2] + math.pi, math.tau) - math.pi)
+        fits |= np.all(standalone_build <= tolerance, axis=0)
     return 1.0 - float(fits.mean())
 
 

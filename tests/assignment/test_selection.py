@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.lint_warnings import doubts
+from grader.assignment.lint_warnings import lint_warnings
 from grader.assignment.load import load_assignment
 from grader.assignment.selection import select, visible_part
 from grader.assignment.withheld import Withheld
@@ -97,7 +97,9 @@ def test_what_is_required_is_shown_no_later(first, second, fits, tmp_path):
 def test_a_hidden_run_that_students_would_see_is_doubtful(tmp_path):
     def told(folder, checks):
         folder.mkdir()
-        return [one for one in doubts(lesson(folder, checks), []) if one.startswith("students")]
+        return [
+            one for one in lint_warnings(lesson(folder, checks), []) if one.startswith("students")
+        ]
 
     assert told(tmp_path / "a", CHECKS) == [
         "students see the run of the scenario 'hard', which only hidden checks name: the visible "

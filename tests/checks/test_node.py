@@ -318,8 +318,8 @@ _IN_RCLPY = (
 
 class TestAlive:
     def test_what_is_never_allowed_costs_the_check_even_where_the_node_ran_to_its_end(self):
-        deed = "sent SIGKILL to the process that holds their sandbox"
-        run = recording(breaches=(Breach(at(1.0), "forbidden call", deed, ""),))
+        violation = "sent SIGKILL to the process that holds their sandbox"
+        run = recording(breaches=(Breach(at(1.0), "forbidden call", violation, ""),))
         found = failing("node.alive", run)
         assert found.startswith(
             "its processes sent SIGKILL to the process that holds their sandbox, which is never "

@@ -384,7 +384,7 @@ def test_what_a_signal_from_outside_does_to_a_node_is_recorded_at_once(
     finding = judge("node.alive", recording)
     assert finding.status is Status.FAILED
     assert number.name in finding.observed
-    assert is_doubtful("node", recording)
+    assert is_doubtful(recording, None)
 
 
 def test_a_cell_that_is_stopped_is_a_fault_of_the_machine_within_bounds(

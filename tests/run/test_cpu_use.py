@@ -137,7 +137,7 @@ def test_a_process_that_takes_its_time_with_it_makes_nobody_owe_anything() -> No
 @pytest.mark.parametrize("cpus", [2, 4])
 def test_what_is_hidden_is_not_taken_for_the_machine_s(cpus: int) -> None:
     """Two processes were there, and ended with nobody to wait for them."""
-    after = CpuTimes(100 * MS, 40 * MS, 0, unwaited=2)
+    after = CpuTimes(100 * MS, 40 * MS, 0, orphans=2)
     others_ms = interval(CpuTimes(0, 0, 0), after, cpus).others_ns / MS
     assert others_ms == max(0, cpus * 100 - 40 - 2 * 100)
 
@@ -165,7 +165,7 @@ while True:
             until_s = time.monotonic() + 30
             while hidden < 10 and time.monotonic() < until_s:
                 time.sleep(0.1)
-                hidden += meter.read(family.look()).unwaited
+                hidden += meter.read(family.look()).orphans
         finally:
             relay.kill()
     # Some of what each took is known, and that each has ended.
@@ -200,7 +200,7 @@ def test_a_process_s_time_counts_when_it_has_ended_as_well() -> None:
     after = meter.read([])
     assert after.student_ns - before.student_ns >= 250 * MS
     assert after.time_ns > before.time_ns
-    assert after.unwaited == meter.read([]).unwaited == 0
+    assert after.orphans == meter.read([]).orphans == 0
     assert meter.cpus == len(os.sched_getaffinity(0))
 
 

@@ -71,7 +71,7 @@ def test_what_a_process_asks_for_is_refused_and_told(guard: Guard) -> None:
         "try:\n    os.kill(1, 15)\nexcept PermissionError:\n    print('refused')"
     )
     assert run(guard, source).split() == ["-1", "1", "refused"]
-    assert guard.deeds == (
+    assert guard.violations == (
         "called `bpf`",
         "sent SIGTERM to the process that holds their sandbox",
     )
@@ -88,14 +88,14 @@ def test_a_process_may_do_what_it_likes_with_its_own(guard: Guard) -> None:
         "print(child.wait())\n"
     )
     assert run(guard, source).split() == ["heard", "heard", "-9"]
-    assert guard.deeds == ()
+    assert guard.violations == ()
 
 
 def test_who_stands_guard_is_not_under_it(guard: Guard) -> None:
     run(guard, "")
     # No such command: whoever asks, it comes to nothing.
     assert ctypes.CDLL(None).syscall(CALLS["bpf"], -1, 0, 0) == -1
-    assert guard.deeds == ()
+    assert guard.violations == ()
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_a_program_may_use_any_timer(guard: Guard) -> None:
         "print(*(create[0](create[1], clock, None, ctypes.byref(timer)) for clock in (0, 1)))"
     )
     assert run(guard, source).split() == ["0", "0"]
-    assert guard.deeds == ()
+    assert guard.violations == ()
 
 
 def test_a_signal_from_outside_is_none_of_theirs(guard: Guard) -> None:

@@ -62,33 +62,35 @@ def test_a_cell_that_hangs_keeps_nobody_waiting_for_the_end(boxed: bool, tmp_pat
     found = try_sandbox()
     if boxed and found.problem:
         pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
-    nursery = PreforkServer(ros.find(), Sandbox(tmp_path / "cache") if boxed else None)
-    cell = CellProcess(nursery)
+    prefork_server = PreforkServer(ros.find(), Sandbox(tmp_path / "cache") if boxed else None)
+    cell = CellProcess(prefork_server)
     cell._forked._await_fork(timeout=None)
-    usages = usage_of([nursery._popen.pid])
+    usages = usage_of([prefork_server._popen.pid])
     (hung,) = {usage.pid for usage in usages} - {usage.parent for usage in usages}
     its_end = os.pidfd_open(hung)
     os.kill(hung, signal.SIGSTOP)
-    nursery.close(limit_s=0.1)
+    prefork_server.close(limit_s=0.1)
     cell.close()
     assert select.select([its_end], [], [], 10.0)[0]
     os.close(its_end)
-    assert not nursery.cells.exists()
+    assert not prefork_server.cells.exists()
 
 
 @pytest.mark.slow
 def test_a_cell_that_hangs_does_not_outlive_long_whoever_could_kill_it() -> None:
-    nursery = PreforkServer(ros.find())
-    cell = CellProcess(nursery)
+    prefork_server = PreforkServer(ros.find())
+    cell = CellProcess(prefork_server)
     cell._forked._await_fork(timeout=None)
-    (hung,) = {usage.pid for usage in usage_of([nursery._popen.pid])} - {nursery._popen.pid}
+    (hung,) = {usage.pid for usage in usage_of([prefork_server._popen.pid])} - {
+        prefork_server._popen.pid
+    }
     os.kill(hung, signal.SIGSTOP)
     # What the kernel does for a grader that is killed.
-    nursery._socket.close()
-    assert nursery._popen.wait(45.0) == 0
+    prefork_server._socket.close()
+    assert prefork_server._popen.wait(45.0) == 0
     assert not Path(f"/proc/{hung}").exists()
     cell.close()
-    nursery.close()
+    prefork_server.close()
 
 
 def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(tmp_path: Path) -> None:
@@ -96,15 +98,15 @@ def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(tmp_pat
     if found.problem:
         pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
     sandbox = Sandbox(tmp_path / "cache")
-    nursery = PreforkServer(ros.find(), sandbox)
+    prefork_server = PreforkServer(ros.find(), sandbox)
     check = sandbox.watched()
     check()
-    assert nursery.is_alive
+    assert prefork_server.is_alive
     next(sandbox.python_tree.glob("lib/python3*/site-packages/rclpy/node.py")).unlink()
     with pytest.raises(GraderFault, match="files of the students' Python were deleted"):
         check()
-    assert not nursery.is_alive
-    nursery.close()
+    assert not prefork_server.is_alive
+    prefork_server.close()
 
 
 def test_whoever_installs_a_package_meanwhile_spoils_no_run(
@@ -144,6 +146,6 @@ def test_a_student_inherits_no_descriptor_but_its_own(run_node: RunNode) -> None
     standard = [target for fd, target in held if int(fd) <= 2]
     others = [target for fd, target in held if int(fd) > 2]
     assert standard[0] == "/dev/null"
-    # The tracer's two pipes, and nothing of the nursery's or of another cell's.
+    # The tracer's two pipes, and nothing of the prefork server's or of another cell's.
     assert len([target for target in others if target.startswith("pipe:")]) == 2
     assert not [target for target in others if target.startswith("socket:")]

@@ -12,7 +12,7 @@ from grader.run.runner import Runner
 
 
 class FakeServer:
-    """A nursery whose cells run on."""
+    """A prefork server whose cells run on."""
 
     def __init__(self, *_: object) -> None:
         self.is_alive = True
@@ -26,7 +26,9 @@ def test_cells_that_run_keep_their_folders_where_a_nursery_is_replaced(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(runner_module, "PreforkServer", FakeServer)
-    monkeypatch.setattr(runner_module, "CellProcess", lambda nursery, _imports: nursery)
+    monkeypatch.setattr(
+        runner_module, "CellProcess", lambda prefork_server, _imports: prefork_server
+    )
     runner = Runner(ros.RosInstallation("wheels", Path("python"), ()))
     first = runner._new_cell(())
     assert isinstance(first, FakeServer)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.ros import RosInstallation
-from grader.submission.build.standalone_build import as_handed_in, built_apart, lay
+from grader.submission.build.standalone_build import as_handed_in, lay, standalone
 from grader.submission.intake.locate import only, opened
 from grader.submission.prepare import Prepared, prepare
 from grader.submission.read.package import read_package
@@ -28,10 +28,10 @@ def workspace(tree: Tree, node: str = NODE, manifest: str = NEEDS_MSGS) -> None:
     tree.package({"bot_publisher/node.py": node, "package.xml": manifest})
 
 
-def apart(tree: Tree, ros: RosInstallation) -> tuple[str, ...]:
+def standalone_build(tree: Tree, ros: RosInstallation) -> tuple[str, ...]:
     with opened(tree.root) as located:
         packages = [read_package(located, folder, ros) for folder in located.packages]
-        return built_apart(packages, located.files)
+        return standalone(packages, located.files)
 
 
 def test_an_interface_package_beside_a_node_is_built_apart(
@@ -39,14 +39,14 @@ def test_an_interface_package_beside_a_node_is_built_apart(
 ) -> None:
     workspace(tree)
     tree.write({f"{MSGS}/README.md": "Messages of the course.\n", f"{MSGS}/LICENSE": "free\n"})
-    assert apart(tree, named_ros) == ("bot_msgs",)
+    assert standalone_build(tree, named_ros) == ("bot_msgs",)
 
 
 def test_where_nothing_else_is_there_it_is_just_built(
     tree: Tree, named_ros: RosInstallation
 ) -> None:
     tree.write(dict(INTERFACES))
-    assert apart(tree, named_ros) == ()
+    assert standalone_build(tree, named_ros) == ()
 
 
 COURSE = """
@@ -66,7 +66,7 @@ def test_usual_styles_are_built_apart(tree: Tree, named_ros: RosInstallation, mo
     tree.write(
         {f"{MSGS}/CMakeLists.txt": CMAKE.replace("ament_package()", f"{more}ament_package()")}
     )
-    assert apart(tree, named_ros) == ("bot_msgs",)
+    assert standalone_build(tree, named_ros) == ("bot_msgs",)
 
 
 # What could see, or change, something that is not in the package.
@@ -96,7 +96,7 @@ def test_who_may_look_at_others_is_built_with_them(
     tree.write(
         {f"{MSGS}/CMakeLists.txt": CMAKE.replace("ament_package()", f"{more}\nament_package()")}
     )
-    assert apart(tree, named_ros) == ()
+    assert standalone_build(tree, named_ros) == ()
 
 
 @pytest.mark.parametrize(
@@ -120,7 +120,7 @@ def test_other_packages_are_built_together(
 ) -> None:
     workspace(tree)
     tree.write(dict(files))
-    assert apart(tree, named_ros) == ()
+    assert standalone_build(tree, named_ros) == ()
 
 
 def test_a_package_with_a_link_is_built_with_the_others(
@@ -129,7 +129,7 @@ def test_a_package_with_a_link_is_built_with_the_others(
     workspace(tree)
     tree.write({"src/shared/Arm.msg": "uint8 x\n"})
     (tree.root / MSGS / "msg/Arm.msg").symlink_to("../../shared/Arm.msg")
-    assert apart(tree, named_ros) == ()
+    assert standalone_build(tree, named_ros) == ()
 
 
 def test_alone_a_package_has_its_own_files_and_a_hash_of_them(tree: Tree) -> None:
@@ -263,7 +263,7 @@ def test_it_is_the_same_as_when_all_is_built_together(
 ) -> None:
     workspace(tree)
     first = built(tree, real_ros).install
-    monkeypatch.setattr("grader.submission.prepare.built_apart", lambda *_: ())
+    monkeypatch.setattr("grader.submission.prepare.standalone", lambda *_: ())
     tree.write({"src/bot_publisher/bot_publisher/other.py": ""})
     second = built(tree, real_ros).install
     assert first is not None

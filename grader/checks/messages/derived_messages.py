@@ -39,7 +39,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class MadeOf:
+class DerivedMessages:
     """All messages of a topic against those of another one.
 
     Attributes:
@@ -62,7 +62,7 @@ class MadeOf:
         fields: Mapping[str, str],
         tolerance: float,
         within_s: float,
-    ) -> MadeOf:
+    ) -> DerivedMessages:
         """Look up which sources each message may be made of.
 
         Args:

@@ -11,7 +11,7 @@ from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.checks.first_seen import endpoints_seen
-from grader.checks.messages.derived_messages import MadeOf, Sample
+from grader.checks.messages.derived_messages import DerivedMessages, Sample
 from grader.checks.messages.source_value import SourceText, SourceValue, mistakes, spread
 from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField
@@ -91,7 +91,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     if not sources:
         return Finding.error(expected, f"nothing was recorded on {source}, so it cannot be judged")
     try:
-        made_of = MadeOf.of(
+        derived = DerivedMessages.of(
             recording,
             messages,
             sources,
@@ -101,9 +101,9 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         )
     except NoSuchField as error:
         return Finding.error(expected, f"the assignment expects what does not exist: {error}")
-    if not _is_telling(made_of.table, parameters.tolerance):
+    if not _is_conclusive(derived.table, parameters.tolerance):
         return _untold(recording, parameters, expected)
-    judged, wrong = _judged(recording, parameters, made_of)
+    judged, wrong = _judged(recording, parameters, derived)
     if len(judged) < parameters.at_least:
         if len(messages) < parameters.at_least:
             return why_few(recording, parameters.topic, parameters.at_least).finding(expected)
@@ -120,27 +120,27 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
             ),
         )
     if wrong:
-        return _failure(recording, parameters, made_of, judged, wrong, expected)
-    late = [one for one in judged if not made_of.fits(one, one.window[one.excused :])]
+        return _failure(recording, parameters, derived, judged, wrong, expected)
+    late = [one for one in judged if not derived.fits(one, one.window[one.excused :])]
     if late:
         return Finding.to_repeat(
             expected,
             f"{len(late)} of {counted(len(judged), 'message')} have older values, but the machine "
             "took the time from the process",
         )
-    plots = tuple(_plot(recording, made_of, judged, index) for index in range(len(made_of.fields)))
+    plots = tuple(_plot(recording, derived, judged, index) for index in range(len(derived.fields)))
     seen = f"so it is in all of {counted(len(judged), 'message')}"
     return Finding.passed(expected, seen, Evidence(plots=plots))
 
 
 def _judged(
-    recording: Recording, parameters: Follows, made_of: MadeOf
+    recording: Recording, parameters: Follows, derived: DerivedMessages
 ) -> tuple[list[Sample], list[Sample]]:
     """The messages that count, and those of them that are wrong."""
     # One that fits nothing may be made of a message that was not recorded.
-    fits = {sample.number: made_of.fits(sample) for sample in made_of.samples}
-    known = [sample for sample in made_of.samples if sample.is_known or fits[sample.number]]
-    begin_ns = made_of.sources[0].stamp_ns
+    fits = {sample.number: derived.fits(sample) for sample in derived.samples}
+    known = [sample for sample in derived.samples if sample.is_known or fits[sample.number]]
+    begin_ns = derived.sources[0].stamp_ns
     settled_ns = begin_ns + round(parameters.settle * NS)
     settled_ns += round(recording.stolen_s(begin_ns, settled_ns) * NS)
     first = next((index for index, sample in enumerate(known) if fits[sample.number]), 0)
@@ -150,7 +150,7 @@ def _judged(
     return judged, [sample for sample in judged if not fits[sample.number]]
 
 
-def _is_telling(table: Sequence[tuple[float, ...]], tolerance: float) -> bool:
+def _is_conclusive(table: Sequence[tuple[float, ...]], tolerance: float) -> bool:
     """Whether the values of every field vary, so that a wrong one shows."""
     return all(spread(column) > _TELLING * tolerance for column in zip(*table, strict=True))
 
@@ -177,7 +177,7 @@ def _untold(recording: Recording, parameters: Follows, expected: str) -> Finding
 def _failure(
     recording: Recording,
     parameters: Follows,
-    made_of: MadeOf,
+    derived: DerivedMessages,
     judged: Sequence[Sample],
     wrong: Sequence[Sample],
     expected: str,
@@ -187,11 +187,11 @@ def _failure(
     seen = judged[:: max(1, len(judged) // _MOST_EXPLAINED)]
     bad = [
         index
-        for index in range(len(made_of.fields))
-        if any(not made_of.fits(sample, fields=[index]) for sample in told)
+        for index in range(len(derived.fields))
+        if any(not derived.fits(sample, fields=[index]) for sample in told)
     ]
-    row = made_of.nearest(first)
-    late_s = _lag_s(made_of, told)
+    row = derived.nearest(first)
+    late_s = _lag_s(derived, told)
     if late_s is not None:
         observed = (
             f"the values are those of {code(parameters.source)} {format_duration(late_s)} earlier"
@@ -204,38 +204,38 @@ def _failure(
         observed = f"the values are of different moments of {code(parameters.source)}"
         hint = "Fill all fields from one message: `msg` of the callback."
     else:
-        observed = _wrong_fields(made_of, first, row, bad, _explanation(made_of, seen, told, bad))
+        observed = _wrong_fields(derived, first, row, bad, _explanation(derived, seen, told, bad))
         hint = (
-            f"Set {codes(made_of.fields[index] for index in bad)} in the callback of "
-            f"{code(parameters.source)}, from {codes(made_of.values[index].text for index in bad)} "
+            f"Set {codes(derived.fields[index] for index in bad)} in the callback of "
+            f"{code(parameters.source)}, from {codes(derived.values[index].text for index in bad)} "
             "of its message."
         )
     rows = tuple(
-        (field, f"{made_of.table[row][index]:.6g}", f"{first.values[index]:.6g}")
-        for index, field in enumerate(made_of.fields)
+        (field, f"{derived.table[row][index]:.6g}", f"{first.values[index]:.6g}")
+        for index, field in enumerate(derived.fields)
     )
     label = f"message {first.number}"
     moment = Moment(f"{label} is wrong", recording.since_launch_s(first.message.stamp_ns))
-    shown = bad or range(len(made_of.fields))
+    shown = bad or range(len(derived.fields))
     return Finding.failed(
         expected,
         f"{observed} ({len(wrong)} of {counted(len(judged), 'message')} wrong)",
         hint,
         Evidence(
             moments=(moment,),
-            plots=tuple(_plot(recording, made_of, judged, index) for index in shown),
+            plots=tuple(_plot(recording, derived, judged, index) for index in shown),
             tables=(Table(label.capitalize(), ("field", "expected", "observed"), rows),),
         ),
     )
 
 
 def _wrong_fields(
-    made_of: MadeOf, sample: Sample, row: int, bad: Sequence[int], why: Mapping[int, str]
+    derived: DerivedMessages, sample: Sample, row: int, bad: Sequence[int], why: Mapping[int, str]
 ) -> str:
     """The wrong fields of a message, with what stands in each."""
     fields = [
-        f"{code(made_of.fields[index])} = {sample.values[index]:.4g} instead of "
-        f"{made_of.table[row][index]:.4g}"
+        f"{code(derived.fields[index])} = {sample.values[index]:.4g} instead of "
+        f"{derived.table[row][index]:.4g}"
         for index in bad
     ]
     if len(bad) > 1 and all(why.get(index) in (_NEVER_SET, _ALWAYS_THE_SAME) for index in bad):
@@ -246,58 +246,58 @@ def _wrong_fields(
     )
 
 
-def _lag_s(made_of: MadeOf, wrong: Sequence[Sample]) -> float | None:
+def _lag_s(derived: DerivedMessages, wrong: Sequence[Sample]) -> float | None:
     """How old the values are, if all wrong messages have those of an older source."""
     ages = []
     for sample in wrong:
         older = range(sample.window[0])
-        row = next((r for r in reversed(older) if made_of.fits(sample, range(r, r + 1))), None)
+        row = next((r for r in reversed(older) if derived.fits(sample, range(r, r + 1))), None)
         if row is None:
             return None
-        ages.append((sample.message.stamp_ns - made_of.sources[row].stamp_ns) / NS)
-    still = spread([sample.values[0] for sample in wrong]) <= made_of.tolerance
+        ages.append((sample.message.stamp_ns - derived.sources[row].stamp_ns) / NS)
+    still = spread([sample.values[0] for sample in wrong]) <= derived.tolerance
     # A value that never changes is old as well, but that says less.
     return None if still and len(wrong) > 1 else sorted(ages)[len(ages) // 2]
 
 
 def _explanation(
-    made_of: MadeOf, seen: Sequence[Sample], wrong: Sequence[Sample], bad: Sequence[int]
+    derived: DerivedMessages, seen: Sequence[Sample], wrong: Sequence[Sample], bad: Sequence[int]
 ) -> dict[int, str]:
     """What stands in the wrong fields, as far as the data tells."""
     found = {}
     for index in bad:
         numbers = [sample.values[index] for sample in seen]
         if any(not math.isfinite(number) for number in numbers):
-            found[index] = _NOT_THERE if "[" in made_of.fields[index] else _NOT_FINITE
+            found[index] = _NOT_THERE if "[" in derived.fields[index] else _NOT_FINITE
         elif len(numbers) > 1 and spread(numbers) <= 0.0:
             found[index] = _ALWAYS_THE_SAME if numbers[0] else _NEVER_SET
         else:
-            off = [sample for sample in wrong if not made_of.fits(sample, fields=[index])]
-            words = _mistaken(made_of, seen, off, index)
+            off = [sample for sample in wrong if not derived.fits(sample, fields=[index])]
+            words = _mistaken(derived, seen, off, index)
             if words:
                 found[index] = words
     return found
 
 
 def _mistaken(
-    made_of: MadeOf, seen: Sequence[Sample], wrong: Sequence[Sample], index: int
+    derived: DerivedMessages, seen: Sequence[Sample], wrong: Sequence[Sample], index: int
 ) -> str | None:
     """What stands in a field: in nearly all messages, and in nearly all of those that are wrong.
 
     Of a number that is not negative, what has lost its sign is right as well, and says nothing of
     the few that are wrong.
     """
-    value = made_of.values[index]
+    value = derived.values[index]
     rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
-    taken = {row: list(mistakes(value, made_of.sources[row].value)) for row in rows}
+    taken = {row: list(mistakes(value, derived.sources[row].value)) for row in rows}
     for number, (words, _) in enumerate(taken[rows[0]]):
         # Of an array in the source, not every message need have as many elements.
         if any(len(entries) <= number for entries in taken.values()):
             break
         series = {row: entries[number][1] for row, entries in taken.items()}
-        if not spread(list(series.values())) > made_of.tolerance:
+        if not spread(list(series.values())) > derived.tolerance:
             continue
-        if all(_hits(samples, index, series, made_of.tolerance) for samples in (seen, wrong)):
+        if all(_hits(samples, index, series, derived.tolerance) for samples in (seen, wrong)):
             return words
     return None
 
@@ -313,9 +313,11 @@ def _hits(
     return hits >= _NEARLY_ALL * len(samples)
 
 
-def _plot(recording: Recording, made_of: MadeOf, judged: Sequence[Sample], index: int) -> Plot:
-    field = made_of.fields[index]
-    errors = [made_of.error(sample, index) for sample in judged]
+def _plot(
+    recording: Recording, derived: DerivedMessages, judged: Sequence[Sample], index: int
+) -> Plot:
+    field = derived.fields[index]
+    errors = [derived.error(sample, index) for sample in judged]
     finite = [(s, e) for s, e in zip(judged, errors, strict=True) if math.isfinite(e)]
     return Plot(
         f"{field}: how far it is off",
@@ -323,5 +325,5 @@ def _plot(recording: Recording, made_of: MadeOf, judged: Sequence[Sample], index
         f"error of {field}",
         tuple(recording.since_launch_s(sample.message.stamp_ns) for sample, _ in finite),
         tuple(error for _, error in finite),
-        (-made_of.tolerance, made_of.tolerance),
+        (-derived.tolerance, derived.tolerance),
     )

@@ -106,8 +106,8 @@ def _stays(driving: list[Command], levels: Collection[float]) -> bool:
     """Whether the lower of two sizes is no step of a proportion that was rounded or held."""
     lower = min(levels)
     times_ns = [item.time_ns for item in driving if round(_size(item), _DIGITS) == lower]
-    apart = round(max(levels) - lower, _DIGITS)
-    return apart > _STEP_M_S and times_ns[-1] - times_ns[0] > _HELD_NS
+    standalone_build = round(max(levels) - lower, _DIGITS)
+    return standalone_build > _STEP_M_S and times_ns[-1] - times_ns[0] > _HELD_NS
 
 
 def _size(item: Command) -> float:

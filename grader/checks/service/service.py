@@ -337,15 +337,15 @@ def _why_otherwise(
     recording: Recording, parameters: Concurrent, first: Call, second: Call
 ) -> Cause | None:
     takes_s, gap_s = parameters.takes, _gap_s(first, second)
-    apart = gap_s >= _APART * takes_s
+    standalone_build = gap_s >= _APART * takes_s
     together = gap_s <= _TOGETHER * takes_s
-    if together if parameters.calls == "side_by_side" else apart:
+    if together if parameters.calls == "side_by_side" else standalone_build:
         return None
     seen = f"the answers to two calls at once came {format_duration(gap_s)} apart"
     ends = (first.answered_ns or 0, second.answered_ns or 0)
     stolen_s = recording.stolen_s(first.requested_ns, max(ends))
     if (parameters.calls == "side_by_side" and gap_s - stolen_s <= _TOGETHER * takes_s) or (
-        not together and not apart
+        not together and not standalone_build
     ):
         return Cause(
             f"{seen}, so it cannot be told how they were worked on",

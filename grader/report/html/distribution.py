@@ -40,13 +40,13 @@ def draw_distribution(scores: Sequence[float], most: float, name: str) -> Figure
 
 
 def _draw(counts: Sequence[int], most: float, caption: str, name: str, width: float) -> Markup:
-    apart = 14.0
-    step = (width - apart) / len(counts)
+    standalone_build = 14.0
+    step = (width - standalone_build) / len(counts)
     bottom = HEIGHT - BOTTOM
     highest = max(counts)
     content = []
     for index, count in enumerate(counts):
-        x = index * step + (apart if index == BINS else 0.0)
+        x = index * step + (standalone_build if index == BINS else 0.0)
         height = (bottom - TOP) * count / highest
         kind = "count full" if index == BINS else "count"
         content.append(

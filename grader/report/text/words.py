@@ -150,7 +150,7 @@ def waiting(grade: Grade, result: CheckResult) -> str:
 def limit_reached(breach: Breach) -> str:
     """What reached which limit of the sandbox, and what came of it."""
     then = "they were ended for it" if breach.ended else "anything more is refused"
-    return f"the processes of the submission {breach.deed}; {then}"
+    return f"the processes of the submission {breach.violation}; {then}"
 
 
 def advice(result: CheckResult, finding: Finding) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from grader.recording.event import Wait
 from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording
 from grader.run.cell.domain import joined_domains
 from grader.run.cell.ending import EndingConditions
-from grader.run.cell.exit_barrier import Leave
+from grader.run.cell.exit_barrier import ExitBarrier
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
 from grader.run.cell.progress_events import tell, tell_line
@@ -79,10 +79,10 @@ class Cell:
                 order.process_sandbox.limits,
                 lambda: self._students.inits,
                 lambda: self._output.written_bytes,
-                ViolationWatch(self._students, self._output, self._graph, wire).deeds,
+                ViolationWatch(self._students, self._output, self._graph, wire).violations,
             )
         self._meter = DisturbanceMeter(Family(os.getpid()).look)
-        self._leave = Leave(self._output, self._graph, self._students)
+        self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
         self._robot: SimulatedRobot | None = None
         if order.simulator is not None:
@@ -344,12 +344,12 @@ class Cell:
             now = time.monotonic()
             settled = self._matched_ns is not None
             news = self._probe.has_met() and not settled
-            if now >= self._next_graph or news or self._leave.is_asked:
+            if now >= self._next_graph or news or self._exit_barrier.is_asked:
                 self._next_graph = now + (_SETTLED_GRAPH_PERIOD_S if settled else _GRAPH_PERIOD_S)
                 self._graph.poll()
                 self._find_foreign()
                 _raise_if_abandoned()
-            self._leave.give()
+            self._exit_barrier.give()
             self._player.tick()
 
     def _find_foreign(self) -> None:

@@ -34,20 +34,20 @@ class CellProcess:
         folder: Its own; gone after :meth:`close`.
     """
 
-    def __init__(self, nursery: PreforkServer, imports: Sequence[str] = ()) -> None:
+    def __init__(self, prefork_server: PreforkServer, imports: Sequence[str] = ()) -> None:
         """Start it; it joins the graph while the order is still being made.
 
         Raises:
-            GraderFault: The nursery has ended.
+            GraderFault: The prefork server has ended.
         """
-        self._server = nursery
+        self._server = prefork_server
         self._closing = threading.Lock()
-        self._temporary = tempfile.TemporaryDirectory(prefix="cell-", dir=nursery.cells)
+        self._temporary = tempfile.TemporaryDirectory(prefix="cell-", dir=prefork_server.cells)
         self.folder = Path(self._temporary.name)
         self._errors = self.folder / "stderr.txt"
         own_domain = os.environ.get("ROS_DOMAIN_ID", "")
         with self._errors.open("wb") as errors:
-            self._forked = nursery.start_cell(
+            self._forked = prefork_server.start_cell(
                 self.folder, errors, [own_domain] if own_domain.isdigit() else [], imports
             )
 

@@ -8,7 +8,7 @@ from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
 
 
-class Leave:
+class ExitBarrier:
     """Keeps the processes that wait to end, by their tracers' word, until the graph has them."""
 
     def __init__(
@@ -31,7 +31,7 @@ class Leave:
             return
         waiting = self._waiting()
         for name in waiting[self._given :]:
-            self._students.let_leave(name)
+            self._students.let_exit(name)
         self._given = len(waiting)
 
     def _waiting(self) -> list[str]:

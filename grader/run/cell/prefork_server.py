@@ -65,11 +65,11 @@ SIMULATOR_MODULE = "grader.run.cell.simulator"
 
 
 class ForkedCell:
-    """A cell that a nursery forks, with the surface of :class:`subprocess.Popen`.
+    """A cell that a prefork server forks, with the surface of :class:`subprocess.Popen`.
 
     Attributes:
         returncode: As in :mod:`subprocess`, or None while it runs.
-        cpu_s: CPU time of it and of all processes of the student, and what the nursery
+        cpu_s: CPU time of it and of all processes of the student, and what the prefork server
             took since another one ended; known at its end.
     """
 
@@ -95,7 +95,7 @@ class ForkedCell:
         with self._waiting:
             if self.returncode is None:
                 self._await_fork(timeout)
-                # Nobody is left to tell when the nursery itself was killed.
+                # Nobody is left to tell when the prefork server itself was killed.
                 self.returncode, self.cpu_s = self._told(timeout) or (-signal.SIGKILL, 0.0)
                 os.close(self._status)
             return self.returncode
@@ -181,7 +181,7 @@ class PreforkServer:
                 ours or ROS's only.
 
         Raises:
-            GraderFault: The nursery has ended.
+            GraderFault: The prefork server has ended.
         """
         in_read, in_write = os.pipe()
         out_read, out_write = os.pipe()
@@ -199,7 +199,7 @@ class PreforkServer:
         except OSError as error:
             for descriptor in (in_write, out_read, status_read):
                 os.close(descriptor)
-            raise GraderFault(f"the nursery of cells has ended: {error.strerror}") from error
+            raise GraderFault(f"the prefork server of cells has ended: {error.strerror}") from error
         finally:
             for descriptor in (in_read, out_write, status_write):
                 os.close(descriptor)

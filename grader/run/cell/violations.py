@@ -38,10 +38,10 @@ class ViolationWatch:
         # Of our own participant: nobody else is here yet.
         self._ports = bound_ports() if wire is not None else frozenset()
 
-    def deeds(self) -> Iterator[tuple[str, str]]:
+    def violations(self) -> Iterator[tuple[str, str]]:
         """Everything so far: its kind, and the same in words."""
-        for deed in self._students.deeds:
-            yield "forbidden call", deed
+        for violation in self._students.violations:
+            yield "forbidden call", violation
         if self._output.forgers:
             yield "forged report", _FORGERY
         if self._graph.forbidden_names:

@@ -76,7 +76,7 @@ class CpuTimes:
     student_ns: int
     idle_ns: int
     own_ns: int = 0
-    unwaited: int = 0
+    orphans: int = 0
 
 
 def interval(before: CpuTimes, after: CpuTimes, cpus: int) -> Interval:
@@ -93,7 +93,7 @@ def interval(before: CpuTimes, after: CpuTimes, cpus: int) -> Interval:
         student_ns += own_ns
     # What they took since they were seen last nobody knows; whoever sees to it that nobody does
     # cannot have it counted as the machine's.
-    student_ns += after.unwaited * (after.time_ns - before.time_ns)
+    student_ns += after.orphans * (after.time_ns - before.time_ns)
     idle_ns = max(0, after.idle_ns - before.idle_ns)
     return Interval(before.time_ns, after.time_ns, max(0, all_ns - student_ns - idle_ns))
 
@@ -106,7 +106,7 @@ class CpuMeter:
         self._cpus = os.sched_getaffinity(0)
         # A container's stand-in (lxcfs) calls a CPU idle that another container uses.
         self._knows_idle = not os.path.ismount(_STAT)
-        self._unwaited = OrphanCpu()
+        self._orphan_cpu = OrphanCpu()
 
     @property
     def cpus(self) -> int:
@@ -126,11 +126,11 @@ class CpuMeter:
                 there[process] = taken
                 student_ns += own_ns
         there[Process(os.getpid(), 0)] = _waited_here()
-        self._unwaited.look(there, complete=complete)
-        ticks = sum(taken.waited for taken in there.values()) + self._unwaited.ticks
+        self._orphan_cpu.look(there, complete=complete)
+        ticks = sum(taken.waited for taken in there.values()) + self._orphan_cpu.ticks
         student_ns += ticks * _TICK_NS
         times = (time.monotonic_ns(), student_ns, self._idle_ns(), time.process_time_ns())
-        return CpuTimes(*times, self._unwaited.ended)
+        return CpuTimes(*times, self._orphan_cpu.ended)
 
     def _idle_ns(self) -> int:
         if not self._knows_idle:

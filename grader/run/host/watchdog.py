@@ -48,7 +48,7 @@ class Watchdog:
         limits: Limits,
         inits: Callable[[], Sequence[int]],
         output_bytes: Callable[[], int],
-        deeds: Callable[[], Iterable[tuple[str, str]]] = tuple,
+        violations: Callable[[], Iterable[tuple[str, str]]] = tuple,
     ) -> None:
         """Prepare.
 
@@ -59,7 +59,7 @@ class Watchdog:
         self._limits = limits
         self._inits = inits
         self._output_bytes = output_bytes
-        self._deeds = deeds
+        self._violations = violations
         self._breaches: dict[str, Breach] = {}
         self._looks = 0
         self._hidden_bytes = 0
@@ -122,8 +122,8 @@ class Watchdog:
         if written > limits.output_bytes:
             allowed = size_words(limits.output_bytes)
             self._end_all("output", f"{size_words(written)} of output", allowed)
-        for kind, deed in self._deeds():
-            self._end_all(kind, deed, "")
+        for kind, violation in self._violations():
+            self._end_all(kind, violation, "")
         self._look_at(STUDENT / "disk", "disk", "/tmp and home")
         self._look_at(STUDENT / "shared", "shared memory", "/dev/shm")
 

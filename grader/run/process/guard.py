@@ -50,7 +50,7 @@ class Guard:
         listener = self._starter.submit(_install, (program, unheard), calls["seccomp"]).result()
         self._listener = listener
         self._ending: set[int] = set()
-        self._deeds: list[str] = []
+        self._violations: list[str] = []
         self._counted = 0
         self._wake_read, self._wake_write = os.pipe()
         self._thread = threading.Thread(target=self._listen, name="guard", daemon=True)
@@ -74,9 +74,9 @@ class Guard:
         return bool(self._ending.difference(ours)) or not self.is_heard
 
     @property
-    def deeds(self) -> tuple[str, ...]:
+    def violations(self) -> tuple[str, ...]:
         """What the student's processes did so far that nobody may, in words."""
-        return tuple(self._deeds)
+        return tuple(self._violations)
 
     def close(self) -> None:
         """End; call it when nothing that was started lives any more."""
@@ -109,16 +109,16 @@ class Guard:
         fcntl.ioctl(listener, _NOTIF_RECV, asked, True)
         number, process, _flags, call, _architecture, _place, *arguments = _ASKED.unpack(asked)
         name = self._names.get(call, f"system call {call}")
-        deed = told_of(name, arguments)
+        violation = told_of(name, arguments)
         self._counted += is_counted(name)
         if is_counted(name) and self._counted <= MOST_COUNTED:
             answer = (0, _CONTINUE)
-        elif deed is None and can_end(name, arguments):
+        elif violation is None and can_end(name, arguments):
             self._ending.add(process)
             answer = (0, _CONTINUE)
         else:
-            if deed is not None and deed not in self._deeds:
-                self._deeds.append(deed)
+            if violation is not None and violation not in self._violations:
+                self._violations.append(violation)
             answer = (-errno.EPERM, 0)
         fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, *answer))
 

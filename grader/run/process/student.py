@@ -189,9 +189,9 @@ class StudentProcesses:
         return tuple(init for init in inits if init is not None)
 
     @property
-    def deeds(self) -> tuple[str, ...]:
+    def violations(self) -> tuple[str, ...]:
         """System calls of theirs that nobody may make, in words."""
-        return self._guard.deeds if self._guard is not None else ()
+        return self._guard.violations if self._guard is not None else ()
 
     @property
     def pids(self) -> frozenset[int]:
@@ -216,7 +216,7 @@ class StudentProcesses:
                     process.stop_s = (process.exited_ns - process.killed_ns) / NS
         return any(process.exited_ns is None for process in self._running)
 
-    def let_leave(self, name: str | None = None) -> None:
+    def let_exit(self, name: str | None = None) -> None:
         """Let a process end, or all: their tracers wait until what they declared was seen."""
         for process in self._running:
             if name in (None, process.name) and process.seen_fd is not None:
@@ -235,7 +235,7 @@ class StudentProcesses:
 
     def kill(self, name: str, number: signal.Signals) -> bool:
         """Send a signal to the process group of one process, in the middle of the run."""
-        self.let_leave(name)
+        self.let_exit(name)
         running = self.is_running(name)
         for process in self._running:
             if process.name == name and process.exited_ns is None:
@@ -246,7 +246,7 @@ class StudentProcesses:
 
     def stop(self, limits: Limits, meter: DisturbanceMeter) -> None:
         """SIGINT, SIGTERM, SIGKILL, each with a bounded wait; dates the end of each process."""
-        self.let_leave()
+        self.let_exit()
         watch = Stopwatch(meter)
         for number, limit_s in (
             (signal.SIGINT, limits.shutdown_s),

@@ -21,8 +21,7 @@ from typing import TYPE_CHECKING, TypeVar
 from grader.errors import GraderFault, machine_fault
 from grader.out_of_memory import oom_kills
 from grader.ros import RosInstallation
-from grader.submission.build import build_log as buildlog
-from grader.submission.build import standalone_build as apart
+from grader.submission.build import build_log, standalone_build
 from grader.submission.build.bounded import Outcome
 from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
@@ -73,8 +72,8 @@ def build(
     *,
     only_python: bool,
     cache: BuildCache,
-    built_apart: Sequence[str] = (),
-    is_apart: bool = False,
+    standalone: Sequence[str] = (),
+    is_standalone: bool = False,
     limits: BuildLimits | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
     sandbox: Sandbox | None = None,
@@ -104,7 +103,7 @@ def build(
         tuple(sources.folders.values()),
         ros=ros,
         only_python=only_python,
-        is_apart=is_apart,
+        is_standalone=is_standalone,
         limits=limits,
         wall_s=wall_s,
         on_progress=on_progress,
@@ -118,21 +117,21 @@ def build(
         ros=ros,
         only_python=False,
         cache=cache,
-        is_apart=True,
+        is_standalone=True,
         limits=limits,
         on_progress=on_progress,
         sandbox=sandbox,
         stop=stop,
         is_second=is_second,
     )
-    terms = [*_terms(limits, sandbox), *(["apart"] if is_apart else [])]
+    terms = [*_terms(limits, sandbox), *(["apart"] if is_standalone else [])]
     key = build_key(located.sha256, ros, sandboxed=sandbox is not None, terms=terms)
     on_progress("looking for an earlier build")
     with cache.locked(key, wait_s=wall_s + COMPILE_S):
         found = cache.find(key)
         if found is not None:
             return found
-        parts = dict(_parts(located, sources, built_apart, alone))
+        parts = dict(_parts(located, sources, standalone, alone))
         with cache.unfinished() as unfinished:
             record = workshop.build(unfinished / INSTALL, parts)
             if record.timed_out:
@@ -157,7 +156,7 @@ def _parts(
             files = {file.path for file in part.files}
             built = build_alone(part, Sources(files, {name: name}))
         if built.build.succeeded and built.install is not None:
-            log = apart.as_handed_in(built.build.log, name, folder)
+            log = standalone_build.as_handed_in(built.build.log, name, folder)
             yield name, replace(built, build=replace(built.build, log=log))
 
 
@@ -178,7 +177,7 @@ class _Workshop:
         scratch.mkdir()
         for name, part in parts.items():
             assert part.install is not None
-            apart.lay(name, part.install, install)
+            standalone_build.lay(name, part.install, install)
             for line in part.build.log.splitlines():
                 self.on_output(line)
         finished = set(parts)
@@ -251,7 +250,7 @@ class _Workshop:
             str(install): "install",
             str(scratch): "scratch",
         }
-        log = buildlog.clean(outcome.output, paths)
+        log = build_log.clean(outcome.output, paths)
         failed = sorted(set(self.sources.folders) - finished)
         succeeded = outcome.status == 0 and not failed and problem is None
         culprit = None
@@ -267,13 +266,13 @@ class _Workshop:
             failed_packages=tuple(failed),
             lacking=tuple(sorted(self._lacking(outcome.output))) if failed else (),
             culprit=culprit,
-            log=buildlog.ending(log),
+            log=build_log.ending(log),
         )
 
     def _lacking(self, output: str) -> set[str]:
         """What ROS 2 Jazzy has and is neither installed here nor handed in."""
-        named = buildlog.not_found(output)
-        imported = {name for name in buildlog.modules_not_found(output) if self._imports(name)}
+        named = build_log.not_found(output)
+        imported = {name for name in build_log.modules_not_found(output) if self._imports(name)}
         missing = (named | imported) & PACKAGES - self.ros.packages - set(self.sources.folders)
         tools = missing_tools(self.ros.environment({})["PATH"])
         return missing | missing_here(named) | set(tools)
@@ -336,7 +335,7 @@ def _with_parts(record: BuildRecord, parts: Iterable[CachedBuild]) -> BuildRecor
     return replace(
         record,
         duration_s=round(record.duration_s + sum(one.duration_s for one in builds), 3),
-        log=buildlog.ending("".join(one.log for one in builds) + record.log),
+        log=build_log.ending("".join(one.log for one in builds) + record.log),
     )
 
 

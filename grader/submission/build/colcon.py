@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
-from grader.submission.build import build_log as buildlog
+from grader.submission.build import build_log
 from grader.submission.build.bounded import Outcome, run_bounded
 from grader.submission.build.build_limits import BuildLimits
 from grader.submission.build.installed import site_packages
@@ -54,7 +54,7 @@ class Colcon:
     install: Path
     ros: RosInstallation
     only_python: bool
-    is_apart: bool
+    is_standalone: bool
     limits: BuildLimits
     wall_s: float
     on_progress: Callable[[str], None]
@@ -74,7 +74,7 @@ class Colcon:
         started: set[str] = set()
 
         def on_output(text: str) -> None:
-            for line in buildlog.own_lines(text).split("\n"):
+            for line in build_log.own_lines(text).split("\n"):
                 on_line(line)
 
         def on_line(line: str) -> None:
@@ -104,7 +104,7 @@ class Colcon:
                 self.wall_s - sum(item.duration_s for item in outcomes),
                 on_output,
             )
-            outcomes.append(replace(outcome, output=buildlog.own_lines(outcome.output)))
+            outcomes.append(replace(outcome, output=build_log.own_lines(outcome.output)))
             # Where setup.py raises before anything is built, colcon's executor stops with the
             # exception, whatever --continue-on-error says; the others are still to be built.
             stopped = not outcome.ended_by_us and STOPPED in outcome.output
@@ -148,7 +148,7 @@ class Colcon:
             command += ["--cmake-args", "-DBUILD_TESTING=OFF"]
             # Quicker than make, but stricter with rules that a student may have written; of these
             # an interface package has none.
-            if self.is_apart and shutil.which("ninja", path=self.environment["PATH"]):
+            if self.is_standalone and shutil.which("ninja", path=self.environment["PATH"]):
                 command += ["-GNinja"]
             if self.ros.source == "wheels":
                 command += [f"-DCMAKE_PROJECT_INCLUDE={self._include}"]

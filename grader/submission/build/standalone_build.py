@@ -41,7 +41,7 @@ _WAYS_OUT = ("..", "$ENV", "CMAKE_INSTALL_PREFIX", "CMAKE_PREFIX_PATH")
 _PREFIX = re.compile(r'^_colcon_package_sh_COLCON_CURRENT_PREFIX="(/.*)"$', re.MULTILINE)
 
 
-def built_apart(packages: Sequence[Package], files: Iterable[SubmissionFile]) -> tuple[str, ...]:
+def standalone(packages: Sequence[Package], files: Iterable[SubmissionFile]) -> tuple[str, ...]:
     """Names of the packages of a submission that can be built apart.
 
     Returns:

@@ -57,7 +57,7 @@ def install_prefix(
                 ros,
                 only_python=False,
                 cache=cache,
-                is_apart=True,
+                is_standalone=True,
                 limits=_LIMITS,
                 on_progress=lambda what: on_progress(f"{what} (ours, once on this machine)"),
                 is_second=is_second,

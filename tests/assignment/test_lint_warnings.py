@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.lint_warnings import doubts
+from grader.assignment.lint_warnings import lint_warnings
 from grader.assignment.load import list_assignments, load_assignment
 from tests.assignment.lessons import HEAD
 
@@ -17,7 +17,9 @@ def told(folder: Path, run: str, uses: str) -> list[str]:
     text = HEAD.replace("timeout: 5 s", f"timeout: 5 s\n    {run}") + check
     (folder / "lesson" / "assignment.yaml").write_text(text, encoding="utf-8")
     loaded = load_assignment(folder / "lesson")
-    return [doubt for doubt in doubts(loaded, []) if doubt.startswith("the check 'some' needs")]
+    return [
+        doubt for doubt in lint_warnings(loaded, []) if doubt.startswith("the check 'some' needs")
+    ]
 
 
 @pytest.mark.parametrize(
@@ -60,7 +62,7 @@ def test_a_run_that_may_go_on_is_not_doubted(tmp_path: Path, run: str, uses: str
 
 @pytest.mark.parametrize("name", list_assignments())
 def test_what_is_shipped_leaves_no_doubt(name: str) -> None:
-    assert [one for one in doubts(load_assignment(name), None) if "mutants" not in one] == []
+    assert [one for one in lint_warnings(load_assignment(name), None) if "mutants" not in one] == []
 
 
 def all_told(folder: Path, checks: str, depends: str = "") -> list[str]:
@@ -68,7 +70,7 @@ def all_told(folder: Path, checks: str, depends: str = "") -> list[str]:
     text = HEAD.replace("executables:", f"depends: [{depends}]\n    executables:") + checks
     (folder / "lesson" / "assignment.yaml").write_text(text, encoding="utf-8")
     loaded = load_assignment(folder / "lesson")
-    return [one for one in doubts(loaded, []) if not one.startswith("no mutant")]
+    return [one for one in lint_warnings(loaded, []) if not one.startswith("no mutant")]
 
 
 @pytest.mark.parametrize(
