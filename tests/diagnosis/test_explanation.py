@@ -1,0 +1,89 @@
+"""The catalogue of explanations: found by itself, asked in order, readable."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from grader.diagnosis.explanation import Explanation, explanations
+from grader.diagnosis.few_messages import FewMessages
+from grader.diagnosis.no_messages import NoMessages
+from grader.diagnosis.process.exceptions import Raised, Row, Table
+from grader.diagnosis.process.raised import Failure, Frame
+from grader.docs import explanations_markdown
+from tests.checks.builder import recording
+
+ALL = [(symptom, entry) for symptom, entries in explanations().items() for entry in entries]
+
+
+def name(case: tuple[type, Explanation]) -> str:
+    return f"{case[0].__name__}: {case[1].sentence[:40]}"
+
+
+@pytest.mark.parametrize(("symptom", "entry"), ALL, ids=map(name, ALL))
+def test_every_explanation_is_one_plain_sentence(symptom: type, entry: Explanation) -> None:
+    assert re.fullmatch(r"\S.*[.]", entry.sentence), entry.sentence
+    assert len(entry.sentence) <= 110
+    assert not re.search(r"\b(whoever|nobody|slip|of ours)\b", entry.sentence)
+
+
+def test_every_explanation_stands_once_below_its_symptom() -> None:
+    page = explanations_markdown()
+    for symptom, entry in ALL:
+        heading = (symptom.__doc__ or "").partition("\n")[0].rstrip(".")
+        section = page.split(f"## {heading}\n")[1].split("\n## ")[0]
+        assert section.count(f"- {entry.sentence}\n") + section.endswith(f"- {entry.sentence}")
+
+
+@pytest.mark.parametrize("symptom", [NoMessages, FewMessages, Raised])
+def test_general_explanations_are_asked_last(symptom: type) -> None:
+    order = [entry.is_general for entry in explanations()[symptom]]
+    assert order == sorted(order) and order[-1]
+
+
+def failure(type_: str, message: str, file: str = "/w/node.py", source: str = "") -> Raised:
+    frames = (Frame(file, 3, "tick", source),)
+    return Raised(Failure(type_, message, frames), recording())
+
+
+@pytest.mark.parametrize(
+    ("row", "raised", "hint"),
+    [
+        (
+            Row(mistake="x.", message=r"no (?P<what>\w+)", hint="Give it $what, $5 and $other."),
+            failure("ValueError", "there is no value"),
+            "Give it value, $5 and $other.",
+        ),
+        (Row(mistake="x.", type="TypeError", hint="h"), failure("ValueError", ""), None),
+        (Row(mistake="x.", raised_in="rclpy/", hint="h"), failure("ValueError", ""), None),
+        (
+            Row(mistake="x.", raised_in="rclpy/", hint="h"),
+            failure("ValueError", "", "/opt/rclpy/node.py"),
+            "h",
+        ),
+        (
+            Row(mistake="x.", message=r"(?P<name>\w+)\(\)", source=r"$name\(", hint="h"),
+            failure("TypeError", "go() takes", source="self.go(1)"),
+            "h",
+        ),
+        (
+            Row(mistake="x.", message=r"(?P<name>\w+)\(\)", source=r"$name\(", hint="h"),
+            failure("TypeError", "go() takes", source="self.come(1)"),
+            None,
+        ),
+    ],
+)
+def test_a_row_of_the_table_matches_all_that_it_says(
+    row: Row, raised: Raised, hint: str | None
+) -> None:
+    assert row(raised) == hint
+
+
+def test_every_pattern_of_the_table_is_a_regular_expression() -> None:
+    rows = [entry.apply for _, entry in ALL if isinstance(entry.apply, Row)]
+    assert len(rows) > 50
+    for row in rows:
+        re.compile(row.message)
+        re.compile(row.source.replace("$name", "name"))
+    assert Table.model_fields
