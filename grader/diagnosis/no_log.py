@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from grader.checks.field import number_at
 from grader.checks.finding import Evidence, Moment, Table
@@ -14,6 +14,7 @@ from grader.checks.wording import code, codes, counted, listing, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.delivery import why_no_history, why_not_delivered
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.misread_log import explain
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
@@ -27,6 +28,52 @@ _SOME = 0.5
 _STARVED = 0.5
 
 
+@dataclass(frozen=True)
+class NotLogged(Symptom[Cause]):
+    """The log does not show what the node received.
+
+    Attributes:
+        found: Messages that log lines follow.
+        needed: How many there must be.
+        decimals: How many decimals must be right.
+        within_ns: How soon after its message a line must have come.
+    """
+
+    recording: Recording
+    topic: str
+    wanted: Sequence[Wanted]
+    found: Sequence[Echo]
+    needed: int
+    decimals: int
+    within_ns: int
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        if self.found:
+            return f"log lines follow {counted(len(self.found), 'message')} on {code(self.topic)}"
+        return f"no log line shows a message on {code(self.topic)}"
+
+    @property
+    def nodes(self) -> set[str]:
+        """The nodes that subscribe to the topic."""
+        subscriptions = self.recording.student_endpoints(Kind.SUBSCRIPTION, self.topic)
+        return {item.node for item in subscriptions}
+
+    @property
+    def begin_ns(self) -> int:
+        """When the first message was sent."""
+        return self.recording.carried(self.topic)[0].stamp_ns
+
+    @property
+    def near(self) -> list[LogLine]:
+        """Lines that could have been an answer to a message."""
+        begin_ns = self.wanted[0].message.stamp_ns
+        end_ns = self.wanted[-1].due_ns + self.within_ns
+        lines = output_lines(self.recording)
+        return [line for line in lines if begin_ns <= line.time_ns <= end_ns]
+
+
 def why_not_logged(
     recording: Recording,
     topic: str,
@@ -37,87 +84,87 @@ def why_not_logged(
     decimals: int,
     within_ns: int,
 ) -> Cause:
-    """Why fewer messages than needed were followed by log lines with their values.
-
-    Args:
-        decimals: How many decimals must be right.
-        within_ns: How soon after its message a line must have come.
-    """
-    cause = why_not_delivered(recording, topic) or why_ended(recording, _seen(topic, found))
-    if cause is not None:
-        return cause
-    if wanted and wanted[-1].message.stamp_ns < recording.launched_ns:
-        cause = why_no_history(recording, topic, _seen(topic, found))
-        if cause is not None:
-            return cause
-    if len(wanted) < needed:
-        sent = f"only {counted(len(wanted), 'message was', 'messages were')} sent on {code(topic)}"
-        return why_unsubscribed(recording, topic, sent) or Cause.to_repeat(sent)
-    nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, topic)}
-    begin_ns = recording.carried(topic)[0].stamp_ns
-    blocked = why_blocked(recording, _seen(topic, found), nodes, begin_ns)
-    cause = (
-        _disturbed(recording, topic, wanted, needed, decimals, within_ns, blocked)
-        or why_unsubscribed(recording, topic, _seen(topic, found))
-        or why_never_spun(
-            recording,
-            f"the callback is never called: the subscription to {code(topic)} is there and its "
-            "QoS matches",
-            nodes,
-        )
-        or blocked
-        or _dropped(recording, topic)
-    )
-    if cause is not None:
-        return cause
-    if found:
-        return _few(recording, topic, wanted, found, needed, nodes)
-    near = _near(recording, wanted, within_ns)
-    return (
-        _behind(recording, topic, wanted, near, decimals, within_ns)
-        # What a late line shows may look like something else of the message that came before it.
-        or why_slow(recording, _late(topic, within_ns), nodes)
-        or _elsewhere(recording, topic, wanted, near, decimals)
-        or _other_values(recording, topic, wanted, near, decimals)
-        or _silent(recording, topic)
-    )
+    """Why fewer messages than needed were followed by log lines with their values."""
+    return cause_of(NotLogged(recording, topic, wanted, found, needed, decimals, within_ns))
 
 
-def _seen(topic: str, found: Sequence[Echo]) -> str:
-    if found:
-        return f"log lines follow {counted(len(found), 'message')} on {code(topic)}"
-    return f"no log line shows a message on {code(topic)}"
+@explanation(NotLogged)
+def not_delivered(symptom: NotLogged) -> Cause | None:
+    """The messages do not reach the node."""
+    return why_not_delivered(symptom.recording, symptom.topic)
 
 
-def _late(topic: str, within_ns: int) -> str:
-    limit = format_duration(within_ns / NS)
-    return f"no log line shows a message on {code(topic)} within {limit} of it"
+@explanation(NotLogged)
+def process_ended(symptom: NotLogged) -> Cause | None:
+    """The process ended."""
+    return why_ended(symptom.recording, symptom.seen)
 
 
-def _disturbed(
-    recording: Recording,
-    topic: str,
-    wanted: Sequence[Wanted],
-    needed: int,
-    decimals: int,
-    within_ns: int,
-    blocked: Cause | None,
-) -> Cause | None:
-    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + within_ns
+@explanation(NotLogged)
+def no_history(symptom: NotLogged) -> Cause | None:
+    """A late joiner does not ask for the messages from before it was there (transient_local)."""
+    wanted, recording = symptom.wanted, symptom.recording
+    if not wanted or wanted[-1].message.stamp_ns >= recording.launched_ns:
+        return None
+    return why_no_history(recording, symptom.topic, symptom.seen)
+
+
+@explanation(NotLogged)
+def too_few_sent(symptom: NotLogged) -> Cause | None:
+    """Too few messages were sent, because the program destroyed its subscription, or by a fault."""
+    number = len(symptom.wanted)
+    if number >= symptom.needed:
+        return None
+    sent = f"only {counted(number, 'message was', 'messages were')} sent on {code(symptom.topic)}"
+    return why_unsubscribed(symptom.recording, symptom.topic, sent) or Cause.to_repeat(sent)
+
+
+@explanation(NotLogged)
+def no_cpu_time(symptom: NotLogged) -> Cause | None:
+    """The machine gave the process too little CPU time; an error, and never a lost point."""
+    recording, wanted = symptom.recording, symptom.wanted
+    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + symptom.within_ns
     stolen_s = recording.stolen_s(begin_ns, end_ns)
-    if len(echoes(recording, wanted, decimals, within_ns, forgive=True)) < needed:
+    forgiven = echoes(recording, wanted, symptom.decimals, symptom.within_ns, forgive=True)
+    if len(forgiven) < symptom.needed:
         if stolen_s < _STARVED * (end_ns - begin_ns) / NS:
             return None
+        blocked = blocked_executor(symptom)
         if blocked is not None:
             return replace(blocked, disturbed=True)
     return Cause.to_repeat(
-        f"log lines for {code(topic)} are late or missing, but the machine took "
+        f"log lines for {code(symptom.topic)} are late or missing, but the machine took "
         f"{format_duration(stolen_s)} from the process meanwhile"
     )
 
 
-def _dropped(recording: Recording, topic: str) -> Cause | None:
-    """Output that was not kept may have held what is missing."""
+@explanation(NotLogged)
+def subscription_destroyed(symptom: NotLogged) -> Cause | None:
+    """The program destroyed its subscription."""
+    return why_unsubscribed(symptom.recording, symptom.topic, symptom.seen)
+
+
+@explanation(NotLogged)
+def never_spun(symptom: NotLogged) -> Cause | None:
+    """rclpy.spin() is never called, so the callback is never called."""
+    return why_never_spun(
+        symptom.recording,
+        f"the callback is never called: the subscription to {code(symptom.topic)} is there and "
+        "its QoS matches",
+        symptom.nodes,
+    )
+
+
+@explanation(NotLogged)
+def blocked_executor(symptom: NotLogged) -> Cause | None:
+    """A callback does not return, and blocks the executor."""
+    return why_blocked(symptom.recording, symptom.seen, symptom.nodes, symptom.begin_ns)
+
+
+@explanation(NotLogged)
+def output_dropped(symptom: NotLogged) -> Cause | None:
+    """The program wrote more than is kept; an error, and never a lost point."""
+    recording, topic = symptom.recording, symptom.topic
     dropped = sum(process.dropped_bytes for process in recording.processes)
     if not dropped:
         return None
@@ -129,24 +176,23 @@ def _dropped(recording: Recording, topic: str) -> Cause | None:
     )
 
 
-def _few(
-    recording: Recording,
-    topic: str,
-    wanted: Sequence[Wanted],
-    found: Sequence[Echo],
-    needed: int,
-    nodes: set[str],
-) -> Cause:
+@explanation(NotLogged)
+def only_some_logged(symptom: NotLogged) -> Cause | None:
+    """Only some messages are logged: an if, once=True or throttle_duration_sec leave others out."""
+    recording, topic = symptom.recording, symptom.topic
+    wanted, found = symptom.wanted, symptom.found
+    if not found:
+        return None
     times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
     seen = (
         f"log lines follow only {len(found)} of {counted(len(wanted), 'message')} on "
         f"{code(topic)}, written {written} after launch"
     )
-    slow = why_slow(recording, seen, nodes)
+    slow = why_slow(recording, seen, symptom.nodes)
     if slow is not None:
         return slow
-    seldom_is_right = needed <= _SOME * len(wanted)
+    seldom_is_right = symptom.needed <= _SOME * len(wanted)
     return Cause(
         seen,
         "Log in every call of the callback"
@@ -163,21 +209,11 @@ def _few(
     )
 
 
-def _near(recording: Recording, wanted: Sequence[Wanted], within_ns: int) -> list[LogLine]:
-    """Lines that could have been an answer to a message."""
-    begin_ns, end_ns = wanted[0].message.stamp_ns, wanted[-1].due_ns + within_ns
-    return [line for line in output_lines(recording) if begin_ns <= line.time_ns <= end_ns]
-
-
-def _behind(
-    recording: Recording,
-    topic: str,
-    wanted: Sequence[Wanted],
-    near: Sequence[LogLine],
-    decimals: int,
-    within_ns: int,
-) -> Cause | None:
-    """The lines show messages that had come long before: the callback takes too long for them."""
+@explanation(NotLogged)
+def log_lags_behind(symptom: NotLogged) -> Cause | None:
+    """The log lags behind: a callback takes too long, and newer messages wait."""
+    recording, topic = symptom.recording, symptom.topic
+    wanted, near = symptom.wanted, symptom.near
     paths = list(wanted[-1].values)
     carried = [
         Wanted(
@@ -193,12 +229,12 @@ def _behind(
             item
             for item in carried
             if item.message.stamp_ns <= line.time_ns
-            and shown(printed, item, decimals) == set(item.values)
+            and shown(printed, item, symptom.decimals) == set(item.values)
         ]
         if not old:
             continue
         late_ns = line.time_ns - old[-1].due_ns
-        if late_ns <= within_ns:
+        if late_ns <= symptom.within_ns:
             return None
         late = format_duration(late_ns / NS)
         return Cause(
@@ -214,17 +250,23 @@ def _behind(
     return None
 
 
-def _elsewhere(
-    recording: Recording,
-    topic: str,
-    wanted: Sequence[Wanted],
-    near: Sequence[LogLine],
-    decimals: int,
-) -> Cause | None:
-    """The values are logged, but not when the messages come."""
-    last = wanted[-1]
+@explanation(NotLogged)
+def callbacks_wait(symptom: NotLogged) -> Cause | None:
+    """The callbacks keep each other waiting, so the lines come too late."""
+    # What a late line shows may look like something else of the message that came before it.
+    limit = format_duration(symptom.within_ns / NS)
+    late = f"no log line shows a message on {code(symptom.topic)} within {limit} of it"
+    return why_slow(symptom.recording, late, symptom.nodes)
+
+
+@explanation(NotLogged)
+def logged_elsewhere(symptom: NotLogged) -> Cause | None:
+    """The values are logged in another callback, and not when the messages come."""
+    recording, topic = symptom.recording, symptom.topic
+    near = symptom.near
+    last = symptom.wanted[-1]
     for line in output_lines(recording):
-        if line in near or shown(numbers(line.text), last, decimals) != set(last.values):
+        if line in near or shown(numbers(line.text), last, symptom.decimals) != set(last.values):
             continue
         late_s = (line.time_ns - last.message.stamp_ns) / NS
         others = [name for name in recording.messages if name != topic and recording.on(name)]
@@ -242,14 +284,11 @@ def _elsewhere(
     return None
 
 
-def _other_values(
-    recording: Recording,
-    topic: str,
-    wanted: Sequence[Wanted],
-    near: Sequence[LogLine],
-    decimals: int,
-) -> Cause | None:
-    """Lines come, but they show something else."""
+@explanation(NotLogged)
+def other_values(symptom: NotLogged) -> Cause | None:
+    """Lines come, but they show other values."""
+    recording, topic = symptom.recording, symptom.topic
+    wanted, near, decimals = symptom.wanted, symptom.near, symptom.decimals
     if not near:
         return None
     # What a process writes at Ctrl+C is no answer to a message.
@@ -292,15 +331,10 @@ def _other_values(
     )
 
 
-def _fields(paths: Sequence[str]) -> str:
-    return listing(code(f"msg.{path}") for path in paths)
-
-
-def _rounded(value: float, decimals: int) -> str:
-    return f"{value:.0f}" if value.is_integer() else f"{value:.{max(decimals, 1)}f}"
-
-
-def _silent(recording: Recording, topic: str) -> Cause:
+@explanation(NotLogged, general=True)
+def nothing_logged(symptom: NotLogged) -> Cause:
+    """Nothing is logged when a message comes."""
+    recording, topic = symptom.recording, symptom.topic
     answers = [call for call in recording.calls if call.answered_ns is not None]
     spins = ", and its executor spins" if answers else ""
     wrote = next(iter(output_lines(recording)), None)
@@ -315,3 +349,11 @@ def _silent(recording: Recording, topic: str) -> Cause:
             log=tuple(line.text for line in output_lines(recording)[:_LOG_LINES]),
         ),
     )
+
+
+def _fields(paths: Sequence[str]) -> str:
+    return listing(code(f"msg.{path}") for path in paths)
+
+
+def _rounded(value: float, decimals: int) -> str:
+    return f"{value:.0f}" if value.is_integer() else f"{value:.{max(decimals, 1)}f}"
