@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_server import Word, offered
 from grader.diagnosis.process.blocked_executor import why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
@@ -18,11 +19,70 @@ from grader.diagnosis.process.raised import interrupted_place, parse_failures, s
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
 from grader.spec.unit import format_duration
+from grader.submission.record import SourceError
 
 _MULTI = "MultiThreadedExecutor"
 _LOG_LINES = 10
 _ROUNDING_S = 1e-6
 _NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]+)' was never awaited")
+
+
+@dataclass(frozen=True)
+class NoAnswer(Symptom[Cause]):
+    """A call or a goal was not answered in time.
+
+    Attributes:
+        what: The symptom in words.
+        name: Of the service or action.
+        while_busy: What is said of an executor that is blocked, or does not tell; None for
+            general words.
+    """
+
+    recording: Recording
+    what: str
+    server: Word
+    name: str
+    asked_ns: int
+    within_s: float
+    while_busy: Cause | None = None
+
+    @property
+    def node(self) -> str:
+        """The node that offers it; a parameter service is named after its node."""
+        own = offered(self.recording, self.server, self.name)
+        return own[-1].node if own else self.name.rpartition("/")[0]
+
+    @property
+    def process(self) -> Process | None:
+        """The process of the node, if it is known."""
+        return declarations.process_of(self.recording, self.node)
+
+    @property
+    def spins(self) -> bool | None:
+        """Whether the node's executor spins; None if the node was not asked."""
+        return _spins(self.recording, self.node, self.asked_ns)
+
+    @property
+    def moment(self) -> Moment:
+        """When it was asked."""
+        when_s = self.recording.since_launch_s(self.asked_ns)
+        return Moment("asked, not answered in time", when_s)
+
+    @property
+    def place(self) -> SourceError | None:
+        """Where the process was when it was interrupted."""
+        process = self.process
+        return interrupted_place(self.recording, process.name) if process else None
+
+    @property
+    def where(self) -> str:
+        """The same in words, with a space before."""
+        return f" ({self.place.file}:{self.place.line})" if self.place else ""
+
+    @property
+    def evidence(self) -> Evidence:
+        """Both."""
+        return Evidence(moments=(self.moment,), places=(self.place,) if self.place else ())
 
 
 def why_unanswered(
@@ -34,48 +94,83 @@ def why_unanswered(
     within_s: float,
     while_busy: Cause | None = None,
 ) -> Cause:
-    """Why an answer did not come in time.
+    """Why an answer did not come in time."""
+    return cause_of(NoAnswer(recording, what, server, name, asked_ns, within_s, while_busy))
 
-    Args:
-        while_busy: What is said of an executor that is blocked, or does not tell; by
-            default in general words.
-    """
-    own = offered(recording, server, name)
-    # A parameter service is named after its node.
-    node = own[-1].node if own else name.rpartition("/")[0]
-    process = declarations.process_of(recording, node)
-    moment = Moment("asked, not answered in time", recording.since_launch_s(asked_ns))
-    cause = (
-        why_gone(recording, what, node)
-        or why_destroyed(recording, what, f"the {server.noun} {code(name)}", own)
-        or why_taken(recording, what, asked_ns, recording.stop_ns, within_s)
-    )
-    if cause is None and process is not None:
-        cause = why_raised(recording, what, asked_ns, (process,)) or why_never_spun(
-            recording, what, (node,), (process,), (moment,)
-        )
-    if cause is not None:
-        return cause
-    spins = _spins(recording, node, asked_ns)
-    place = interrupted_place(recording, process.name) if process else None
-    where = f" ({place.file}:{place.line})" if place else ""
-    evidence = Evidence(moments=(moment,), places=(place,) if place else ())
-    if while_busy is not None and not spins:
-        return replace(while_busy, observed=while_busy.observed + where, evidence=evidence)
-    if spins is False:
-        return Cause(
-            f"{what}: something blocks the executor{where}; the node's parameter "
-            "services answer no call either",
-            "A callback must return soon. Look for `while True`, time.sleep() or input() in it, "
-            "and for a call() of another service, which waits for an answer that the same "
-            "executor would have to take in: use call_async().",
-            evidence,
-        )
+
+@explanation(NoAnswer)
+def process_gone(symptom: NoAnswer) -> Cause | None:
+    """The process ended."""
+    return why_gone(symptom.recording, symptom.what, symptom.node)
+
+
+@explanation(NoAnswer)
+def server_destroyed(symptom: NoAnswer) -> Cause | None:
+    """The program destroyed its server."""
+    own = offered(symptom.recording, symptom.server, symptom.name)
+    server = f"the {symptom.server.noun} {code(symptom.name)}"
+    return why_destroyed(symptom.recording, symptom.what, server, own)
+
+
+@explanation(NoAnswer)
+def no_cpu_time(symptom: NoAnswer) -> Cause | None:
+    """The machine gave the process too little CPU time; an error, and never a lost point."""
+    recording = symptom.recording
+    return why_taken(recording, symptom.what, symptom.asked_ns, recording.stop_ns, symptom.within_s)
+
+
+@explanation(NoAnswer)
+def callback_raised(symptom: NoAnswer) -> Cause | None:
+    """A callback raised an exception."""
+    process = symptom.process
+    if process is None:
+        return None
+    return why_raised(symptom.recording, symptom.what, symptom.asked_ns, (process,))
+
+
+@explanation(NoAnswer)
+def never_spun(symptom: NoAnswer) -> Cause | None:
+    """rclpy.spin() is never called, or the node is not given to the executor that spins."""
+    process = symptom.process
+    if process is None:
+        return None
+    nodes, moments = (symptom.node,), (symptom.moment,)
+    return why_never_spun(symptom.recording, symptom.what, nodes, (process,), moments)
+
+
+@explanation(NoAnswer)
+def busy_as_the_lesson_says(symptom: NoAnswer) -> Cause | None:
+    """The executor is busy with another callback, such as the execute callback of a goal."""
+    busy = symptom.while_busy
+    if busy is None or symptom.spins:
+        return None
+    return replace(busy, observed=busy.observed + symptom.where, evidence=symptom.evidence)
+
+
+@explanation(NoAnswer)
+def blocked_executor(symptom: NoAnswer) -> Cause | None:
+    """A callback does not return, and blocks the executor."""
+    if symptom.spins is not False:
+        return None
     return Cause(
-        f"{what}{where}" + (", although the node's executor spins" if spins else ""),
+        f"{symptom.what}: something blocks the executor{symptom.where}; the node's parameter "
+        "services answer no call either",
+        "A callback must return soon. Look for `while True`, time.sleep() or input() in it, "
+        "and for a call() of another service, which waits for an answer that the same "
+        "executor would have to take in: use call_async().",
+        symptom.evidence,
+    )
+
+
+@explanation(NoAnswer, general=True)
+def callback_does_not_answer(symptom: NoAnswer) -> Cause:
+    """The callback does not come to its end, or waits for another one of its group."""
+    spins = ", although the node's executor spins" if symptom.spins else ""
+    return Cause(
+        f"{symptom.what}{symptom.where}{spins}",
         "Does the callback come to its end and return the response? A callback that waits for "
         "another one of the same callback group waits for ever.",
-        evidence,
+        symptom.evidence,
     )
 
 

@@ -10,6 +10,7 @@ from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.exchanged_executables import why_exchanged
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.near_name import Named, why_misnamed
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_it_exited
@@ -116,52 +117,115 @@ def _of_students(recording: Recording, word: Word) -> tuple[Service, ...]:
     return services(recording) if word is SERVICE else actions(recording)
 
 
+@dataclass(frozen=True)
+class NotOffered(Symptom[Cause]):
+    """A service or an action is missing.
+
+    Attributes:
+        interface: Its type, or None where any will do.
+    """
+
+    recording: Recording
+    word: Word
+    name: str
+    interface: str | None
+
+    @property
+    def there(self) -> tuple[Service, ...]:
+        """What the student's nodes offer of the kind."""
+        return _of_students(self.recording, self.word)
+
+    @property
+    def evidence(self) -> Evidence:
+        """The same as a table."""
+        return _evidence(self.recording, self.there, self.word)
+
+    @property
+    def create(self) -> str:
+        """The code that creates it."""
+        return _create(self.word, self.name, self.interface)
+
+
 def why_not_offered(
     recording: Recording, word: Word, name: str, interface: str | None = None
 ) -> Cause | None:
-    """Why no node of the student offers a service or action, or None if one does.
-
-    Args:
-        interface: Its type, or None where any will do.
-    """
-    there = _of_students(recording, word)
-    own = [item for item in there if item.name == name]
-    if any(interface in (None, item.type) for item in own):
+    """Why no node of the student offers a service or action, or None if one does."""
+    symptom = NotOffered(recording, word, name, interface)
+    if any(one.name == name and interface in (None, one.type) for one in symptom.there):
         return None
-    cause = why_no_node(recording)
-    if cause is not None:
-        return cause
-    evidence = _evidence(recording, there, word)
-    if own and interface is not None:
-        return _other_type(own[0], word, interface, evidence)
-    near = why_misnamed(
-        name,
-        [Named(item.name, item.node) for item in there],
-        f"found the {word.noun}",
-        f"Write its name as '{name.rpartition('/')[2]}'.",
-        evidence,
-    )
-    if near is not None:
-        return near
-    ended = crashed(recording)
-    if ended:
-        return why_it_exited(recording, ended[0])
-    wrong = ACTION if word is SERVICE else SERVICE
-    if any(item.name == name for item in _of_students(recording, wrong)):
-        return Cause(
-            f"{code(name)} is there, but as {wrong.article} {wrong.noun}",
-            f"Make it with {_create(word, name, interface)}.",
-            evidence,
-        )
-    exchanged = why_exchanged(recording)
-    if exchanged is not None:
-        return exchanged.after(f"there is no {word.noun} {code(name)}")
-    nodes = codes(item.name for item in recording.student_nodes)
-    there_words = codes(item.name for item in there)
+    return cause_of(symptom)
+
+
+@explanation(NotOffered)
+def no_node(symptom: NotOffered) -> Cause | None:
+    """There is no node at all."""
+    return why_no_node(symptom.recording)
+
+
+@explanation(NotOffered)
+def other_type(symptom: NotOffered) -> Cause | None:
+    """The service or action has another type."""
+    own = next((one for one in symptom.there if one.name == symptom.name), None)
+    if own is None or symptom.interface is None:
+        return None
+    package, _, short = symptom.interface.split("/")
     return Cause(
-        f"{nodes} offers {there_words} only" if there else f"{nodes} offers no {word.noun}",
-        f"Call {_create(word, name, interface)} in the node's constructor.",
-        evidence,
+        f"the {symptom.word.noun} {code(own.name)} has the type {code(own.type)}",
+        f"A client and a server meet only if their types are the same: "
+        f"`from {package}.{symptom.word.folder} import {short}`.",
+        symptom.evidence,
+    )
+
+
+@explanation(NotOffered)
+def misspelt_name(symptom: NotOffered) -> Cause | None:
+    """Its name is misspelt, private, in a namespace, or in other case."""
+    return why_misnamed(
+        symptom.name,
+        [Named(item.name, item.node) for item in symptom.there],
+        f"found the {symptom.word.noun}",
+        f"Write its name as '{symptom.name.rpartition('/')[2]}'.",
+        symptom.evidence,
+    )
+
+
+@explanation(NotOffered)
+def process_crashed(symptom: NotOffered) -> Cause | None:
+    """The process ended with a failure before it created the server."""
+    ended = crashed(symptom.recording)
+    return why_it_exited(symptom.recording, ended[0]) if ended else None
+
+
+@explanation(NotOffered)
+def service_and_action_exchanged(symptom: NotOffered) -> Cause | None:
+    """A service was created where an action is expected, or the other way round."""
+    wrong = ACTION if symptom.word is SERVICE else SERVICE
+    if not any(item.name == symptom.name for item in _of_students(symptom.recording, wrong)):
+        return None
+    return Cause(
+        f"{code(symptom.name)} is there, but as {wrong.article} {wrong.noun}",
+        f"Make it with {symptom.create}.",
+        symptom.evidence,
+    )
+
+
+@explanation(NotOffered)
+def exchanged_executables(symptom: NotOffered) -> Cause | None:
+    """In setup.py an executable runs the function of another one."""
+    exchanged = why_exchanged(symptom.recording)
+    return exchanged and exchanged.after(f"there is no {symptom.word.noun} {code(symptom.name)}")
+
+
+@explanation(NotOffered, general=True)
+def nothing_offered(symptom: NotOffered) -> Cause:
+    """The node offers others only, or none."""
+    nodes = codes(item.name for item in symptom.recording.student_nodes)
+    there = codes(item.name for item in symptom.there)
+    noun = symptom.word.noun
+    return Cause(
+        f"{nodes} offers {there} only" if symptom.there else f"{nodes} offers no {noun}",
+        f"Call {symptom.create} in the node's constructor.",
+        symptom.evidence,
     )
 
 
@@ -174,16 +238,6 @@ def why_not_met(recording: Recording, word: Word, name: str, what: str, asked_ns
         f"Keep the {word.noun} and its node as long as the program runs, and leave its QoS as it "
         "is.",
         Evidence(moments=(Moment("given up", recording.since_launch_s(asked_ns)),)),
-    )
-
-
-def _other_type(item: Service, word: Word, interface: str, evidence: Evidence) -> Cause:
-    package, _, short = interface.split("/")
-    return Cause(
-        f"the {word.noun} {code(item.name)} has the type {code(item.type)}",
-        f"A client and a server meet only if their types are the same: "
-        f"`from {package}.{word.folder} import {short}`.",
-        evidence,
     )
 
 
