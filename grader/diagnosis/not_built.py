@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.spec.nearest_name import nearest
 from grader.submission.build.build_log import modules_not_found, not_found
 from grader.submission.build.toolchain import TOOLS
@@ -28,43 +29,84 @@ _CMAKE = ("ament_cmake", "cmake")
 _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
 
 
+@dataclass(frozen=True)
+class NoPackage(Symptom[Cause]):
+    """A package is missing."""
+
+    submission: SubmissionRecord
+    name: str
+
+    @property
+    def names(self) -> list[str]:
+        """The packages that are there."""
+        return [item.name for item in self.submission.packages]
+
+    @property
+    def match(self) -> str | None:
+        """The package whose name is nearly the wanted one."""
+        return nearest(self.name, self.names)
+
+
 def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
     """Why the submission has no package of a name, or None if it has one."""
-    if submission.problem is not None:
-        return Cause(
-            submission.problem,
-            "Hand in the packages that are asked for, each of them once; colcon leaves out a "
-            "folder with a file COLCON_IGNORE in it."
-            if submission.packages
-            else "Hand in the workspace, its src folder or the package itself: a folder with a "
-            "package.xml must be in it.",
-        )
-    if submission.package(name) is not None:
+    if submission.problem is None and submission.package(name) is not None:
         return None
-    names = [item.name for item in submission.packages]
-    if not names:
-        return Cause("no package.xml was found", "A ROS package is a folder with a package.xml.")
-    match = nearest(name, names)
-    errors = [item.manifest_error for item in submission.packages if item.manifest_error]
-    if errors and match is None:
-        return _unusable(
-            f"no package {code(name)} was found, and a package.xml cannot be used: {errors[0]}",
-            errors,
-        )
-    found = f"found package {code(match)}" if match else f"found {codes(names)} only"
+    return cause_of(NoPackage(submission, name))
+
+
+@explanation(NoPackage)
+def no_workspace(symptom: NoPackage) -> Cause | None:
+    """What was handed in is no workspace: an empty archive, or two packages of one name."""
+    problem = symptom.submission.problem
+    if problem is None:
+        return None
+    return Cause(
+        problem,
+        "Hand in the packages that are asked for, each of them once; colcon leaves out a "
+        "folder with a file COLCON_IGNORE in it."
+        if symptom.names
+        else "Hand in the workspace, its src folder or the package itself: a folder with a "
+        "package.xml must be in it.",
+    )
+
+
+@explanation(NoPackage)
+def no_package_xml(symptom: NoPackage) -> Cause | None:
+    """There is no package.xml."""
+    if symptom.names:
+        return None
+    return Cause("no package.xml was found", "A ROS package is a folder with a package.xml.")
+
+
+@explanation(NoPackage)
+def broken_package_xml(symptom: NoPackage) -> Cause | None:
+    """package.xml cannot be read: broken XML, or an e-mail that is none."""
+    errors = [item.manifest_error for item in symptom.submission.packages if item.manifest_error]
+    if not errors or symptom.match is not None:
+        return None
+    seen = f"no package {code(symptom.name)} was found, and a package.xml cannot be used"
+    return _unusable(f"{seen}: {errors[0]}", errors)
+
+
+@explanation(NoPackage, general=True)
+def other_package_name(symptom: NoPackage) -> Cause:
+    """The package has another name, or lies inside another package."""
+    name, match = symptom.name, symptom.match
     places = tuple(
         SourceError(item.file("package.xml"), None, f"the package {code(item.name)}")
-        for item in submission.packages
+        for item in symptom.submission.packages
         if match in (None, item.name)
     )
-    is_cmake = match is not None and existing_package(submission, match).build_type in _CMAKE
+    is_cmake = (
+        match is not None and existing_package(symptom.submission, match).build_type in _CMAKE
+    )
     others = (
         "in project(...) of CMakeLists.txt"
         if is_cmake
         else "in setup.py, setup.cfg, resource/ and the folder of the Python module"
     )
     return Cause(
-        found,
+        f"found package {code(match)}" if match else f"found {codes(symptom.names)} only",
         f"Write <name>{name}</name> in package.xml, and the same name {others}."
         + ("" if match else _SIDE_BY_SIDE),
         Evidence(places=places[:10]),
@@ -110,33 +152,63 @@ def why_too_new(package: PackageRecord) -> Cause | None:
     )
 
 
+@dataclass(frozen=True)
+class NotBuilt(Symptom[Cause]):
+    """A package was not built."""
+
+    submission: SubmissionRecord
+    name: str
+    build: BuildRecord
+
+
 def why_not_built(submission: SubmissionRecord, name: str) -> Cause | None:
     """Why a package was not built, or None if it was."""
     cause = why_no_package(submission, name)
+    cause = cause or why_too_new(existing_package(submission, name))
     if cause is not None:
         return cause
-    newer = why_too_new(existing_package(submission, name))
-    if newer is not None:
-        return newer
     build = submission.build
     if build is None:
         return Cause("nothing was built, so this cannot be judged", ours=True)
-    if build.succeeded:
-        return None
     # A package that is not among those that failed was built, whatever became of the others.
-    if build.failed_packages and name not in build.failed_packages:
+    if build.succeeded or (build.failed_packages and name not in build.failed_packages):
         return None
-    if build.timed_out:
-        return Cause(
-            "`colcon build` did not finish within its time limit and was ended",
-            "Look for input(), an endless loop or a long computation in setup.py or "
-            "CMakeLists.txt.",
-            _evidence(build, name),
-        )
-    if _failed_itself(build, name):
-        lacking = _lacking(submission, build, name)
-        return _not_here(lacking) if lacking else _failed(_own(submission, build, name), name)
-    return _never_begun(submission, build, name)
+    return cause_of(NotBuilt(submission, name, build))
+
+
+@explanation(NotBuilt)
+def build_takes_too_long(symptom: NotBuilt) -> Cause | None:
+    """The build does not end: input() or an endless loop in setup.py or CMakeLists.txt."""
+    if not symptom.build.timed_out:
+        return None
+    return Cause(
+        "`colcon build` did not finish within its time limit and was ended",
+        "Look for input(), an endless loop or a long computation in setup.py or CMakeLists.txt.",
+        _evidence(symptom.build, symptom.name),
+    )
+
+
+@explanation(NotBuilt)
+def machine_lacks_a_package(symptom: NotBuilt) -> Cause | None:
+    """The build needs what the machine lacks; an error, and never a lost point."""
+    if not _failed_itself(symptom.build, symptom.name):
+        return None
+    lacking = _lacking(symptom.submission, symptom.build, symptom.name)
+    return _not_here(lacking) if lacking else None
+
+
+@explanation(NotBuilt)
+def build_failed(symptom: NotBuilt) -> Cause | None:
+    """The build fails: the first error is shown, with its file and line."""
+    if not _failed_itself(symptom.build, symptom.name):
+        return None
+    return _failed(_own(symptom.submission, symptom.build, symptom.name), symptom.name)
+
+
+@explanation(NotBuilt, general=True)
+def rests_on_another(symptom: NotBuilt) -> Cause:
+    """Another package, on which it rests, failed to build."""
+    return _never_begun(symptom.submission, symptom.build, symptom.name)
 
 
 def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
