@@ -73,9 +73,6 @@ def run(recording: Recording, parameters: Runs) -> Finding:
     callback ran `at_least` times. A start that is late because callbacks worked without a pause
     until then counts as on time: whether they should have run at once is judged elsewhere. One
     that comes before its time is never right, whatever the median is.
-
-    Explains reports in another form or with other names, periods in milliseconds, callbacks that
-    never end or never run, messages that were dropped, and a callback that is registered twice.
     """
     expected = _run_words(parameters)
     reports = read_reports(recording.on(parameters.topic))
@@ -358,9 +355,6 @@ def work(recording: Recording, parameters: Work) -> Finding:
     The time between the report of the start and that of the end, by source timestamps: the
     median of each callback's runs must be the duration within `tolerance`. What the machine took
     from the process never costs a point.
-
-    Explains milliseconds that were taken for seconds, and a start and an end that are published
-    without the work between them.
     """
     expected = (
         f"{codes(parameters.callbacks)} working {format_duration(parameters.duration)} in each run "

@@ -39,8 +39,6 @@ def never_overlap(recording: Recording, parameters: NeverOverlap) -> Finding:
     No two runs of the named callbacks may overlap, neither of different ones nor of the same one.
     Judged by their reports on the wire; the executor and the callback groups that the process
     declared only help to explain.
-
-    Explains several threads where one is expected, and a callback in a reentrant group.
     """
     names = parameters.callbacks
     expected = (
@@ -143,10 +141,9 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
     `by` or longer. Judged by their reports on the wire; the executor and the callback groups that
     the process declared only help to explain.
 
-    Explains an executor with one thread or fewer threads than callbacks, and callbacks in one
-    mutually exclusive group. A MultiThreadedExecutor takes as many threads as there are CPUs; the
-    grader gives it four at least, and os.cpu_count() says so. Where that is not possible and the
-    machine has one CPU, it cannot be judged, which costs no point.
+    A MultiThreadedExecutor takes as many threads as there are CPUs; the grader gives it four at
+    least, and os.cpu_count() says so. Where that is not possible and the machine has one CPU, it
+    cannot be judged, which costs no point.
     """
     expected = (
         f"{codes(parameters.callbacks)} running at the same time as "

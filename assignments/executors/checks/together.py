@@ -41,8 +41,8 @@ def together(recording: Recording, parameters: Together) -> Finding:
     longer. Judged by their reports on the wire; the executor that the process declared only
     helps to explain.
 
-    Explains an executor with fewer threads than callbacks. Where a MultiThreadedExecutor has one
-    thread because the machine has one CPU, it cannot be judged, which costs no point.
+    Where a MultiThreadedExecutor has one thread because the machine has one CPU, it cannot be
+    judged, which costs no point.
     """
     names = parameters.callbacks
     times = counted(parameters.at_least, "time")

@@ -68,10 +68,6 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     origin is laid through them: its slope is the gain, R² tells how well it fits. Commands at a
     limit (of the robot, or a clamp of your own) and the pause near zero within your tolerance
     do not count.
-
-    Explains commands that know only a few values (bang-bang), an error that is not normalised,
-    a wrong sign, a yaw that was read wrongly, commands that have nothing to do with the error, and
-    a gain out of range.
     """
     phase = parameters.phase
     expected = (

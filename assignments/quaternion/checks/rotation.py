@@ -124,12 +124,6 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     come late or twice: each is paired with the question that it answers, and one that is missing
     does not shift the others. A node that repeats its last answer for as long as nothing new is
     asked is wrong.
-
-    Names the mistake where the wrong answers are what it gives: the angle not halved, the axis
-    not normalized, w first instead of last, degrees, roll and yaw swapped, axes that turn with
-    the body instead of fixed ones, the inverse rotation, answers that belong to the message
-    before. Explains answers that are missing (a process that died, a callback that is never
-    called), and messages that answer nothing.
     """
     expected = parameters.words
     sent = recording.sent.get(parameters.stimulus, ())

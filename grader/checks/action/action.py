@@ -53,9 +53,6 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
     """The node offers the action.
 
     Judged by the ROS graph: an action server of the student's was there, with this type.
-
-    Explains a misspelt name, a private or namespaced one, upper and lower case, another type,
-    a service or nothing in its place, and a program that died before.
     """
     return is_offered(recording, ACTION, parameters.action, parameters.type)
 
@@ -108,9 +105,6 @@ def rejects(recording: Recording, parameters: Rejects) -> Finding:
     """The goal is rejected.
 
     Judged by the server's answer to the goals that the probe sent.
-
-    Explains a server that accepts every goal, one that accepts and then aborts, and a goal that
-    is never answered.
     """
     expected = f"{parameters.words} is rejected"
     try:
@@ -162,9 +156,6 @@ def feedback(recording: Recording, parameters: FeedbackOf) -> Finding:
 
     Judged by the feedback that the probe received for each goal that was accepted and let come
     to its end: how much, at which mean rate, and what the last of it said.
-
-    Explains feedback that is missing, too little, too slow or too fast, feedback with other
-    values, and a goal that was rejected or ended with an exception.
     """
     expected = f"at least {counted(parameters.at_least, 'message')} of feedback"
     if parameters.rate is not None:
@@ -271,10 +262,6 @@ def result(recording: Recording, parameters: Result) -> Finding:
     """The action ends with the expected result.
 
     Judged by the results of the goals that were accepted and let come to their end.
-
-    Explains a goal that was rejected, one that never ends, an exception in the execute callback
-    (which rclpy catches, so that the goal is aborted), a callback that does not call
-    `goal_handle.succeed()`, and a result with other values.
     """
     wanted = f" with {fields_words(parameters.result)}" if parameters.result else ""
     expected = (

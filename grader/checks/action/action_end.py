@@ -50,10 +50,6 @@ def cancels(recording: Recording, parameters: Cancels) -> Finding:
 
     Judged by the goals that the probe asked to cancel (`cancel_after`): the server agrees, and
     the goal ends as canceled in time.
-
-    Explains a server that refuses to cancel (no cancel_callback: rclpy refuses by default), one
-    that agrees but goes on, one that ends without `goal_handle.canceled()`, and an executor
-    that cannot take in the request while the execute callback runs.
     """
     expected = f"{parameters.words} is canceled within {format_duration(parameters.within)}"
     try:
@@ -200,9 +196,6 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding:
 
     Judged by the goals that the probe sent while another one was active (`preempt: true`): the
     new one is accepted, and the old one ends in time, canceled or aborted, without success.
-
-    Explains a server that rejects the new goal, that works on both, or that lets the old one
-    succeed first.
     """
     expected = (
         f"{parameters.words} ends the goal before it within {format_duration(parameters.within)}"

@@ -90,9 +90,8 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     to be answered before the end do not count. A callback may be busy for a while, as long as
     answers come in time; with `typically`, only as long as most of them come soon.
 
-    Explains a loop with `time.sleep()` in the constructor, in main() or in a callback, and
-    `rclpy.spin()` that was never called. Where no call can be judged it relies on what the
-    process declared: that it spins and has a timer.
+    Where no call can be judged it relies on what the process declared: that it spins and has a
+    timer.
     """
     expected = f"services of the node answer within {format_duration(parameters.within)}"
     if parameters.node:

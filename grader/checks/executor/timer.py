@@ -41,8 +41,6 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     process declared: a process that created its publisher on the topic and no timer at all does
     not publish in the callback of one. Any timer with a callback will do, whatever its period.
     Where the process did not declare its publisher either, it is an error, which costs no point.
-
-    Explains a thread, a loop with `time.sleep()` and a rate, which has a timer that calls nothing.
     """
     expected = f"a timer, in whose callback the node publishes on {code(parameters.topic)}"
     messages = recording.on(parameters.topic)

@@ -70,9 +70,6 @@ def found(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
     Judged by the files that were handed in: `msg/<Name>.msg` (or `srv/<Name>.srv`,
     `action/<Name>.action`) beside package.xml. A file from elsewhere counts as well, if the
     build generated the interface from it.
-
-    Explains a file in a wrong folder or in another package, a wrong suffix, upper and lower
-    case, and a misspelt name.
     """
     expected = f"a definition in {code(parameters.parts.file)} of {code(parameters.parts.package)}"
     definition = find_definition(submission, parameters.parts)
@@ -86,12 +83,6 @@ def generated(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
     """The build generates code for the interface.
 
     Judged by what `colcon build` installed, not by how CMakeLists.txt is written.
-
-    Explains, one at a time and in the order in which CMake would notice: no
-    rosidl_generate_interfaces(), no find_package(rosidl_default_generators), ament_package()
-    before it, a project that is not called as the package, a file that is not listed, a package
-    that is missing under DEPENDENCIES or that is not found, a package.xml that is not a member of
-    rosidl_interface_packages; and otherwise the first error of the build.
     """
     expected = f"`colcon build` generates {code(parameters.interface)}"
     definition = find_definition(submission, parameters.parts)
@@ -110,9 +101,6 @@ def fields(submission: SubmissionRecord, parameters: Defined) -> Finding:
     Compares name, type, array bound and order of all fields. Comments, blanks, default values
     and constants do not matter. Two nodes understand each other only if all of this is the same:
     ROS compares a hash of it.
-
-    Explains each field that is missing, misspelt, of another type, with another array bound, in
-    another place, or one too many, and a line that cannot be read.
     """
     wanted = [str(item) for section in parameters.sections for item in section.fields]
     expected = f"the fields {codes(wanted)}" if wanted else "no field"
@@ -124,9 +112,6 @@ def constants(submission: SubmissionRecord, parameters: Defined) -> Finding:
     """The interface has the expected constants.
 
     Compares name, type and value. Their order does not matter, nor do further constants.
-
-    Explains each constant that is missing or misspelt, each wrong value or type, and a line that
-    cannot be read.
     """
     wanted = [str(item) for section in parameters.sections for item in section.constants]
     expected = f"the constants {codes(wanted)}" if wanted else "no constant"
@@ -201,9 +186,6 @@ def manifest(submission: SubmissionRecord, parameters: OfInterface) -> Finding:
     (or by one tag for the build and one for the run). On the machine where all of it is
     installed the build does without these; on another one it fails. A package that was built must
     be in ament's index of packages, where `ros2 interface show` looks.
-
-    Explains each entry that is missing, with the line to add, and a CMakeLists.txt without
-    ament_package().
     """
     expected = f"package.xml of {code(parameters.parts.package)} is that of an interface package"
     definition = find_definition(submission, parameters.parts)

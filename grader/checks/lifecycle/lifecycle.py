@@ -42,10 +42,7 @@ def state(recording: Recording, parameters: State) -> Finding:
 
     Judged by the node's own answers to the calls of `get_state` that the scenario makes
     (`lifecycle_msgs/srv/GetState`), between those of `change_state`.
-
-    Explains a node without a lifecycle, a transition that the node refused or that failed, a
-    state that is another one, and a node that does not answer. Without the package
-    lifecycle_msgs on the machine that grades, it is an error.
+    Without the package lifecycle_msgs on the machine that grades, it is an error.
     """
     node = parameters.node
     expected = f"the states of {code(node)}: {listing(parameters.states, 'then')}"

@@ -82,12 +82,6 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     rounded or exact, the whole message; other numbers and other lines do not matter. Only the
     name that stands right before a number, as in `x = 1.37`, must not be that of another of the
     fields. Where the lines come from does not matter either, a callback or a timer.
-
-    Explains a subscription that is missing, of another type, or that requests a QoS that the
-    publisher does not offer; an executor that never spins or that a callback blocks; other values
-    (another beam of a scan, the nearest of all, z instead of y, centimetres, too few decimals); two
-    fields under each other's names; values that are logged only in the callback of another topic;
-    a callback that logs nothing, and one that logs too seldom.
     """
     carried = recording.carried(parameters.topic)
     expected = _words(parameters, carried)

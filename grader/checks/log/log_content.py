@@ -106,9 +106,6 @@ def contains(recording: Recording, parameters: Contains) -> Finding:
 
     Judged by the records of the loggers, on /rosout and in the lines that they write; each
     counts once, and printed lines do not count.
-
-    Explains the right text at another level, text that is printed instead of logged, similar
-    text, and a node that logs nothing or died before.
     """
     low, high = parameters.at_least, parameters.at_most
     bounds = f"{low} or more" if high is None else f"{low} to {high}" if low < high else str(low)
@@ -199,8 +196,6 @@ def level(recording: Recording, parameters: Worst) -> Finding:
 
     Judged by the records of the loggers, on /rosout and in the lines that they write, until
     SIGINT.
-
-    Explains the first record that is too severe, and a node that died.
     """
     whose = f" by {code(parameters.node)}" if parameters.node else ""
     expected = f"nothing logged{whose} above {parameters.at_most}"
@@ -256,9 +251,6 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     Judged by the stamps of the records: their mean rate from the first to the last, or, of
     fewer than three, by how many there are in the time that was observed. With a lowest rate the
     node must log until the end of the observation: the last two periods may be silent.
-
-    Explains a log that is flooded from a fast callback, one that comes too seldom or falls
-    silent, and the same mistakes as log.contains where there is none.
     """
     low_hz, high_hz = parameters.bounds_hz
     if parameters.rate is not None:

@@ -76,11 +76,6 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     Every message must hold the values of one message of the source that was published at most
     `within` before it; what the machine took from the node is not held against it. Angles are
     compared on the circle. What is published before the source has said anything does not count.
-
-    Explains, from the data: another field of the source, a part of a quaternion taken for an
-    angle, degrees, a wrong sign, half of the angle, values that never change, that are never set
-    or that lag behind, and values of different moments in one message. If nothing was published
-    it says why, as messages.count does.
     """
     topic, source = code(parameters.topic), code(parameters.source)
     pairs = listing(f"{code(field)} = {code(value)}" for field, value in parameters.fields.items())

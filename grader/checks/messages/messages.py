@@ -100,11 +100,6 @@ def count(recording: Recording, parameters: Count) -> Finding:
     Counts the messages on the topic in the whole observation, or since the first message of a
     stimulus that they answer. A message that the writer numbered but that was lost on its way
     counts as published.
-
-    Explains a publisher that is silent: another topic or type, QoS that does not match, a
-    process that died, a timer whose period was given in milliseconds, an executor that never
-    spins, printing instead of publishing. Explains too many messages by the timers and
-    publishers that were there.
     """
     expected = parameters.words
     everything = recording.on(parameters.topic)
@@ -185,11 +180,6 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
 
     Compares each field of each message on the topic. It does not matter whether a number was
     written as an integer.
-
-    Explains fields that were swapped, a value in a wrong field, a wrong sign, a factor of 10,
-    100 or 1000, degrees instead of radians, an integer in a float field, not-a-number, a message
-    that is all zero as a new one is, and a value that grows from message to message.
-    If nothing was published it says why, as messages.count does.
     """
     messages = recording.on(parameters.topic)
     expected = _expected_words(parameters)

@@ -87,10 +87,6 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
     Compares one field of each message with the value that it should have at its place: counting
     by a `step`, or a list of `values`. A message that the writer numbered but that was lost on
     its way leaves its place out.
-
-    Explains a value that never changes, that grows by another step, that begins elsewhere, that
-    begins anew, that repeats, and values in another order. If nothing was published it says why,
-    as messages.count does.
     """
     expected = parameters.words
     messages = recording.on(parameters.topic)

@@ -79,10 +79,7 @@ def no_contact(recording: Recording, parameters: NoContact) -> Finding:
     """The robot touches nothing.
 
     Judged by the simulator. Something that runs into a robot at rest does not count.
-
-    Explains what was touched, when and how fast, scans that had ended long before, and a process
-    that ended while the robot was driving; a robot that never moved does not pass, unless
-    `moving` is false.
+    A robot that never moved does not pass, unless `moving` is false.
     """
     expected = "touches nothing"
     cause = why_not_moved(recording) if parameters.moving else why_not_judged(recording)

@@ -68,10 +68,6 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     Judged by the true speed, while nothing is near ahead: after it has sped up (half a second,
     and what the robot's acceleration needs to that speed), and until it comes to rest for good.
     The median must be the speed within `tolerance`, and nine tenths of the time must be, too.
-
-    Explains a robot that never moved (the process ended, nothing published, commands of zero
-    or not-a-number), a factor, a limit of the robot, driving backwards, driving on and off, and
-    a speed that varies.
     """
     wanted, share = parameters.speed, parameters.tolerance
     expected = f"drives at {speed(wanted)} (within {percent(share)}) while nothing is near ahead"
@@ -197,10 +193,6 @@ def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
     """The robot drives on where nothing is ahead.
 
     Judged by the way ahead along its true path; what it drives backwards is taken off.
-
-    Explains an obstacle beside the path that counted as one ahead (`min(ranges)`), a beam
-    without return (0.0 or inf) that counted as one, contact, a robot that drives backwards, is
-    too slow or never moved, and a process that ended.
     """
     wanted_m = parameters.distance
     expected = f"drives {metres(wanted_m)} ahead without stopping, for nothing is near ahead"

@@ -48,11 +48,6 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
 
     Judged by the true pose at the end of the run: at rest, near the position, and with the
     heading (a full turn more or less is the same heading).
-
-    Explains a robot that never moved or touched something, a process that ended, commands that
-    are not finite, a goal with x and y swapped or a sign changed or counted from the start, one
-    that was passed or circled, a yaw that was read wrongly, degrees instead of radians, a heading
-    that was never turned to or turned past, oscillation, and a robot that is too slow.
     """
     run = approach(recording, parameters.goal)
     heading = parameters.heading
@@ -109,8 +104,6 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     Judged by the true motion: from the beginning of simulated time, which is when the node is
     first connected, to the moment from which it rests until the end of the run. Where it rests
     is the matter of motion.reaches.
-
-    Explains a robot that never moved, one that does not come to rest, and a process that ended.
     """
     expected = f"comes to rest for good within {format_duration(parameters.within)}"
     cause = why_not_moved(recording)
@@ -171,8 +164,6 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
 
     Judged by the true path of the whole run, against the straight line from its start to the
     goal.
-
-    Explains why the goal was not reached, and a path with a detour.
     """
     run = approach(recording, parameters.goal)
     path = f"on a path at most {percent(parameters.most)} longer than the straight line"
@@ -262,8 +253,6 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     Judged by the true motion. Position: how much the distance from the goal grows again after
     the robot has come near. Heading: how far it turns beyond the goal's heading after it has
     stopped driving.
-
-    Explains why the goal was not reached, and how far the robot went past it.
     """
     expected = " and ".join(
         [

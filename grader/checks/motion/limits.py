@@ -36,9 +36,6 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
 
     Judged by the commands as they were published. The robot itself does no more than it can,
     so that what it is asked for beyond it shows only here.
-
-    Explains the first command beyond a limit and the largest, commands that are not finite, and
-    a node that published nothing.
     """
     cause = why_not_judged(recording)
     scene = recording.scene

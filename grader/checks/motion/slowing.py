@@ -52,9 +52,6 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     It is no proportion either where all commands have one of two sizes, each of them several times,
     unless these are next to each other where a command has two decimals, or the lower one comes for
     1 s at most.
-
-    Explains a speed that is the same all the way, one that is switched, and the same causes as
-    motion.reaches where the robot never moved.
     """
     expected = (
         f"linear.x at the end of the way at most {percent(parameters.share)} of its largest value"

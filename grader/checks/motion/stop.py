@@ -58,11 +58,7 @@ def stops(recording: Recording, parameters: Stops) -> Finding:
 
     Judged by the true distance from the LiDAR, straight ahead, at the moment the robot came to
     rest after it had moved.
-
-    Explains a robot that never moved, never stopped or touched something, that stopped for
-    something beside it (`min(ranges)`), for a beam without return (0.0 or inf) or because it
-    counted from its edge, and one that reacted too late. What the machine took from the run
-    never costs a point.
+    What the machine took from the run never costs a point.
     """
     wanted_m = parameters.distance
     expected = (
@@ -223,9 +219,6 @@ def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding:
 
     Judged by the true speed: with `after: start` in the whole run, with `after: stop` from the
     moment it first came to rest after it had moved (for half a second or more) to the end.
-
-    Explains a robot that set off before the first scan, one that starts again or creeps on, and
-    with `after: stop` one that never moved or never stopped.
     """
     if parameters.after == "start":
         return _from_start(recording, parameters)

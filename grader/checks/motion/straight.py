@@ -32,9 +32,6 @@ def straight(recording: Recording, parameters: Straight) -> Finding:
 
     Judged by the commands in force and by the true heading: `angular.z` is zero all the time,
     and the heading stays that of the start.
-
-    Explains a robot that never moved, an angular.z that is not zero (the first command), and
-    values that stand in the wrong field.
     """
     expected = f"drives straight: angular.z is zero (within {turn(parameters.tolerance)})"
     cause = why_not_moved(recording)

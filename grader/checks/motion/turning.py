@@ -51,9 +51,6 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     but while it turns away from the goal's position, or once it has done so without driving, it
     may not drive any more (for the delay of odometry 2 cm are allowed, or what the robot
     goes in 0.09 s at its full speed).
-
-    Explains why the position was not reached, a speed in the second phase, and driving and
-    turning by turns.
     """
     expected = (
         f"no linear motion once within {metres(parameters.position)} of the goal, only turning"
@@ -139,9 +136,6 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     Judged by the true heading, in the first phase against the direction of the goal, in the
     second (once driving has ended near the goal) against the goal's heading. The long way
     leads away from the error and through half a turn; overshooting by less is no long way.
-
-    Explains where it turned the long way, from which error, and why the robot never moved or
-    never came to the goal.
     """
     expected = "turns by the short way, never more than half a turn for an error"
     run = approach(recording, parameters.goal)

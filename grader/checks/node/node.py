@@ -30,10 +30,6 @@ def starts(recording: Recording, parameters: NoParameters) -> Finding:
     """The program starts and has a node.
 
     Judged by the ROS graph: any node of the student was seen, whatever its name.
-
-    Explains, deepest first: nothing could be launched; the process ended before it had a node
-    (with its exception and the line in your file, its signal, or that main() returned); it
-    runs but has no node (waits for input, loops or sleeps before rclpy.init).
     """
     expected = "the program creates a node"
     missing = why_no_node(recording)
@@ -64,11 +60,6 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
     """The node appears under its name.
 
     Judged by the ROS graph: a node of the student with this fully qualified name was seen.
-
-    Explains, deepest first: nothing could be launched; the process ended before it had a node
-    (with its exception and the line in your file, its signal, or that main() returned); it
-    runs but has no node (waits for input, loops or sleeps before rclpy.init); the node has
-    another name, namespace or case; another node publishes in its place.
     """
     expected = f"a node {code(parameters.name)}"
     missing = why_not_node(recording, parameters.name) or _other_publisher(recording, parameters)
@@ -115,9 +106,6 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
     graph, which must not have lost the node before. Of several nodes those count that publish
     what is recorded, or subscribe to what they are sent; a helper node may come and go. What a
     sandbox never allows, such as a signal to the process that holds it, ends a node.
-
-    Explains an exception (with the line in your file), a crash with its signal, and a main()
-    that returned, such as one that does not call rclpy.spin.
     """
     who = code(parameters.name) if parameters.name else "the node"
     expected = f"{who} runs until SIGINT (Ctrl-C)"
@@ -200,10 +188,6 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
 
     Judged by the process: after SIGINT it must end in time, and leave no process behind. Its
     exit status does not matter, nor does a traceback of KeyboardInterrupt.
-
-    Explains a process that had ended already, one that swallows KeyboardInterrupt (a bare
-    `except:` in a loop, an own signal handler), one that waits for a thread, and child
-    processes that outlive it.
     """
     expected = f"the process ends within {format_duration(parameters.within)} of SIGINT (Ctrl-C)"
     if not recording.processes:

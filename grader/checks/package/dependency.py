@@ -49,9 +49,6 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     is named there must exist. An import that the code can do without (guarded by `try`)
     needs no entry. Modules that the code names in none of its files, but imports in a run, count
     as well.
-
-    Explains each missing dependency with the line of the import and the tag to add, one that
-    stands under `test_depend` or inside `export` only, and misspelt names.
     """
     expected = f"every ROS package that {code(parameters.package)} imports is in package.xml"
     cause = why_no_manifest(submission, parameters.package)

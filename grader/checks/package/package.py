@@ -36,9 +36,6 @@ def found(submission: SubmissionRecord, parameters: Found) -> Finding:
 
     Judged by the files that were handed in: a package.xml with this name, which can be read,
     and with the expected build type.
-
-    Explains a submission that cannot be read (empty, no package.xml, a refused archive, two
-    packages of one name), a misspelt name, broken XML (with its line), and a wrong build type.
     """
     expected = f"the package {code(parameters.package)}"
     if parameters.build_type:
@@ -74,9 +71,6 @@ def builds(submission: SubmissionRecord, parameters: Builds) -> Finding:
     Judged by `colcon build` on a copy of what was handed in. A syntax error in the module of
     an executable counts too, if the package has no other executable: colcon only prints it and
     goes on.
-
-    Explains the first error with your file and line and the end of the build's output, a build
-    that never ends, and a package that was not built because another one failed.
     """
     expected = f"`colcon build` builds {code(parameters.package)}"
     cause = why_not_built(submission, parameters.package)
@@ -141,10 +135,6 @@ def executable(submission: SubmissionRecord, parameters: Executable) -> Finding:
 
     Judged by what the build installed in lib/<package>, and by whether the function behind it
     exists in the package.
-
-    Explains a missing or misspelt entry of console_scripts, a setup.cfg that is missing or
-    wrong (the script then lies in bin/, where `ros2 run` does not look), and an entry point
-    whose module or function does not exist.
     """
     package, name = parameters.package, parameters.executable
     expected = f"the executable {code(name)}, for `ros2 run {package} {name}`"

@@ -84,10 +84,6 @@ def declared(recording: Recording, parameters: Declared) -> Finding:
 
     Judged by the node's own parameter services, which the probe asked (`read_parameters` or
     `set_parameters`): type, value before anybody set it, and descriptor.
-
-    Explains a misspelt name, a parameter that is not declared, an integer where a double is
-    asked for, another default, a range that is missing or another one, and a node that does not
-    answer.
     """
     expected = f"the parameter {code(parameters.name)} of {code(parameters.node)}"
     expected += _wanted(parameters)
@@ -329,10 +325,6 @@ def set_(recording: Recording, parameters: Set) -> Finding:
 
     Judged by the node's answer to `set_parameters`, and by the value that its parameter has
     after it: accepted, it is the new one; refused, it is the one from before.
-
-    Explains a value that is refused (with the node's reason), one that is accepted although it
-    should not be, a refusal without the reason that is asked for, and a parameter that is not
-    declared.
     """
     verb = "accepts" if parameters.accepted else "refuses"
     expected = f"{code(parameters.node)} {verb} {parameters.name} = {value_text(parameters.value)}"

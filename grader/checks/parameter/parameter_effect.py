@@ -88,9 +88,6 @@ def takes_effect(recording: Recording, parameters: TakesEffect) -> Finding:
 
     Judged by the messages that were published from a moment after the node accepted the value
     until the same parameter was set again, or the run ended.
-
-    Explains a parameter that is read once in the constructor, a timer that keeps its period, a
-    value that is refused, and a node that falls silent.
     """
     shown = f"{parameters.name} = {value_text(parameters.value)}"
     expected = (

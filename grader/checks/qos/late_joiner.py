@@ -56,10 +56,6 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     is no subscription until the late joiner's; how many messages came before tell the numbers
     that the publisher's middleware gives them. So a publisher is found out that publishes only
     while there is a subscription.
-
-    Explains a publisher that is volatile, a queue that is too short or too long, a history of
-    keep_all, a lifespan that is over, publishers that are made anew for each message, a publisher
-    that had not published enough, and one that waits for a subscription.
     """
     expected = _expected_words(parameters)
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)

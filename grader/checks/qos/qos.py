@@ -115,9 +115,6 @@ def offered(recording: Recording, parameters: Profile) -> Finding:
 
     Judged by what DDS discovered of every publisher of the student's on the topic; only the
     policies that are named in the parameters count. Queue depth is judged by qos.depth.
-
-    Explains by the rule "requested against offered" whether a subscription that requests the
-    expected profile would receive anything.
     """
     return _judge(recording, parameters, _PUBLISHER)
 
@@ -128,9 +125,6 @@ def requested(recording: Recording, parameters: Profile) -> Finding:
 
     Judged by what DDS discovered of every subscription of the student's to the topic; only the
     policies that are named in the parameters count.
-
-    Explains by the rule "requested against offered" whether it would receive anything from a
-    publisher that offers the expected profile.
     """
     return _judge(recording, parameters, _SUBSCRIPTION)
 
@@ -271,9 +265,6 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
     Discovery does not tell history and depth, so this is judged by what the process declared when
     it created the endpoint. The heartbeats of a reliable publisher tell how many messages it
     keeps: what they show counts more.
-
-    Explains another depth, a history of keep_all, which has no depth, and an endpoint that the
-    process did not declare.
     """
     kind = Kind(parameters.kind)
     expected = f"queue depth {parameters.depth} of the {kind.value} on {code(parameters.topic)}"

@@ -84,8 +84,6 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     duration. With a late joiner as the peer, it is judged by whether the two did match. A
     subscription with the policy "best available" matches every publisher: it requests what the
     publishers offer that are there when it is created. Only the process can declare that.
-
-    Explains the policy that decides, and shows the rules as a table.
     """
     kind = Kind(parameters.kind)
     who = f"a {'subscription' if kind is Kind.PUBLISHER else 'publisher'}"

@@ -54,9 +54,6 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
     """The node offers the service.
 
     Judged by the ROS graph: a service server of the student's was there, with this type.
-
-    Explains a misspelt name, a private or namespaced one, upper and lower case, another type,
-    an action or nothing in its place, and a program that died before.
     """
     return is_offered(recording, SERVICE, parameters.service, parameters.type)
 
@@ -102,10 +99,6 @@ def responds(recording: Recording, parameters: Responds) -> Finding:
 
     Judged by the calls that the probe sent: every one must be answered in time, with the
     expected fields. A node answers only while its executor spins.
-
-    Explains a service that is not there, a process that died of the call (with its exception
-    and your line), a callback that never returns or that blocks the executor, and fields with
-    other values.
     """
     asked = f" to {fields_words(parameters.request)}" if parameters.request else ""
     wanted = [f"{path} with “{word}”" for path, word in parameters.contains.items()]
@@ -289,9 +282,6 @@ def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
 
     Judged by the answers to calls that the probe sent at once: side by side they come together,
     one after another they are as far apart as one call takes.
-
-    Explains a second call that has to wait (a single-threaded executor, a mutually exclusive
-    callback group), one that should wait but does not, and calls that are never answered.
     """
     how = parameters.calls.replace("_", " ")
     expected = (

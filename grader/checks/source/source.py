@@ -84,9 +84,6 @@ def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
     Judged by the syntax of the package's Python files. It does not matter how the base class is
     imported or called (`rclpy.node.Node`, `import ... as`, an alias), and whether it is
     inherited at once or through a class of your own, in any file. A lifecycle node is a node.
-
-    Explains a class that is missing (with the nearest name), one that inherits nothing or
-    something else, and a node that is used without a class of its own.
     """
     base = parameters.inherits.rpartition(".")[2]
     who = f"the class {code(parameters.name)}" if parameters.name else "a class"
@@ -195,9 +192,6 @@ def docstrings(submission: SubmissionRecord, parameters: Docstrings) -> Finding:
     Judged by the syntax of the package's Python files. Names that begin with an underscore need
     none, `__init__` included, nor do functions inside of functions, overloads, setters, and an
     empty `__init__.py`.
-
-    Explains what has no docstring, each with its file and line, and a comment where a docstring
-    is expected.
     """
     expected = f"docstrings of {_needed(parameters.share)} {_plurals(parameters.of)}"
     package = _python_files(submission, parameters.package)
@@ -267,8 +261,6 @@ def type_hints(submission: SubmissionRecord, parameters: TypeHints) -> Finding:
 
     Judged by the syntax of the package's Python files: every parameter, and what is returned.
     `self` and `cls` need no hint, nor does what `__init__` returns, nor a lambda.
-
-    Explains what has no hint, each with its file and line.
     """
     what = "parameters and return types" if parameters.returns else "parameters"
     expected = f"type hints for the {what} of {_needed(parameters.share)} functions"
@@ -324,8 +316,6 @@ def no_print(submission: SubmissionRecord, parameters: Source) -> Finding:
 
     Judged by the syntax of the package's Python files: `print` is not called, nor handed on as
     a function. Printing into a file is not meant.
-
-    Explains each place with its file and line.
     """
     expected = "no print(): the node's logger tells what happens"
     package = _python_files(submission, parameters.package)
@@ -376,9 +366,7 @@ def ruff(submission: SubmissionRecord, parameters: Ruff) -> Finding:
 
     Judged by `ruff check` on the package's Python files, with lines of up to 99 characters as
     in the style guide of ROS 2, and without any configuration or `# noqa` of the student's.
-
-    Explains each place with its file and line in the words of ruff. Without ruff on the machine
-    that grades, it is an error, which costs no point.
+    Without ruff on the machine that grades, it is an error, which costs no point.
     """
     wanted = ", ".join(parameters.rules)
     but = f" but {', '.join(parameters.except_)}" if parameters.except_ else ""

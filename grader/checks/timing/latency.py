@@ -98,9 +98,6 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     The latency is the time from the probe's publishing of a message to the source timestamp of
     the node's answer. Answers are taken in their order, one for each message. What the machine
     took from the process meanwhile is measured, and never costs a point.
-
-    Explains answers that wait for a timer, that come later and later (a callback that takes
-    longer than the time between two messages), and messages without an answer.
     """
     limits = [
         f"{words} {format_duration(limit)}"

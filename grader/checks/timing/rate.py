@@ -69,8 +69,6 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     matter (see timing.period), unless `pause` says how long a pause may be. Messages that the
     writer numbered but that were lost on their way count. What the machine took from the process
     is measured, and never costs a point.
-
-    Explains a publisher that is silent or stops, as messages.count does.
     """
     expected = parameters.words
     messages = recording.on(parameters.topic)

@@ -86,11 +86,6 @@ def period(recording: Recording, parameters: Period) -> Finding:
     missing in it. Messages must go on until the end of the
     observation. What the machine took from the process is
     measured, and never costs a point.
-
-    Explains a period in milliseconds where seconds are meant (300 or 0.003 instead of 0.3),
-    factors of ten, two timers or two publishers, sleeping instead of a timer (the work is
-    added to each period), callbacks that take longer than the period, messages left out,
-    messages that stop, and a publisher that is silent.
     """
     limits = parameters.limits
     expected = (

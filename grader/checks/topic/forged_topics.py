@@ -32,8 +32,6 @@ def untouched(recording: Recording, parameters: Untouched) -> Finding:
     Judged by the ROS graph: no node of the student has a publisher on a topic of the robot, or
     the name of the node that watches the run. Motion is judged by the simulator itself, so
     that publishing there could gain nothing.
-
-    Explains which node publishes where, and why there is no node at all.
     """
     expected = f"no publisher on {codes(parameters.topics, last='or')}"
     missing = why_no_node(recording)

@@ -38,10 +38,6 @@ def published(recording: Recording, parameters: Topic) -> Finding:
 
     Judged by the ROS graph: a publisher of the student's was there. Whether and what it
     publishes is judged elsewhere.
-
-    Explains a misspelt topic (`/cmdvel`), a private or namespaced one
-    (`/bot_publisher/cmd_vel`), upper and lower case, a subscription where a publisher is
-    expected, the right type on another topic, and a node that publishes nothing at all.
     """
     return _presence(recording, Kind.PUBLISHER, parameters)
 
@@ -51,8 +47,6 @@ def subscribed(recording: Recording, parameters: Topic) -> Finding:
     """The node subscribes to the topic.
 
     Judged by the ROS graph: a subscription of the student's was there.
-
-    Explains the same mistakes as topic.published, with the ends exchanged.
     """
     return _presence(recording, Kind.SUBSCRIPTION, parameters)
 
@@ -117,10 +111,6 @@ def type_(recording: Recording, parameters: Type) -> Finding:
     """The topic has the expected message type.
 
     Judged by the ROS graph, for every endpoint of the student's on the topic.
-
-    Explains a type of the same name from another package, the Stamped variant (with a header)
-    or its plain counterpart, a type that is only a part of the expected one (Vector3 of
-    Twist), and similar names.
     """
     kind = Kind(parameters.kind)
     expected = f"a {kind.value} of {code(parameters.type)} on {code(parameters.topic)}"
