@@ -190,7 +190,8 @@ def checks_markdown(catalogue: Mapping[str, Check] = CATALOGUE) -> str:
         _MADE,
         "What `uses` in an [assignment.yaml](assignment-yaml.md) may name, with the keys of "
         "`with`. A check judges either what was handed in, before it runs, or the recording "
-        "of a run.",
+        "of a run. Why a check failed is told with what it found: "
+        "[what rosgrade can explain](explanations.md).",
         _table(("check", "what it asks for"), rows),
         *(check_markdown(check) for check in catalogue.values()),
         *_lessons_markdown(),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import endpoints_seen, first_seen
 from grader.checks.motion.command import Command, command_topic, commands, is_zero
@@ -13,6 +16,7 @@ from grader.checks.motion.track import has_moved, index_at, is_at_rest
 from grader.checks.qos.compatibility import compatibility_table, refusals
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
@@ -40,25 +44,28 @@ def why_not_judged(recording: Recording) -> Cause | None:
     return Cause("there is no simulated robot in this scenario: it needs a `world`", ours=True)
 
 
+@dataclass(frozen=True)
+class NotMoved(Symptom[Cause]):
+    """The robot never moved."""
+
+    recording: Recording
+
+    @cached_property
+    def sent(self) -> tuple[Command, ...]:
+        """The velocity commands."""
+        return commands(self.recording)
+
+    def moment(self, label: str, command: Command) -> Evidence:
+        """Evidence at a command."""
+        return Evidence(moments=(Moment(label, self.recording.since_launch_s(command.time_ns)),))
+
+
 def why_not_moved(recording: Recording) -> Cause | None:
     """Why the robot never moved; None if it did."""
     cause = why_not_judged(recording)
     if cause is not None or has_moved(recording.truth):
         return cause
-    cause = why_ended(recording, _STILL)
-    if cause is not None:
-        return cause
-    sent = commands(recording)
-    if not sent:
-        topic = command_topic(recording)
-        cause = _unreadable(recording) if recording.on(topic) else why_silent(recording, topic)
-        return cause.after(_STILL)
-    return (
-        why_rejected(recording)
-        or _unheard(recording)
-        or _asks_nothing(recording, sent)
-        or _in_vain(recording, sent)
-    )
+    return cause_of(NotMoved(recording))
 
 
 def why_cut_short(recording: Recording) -> Cause | None:
@@ -95,6 +102,33 @@ def _moment(recording: Recording, label: str, incident: Incident) -> Moment:
     return Moment(label, recording.since_launch_s(incident.time_ns))
 
 
+@explanation(NotMoved)
+def ended_before_it_moved(symptom: NotMoved) -> Cause | None:
+    """The process ended."""
+    return why_ended(symptom.recording, _STILL)
+
+
+@explanation(NotMoved)
+def nothing_published(symptom: NotMoved) -> Cause | None:
+    """Nothing was published on the topic of velocity commands."""
+    recording, topic = symptom.recording, command_topic(symptom.recording)
+    return None if recording.on(topic) else why_silent(recording, topic).after(_STILL)
+
+
+@explanation(NotMoved)
+def no_velocity_command(symptom: NotMoved) -> Cause | None:
+    """What was published is no velocity command."""
+    if symptom.sent:
+        return None
+    return _unreadable(symptom.recording).after(_STILL)
+
+
+@explanation(NotMoved)
+def not_finite(symptom: NotMoved) -> Cause | None:
+    """The commands are infinite, or not a number."""
+    return why_rejected(symptom.recording)
+
+
 def _unreadable(recording: Recording) -> Cause:
     topic = command_topic(recording)
     found = sorted({message.type for message in recording.on(topic)})
@@ -105,8 +139,10 @@ def _unreadable(recording: Recording) -> Cause:
     )
 
 
-def _unheard(recording: Recording) -> Cause | None:
-    """The probe heard the commands, but the robot's own subscription does not match."""
+@explanation(NotMoved)
+def robot_not_matched(symptom: NotMoved) -> Cause | None:
+    """The QoS of the publisher does not match that of the robot's subscription."""
+    recording = symptom.recording
     if any(step.command_m_s or step.command_rad_s for step in recording.truth):
         return None
     topic = command_topic(recording)
@@ -133,19 +169,26 @@ def _unheard(recording: Recording) -> Cause | None:
     return None
 
 
-def _asks_nothing(recording: Recording, sent: tuple[Command, ...]) -> Cause | None:
+@explanation(NotMoved)
+def other_axes(symptom: NotMoved) -> Cause | None:
+    """The commands set fields that a differential drive cannot follow, such as linear.y."""
+    stray = sorted({field for item in symptom.sent for field in item.stray})
+    if not stray or not all(is_zero(item.twist) for item in symptom.sent):
+        return None
+    return Cause(
+        f"{_STILL}: the commands set {codes(stray)}, which a differential drive cannot do",
+        "The speed ahead is linear.x, the turn is angular.z.",
+        symptom.moment("first command", symptom.sent[0]),
+    )
+
+
+@explanation(NotMoved)
+def only_zeros(symptom: NotMoved) -> Cause | None:
+    """All commands are zero, perhaps because a scan was misread."""
+    recording, sent = symptom.recording, symptom.sent
     if not all(is_zero(item.twist) for item in sent):
         return None
-    evidence = Evidence(
-        moments=(Moment("first command", recording.since_launch_s(sent[0].time_ns)),)
-    )
-    stray = sorted({field for item in sent for field in item.stray})
-    if stray:
-        return Cause(
-            f"{_STILL}: the commands set {codes(stray)}, which a differential drive cannot do",
-            "The speed ahead is linear.x, the turn is angular.z.",
-            evidence,
-        )
+    evidence = symptom.moment("first command", sent[0])
     topic = code(command_topic(recording))
     seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
     last = recording.truth[-1]
@@ -159,19 +202,23 @@ def _asks_nothing(recording: Recording, sent: tuple[Command, ...]) -> Cause | No
     return Cause(f"{seen}{where}", hint, evidence)
 
 
-def _in_vain(recording: Recording, sent: tuple[Command, ...]) -> Cause:
-    first = next(item for item in sent if not is_zero(item.twist))
-    left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
-    evidence = Evidence(
-        moments=(Moment("first command to move", recording.since_launch_s(first.time_ns)),)
+@explanation(NotMoved)
+def stands_against_something(symptom: NotMoved) -> Cause | None:
+    """The robot stood against something and was told to drive into it."""
+    touched = next((step.contact for step in symptom.recording.truth if step.contact), None)
+    if not touched:
+        return None
+    return Cause(
+        f"{_STILL}: it stood against {code(touched)} and was told to drive into it",
+        "Look at what is straight ahead before you drive.",
+        _first_to_move(symptom)[1],
     )
-    touched = next((step.contact for step in recording.truth if step.contact), None)
-    if touched:
-        return Cause(
-            f"{_STILL}: it stood against {code(touched)} and was told to drive into it",
-            "Look at what is straight ahead before you drive.",
-            evidence,
-        )
+
+
+@explanation(NotMoved)
+def integer_in_command(symptom: NotMoved) -> Cause | None:
+    """A field of floats was given an integer, which ROS misreads."""
+    first, evidence = _first_to_move(symptom)
     fields = {"linear.x": first.twist.linear_m_s, "angular.z": first.twist.angular_rad_s}
     for field, number in fields.items():
         if was_integer(number):
@@ -181,6 +228,15 @@ def _in_vain(recording: Recording, sent: tuple[Command, ...]) -> Cause:
                 "A number in a message must be a float: write 1.0 instead of 1, or float(value).",
                 evidence,
             )
+    return None
+
+
+@explanation(NotMoved)
+def told_too_late(symptom: NotMoved) -> Cause:
+    """The first command to move came at the very end, or was too slow."""
+    recording = symptom.recording
+    first, evidence = _first_to_move(symptom)
+    left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
     begin_ns = recording.truth[0].time_ns
     lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
     if left_s < 0.2 and lost_s > 0.0:
@@ -193,3 +249,8 @@ def _in_vain(recording: Recording, sent: tuple[Command, ...]) -> Cause:
         "A speed below 1 mm/s, or one that holds for a moment only, does not move the robot.",
         evidence,
     )
+
+
+def _first_to_move(symptom: NotMoved) -> tuple[Command, Evidence]:
+    first = next(item for item in symptom.sent if not is_zero(item.twist))
+    return first, symptom.moment("first command to move", first)

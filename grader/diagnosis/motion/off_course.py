@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from grader.checks.finding import Evidence, Moment
 from grader.checks.motion.command import commands, is_zero
 from grader.checks.motion.contact import why_touched
 from grader.checks.motion.track import speed_plot
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, explain, explanation
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
@@ -15,12 +18,34 @@ from grader.spec.unit import format_duration
 _UNSTEERED_S = 2.0
 
 
-def why_off_course(recording: Recording) -> Cause | None:
-    """What lies deeper than a way that is wrong; None where nothing does.
+@dataclass(frozen=True)
+class OffCourse(Symptom[Cause]):
+    """The robot does not drive as it should."""
 
-    A process that ended, commands that are not finite, contact, or no command for long.
-    """
-    return why_cut_short(recording) or why_touched(recording) or why_unsteered(recording)
+    recording: Recording
+
+
+def why_off_course(recording: Recording) -> Cause | None:
+    """What lies deeper than a way that is wrong; None where nothing does."""
+    return explain(OffCourse(recording))
+
+
+@explanation(OffCourse)
+def cut_short(symptom: OffCourse) -> Cause | None:
+    """The process ended, or sent commands that are not finite."""
+    return why_cut_short(symptom.recording)
+
+
+@explanation(OffCourse)
+def touched(symptom: OffCourse) -> Cause | None:
+    """The robot touched something."""
+    return why_touched(symptom.recording)
+
+
+@explanation(OffCourse)
+def no_command_for_long(symptom: OffCourse) -> Cause | None:
+    """No command came for a long time, and the robot moved on."""
+    return why_unsteered(symptom.recording)
 
 
 def why_unsteered(recording: Recording) -> Cause | None:
