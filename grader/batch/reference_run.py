@@ -18,10 +18,10 @@ from typing import Any
 
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Scenario
-from grader.checks.motion.measure import metres
 from grader.checks.wording import counted
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.grade import Grade
+from grader.measure.motion.quantities import metres
 from grader.recording.model import Recording
 from grader.report.files import write_whole
 from grader.report.html.replay import Replay, make_replay

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from grader.checks.finding import Evidence
 from grader.checks.first_seen import endpoints_seen
-from grader.checks.qos import compatibility
 from grader.checks.wording import code, codes, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
@@ -15,6 +14,7 @@ from grader.diagnosis.explanation import Symptom, explain, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.type_confusion import OtherType
+from grader.measure import compatibility
 from grader.recording.model import Endpoint, Kind, Owner, Recording
 
 # Policies that promise something in time, which a publisher without them does not.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
@@ -13,6 +12,7 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import ENDED_HINT, SECONDS_HINT, why_silent, why_unreadable
 from grader.diagnosis.process.blocked_executor import why_never_spun
 from grader.diagnosis.process.process_exit import why_ended
+from grader.measure import declarations
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from statistics import mean
 
-from grader.checks.log.echo import Wanted
-from grader.checks.log.printed import shows
 from grader.checks.value import leaves
 from grader.checks.wording import code, listing
+from grader.measure.echo import Wanted
+from grader.measure.printed import shows
 
 _FACTORS = (
     (100.0, "100 times the value, as in centimetres,"),

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
@@ -16,6 +15,7 @@ from grader.diagnosis.no_server import Word, offered
 from grader.diagnosis.process.blocked_executor import why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place, parse_failures, student_place
+from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
 from grader.spec.unit import format_duration

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from grader.checks import declarations
 from grader.checks.finding import Evidence, Table
 from grader.checks.first_seen import endpoints_seen, nodes_seen
 from grader.checks.wording import code, codes
@@ -16,6 +15,8 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.near_name import Named, why_misnamed
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import crashed, why_it_exited
+from grader.diagnosis.undeclared import why_never_appeared
+from grader.measure import declarations
 from grader.recording.model import Endpoint, Kind, Owner, Recording
 
 # Every rclpy node has these by itself; they say nothing of what the student wrote.
@@ -103,7 +104,7 @@ def never_appeared(symptom: NoEndpoint) -> Cause | None:
     kind, topic = symptom.kind.value, symptom.topic
     if not declarations.declares(symptom.recording, kind, "topic", topic):
         return None
-    return declarations.why_never_appeared(symptom.recording, f"a {kind} on {code(topic)}")
+    return why_never_appeared(symptom.recording, f"a {kind} on {code(topic)}")
 
 
 @explanation(NoEndpoint)

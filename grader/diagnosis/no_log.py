@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from grader.checks.field import number_at
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.first_seen import first_seen
-from grader.checks.log.echo import Echo, Wanted, echoes, output_lines, shown
-from grader.checks.log.printed import exchanged, logged_text, numbers, quote, unfilled
 from grader.checks.wording import code, codes, counted, listing, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.delivery import why_no_history, why_not_delivered
@@ -18,6 +16,8 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.misread_log import explain
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
+from grader.measure.echo import Echo, Wanted, echoes, output_lines, shown
+from grader.measure.printed import exchanged, logged_text, numbers, quote, unfilled
 from grader.recording.model import NS, Kind, LogLine, Recording
 from grader.spec.unit import format_duration
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from grader.checks import declarations
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import endpoints_seen, until_the_end
-from grader.checks.qos import compatibility
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.delivery import why_not_delivered
@@ -20,6 +18,7 @@ from grader.diagnosis.process.blocked_executor import left_s, why_blocked, why_n
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.process.raised import interrupted_place
 from grader.diagnosis.sim_time import why_time_stands_still
+from grader.measure import compatibility, declarations
 from grader.recording.model import NS, Endpoint, Kind, Owner, Recording
 from grader.spec.unit import format_duration
 from grader.submission.record import SourceError

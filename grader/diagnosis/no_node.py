@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import nodes_seen, until_the_end
 from grader.checks.wording import code, codes
@@ -14,6 +13,8 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import why_not_built
 from grader.diagnosis.process.process_exit import crashed, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
+from grader.diagnosis.undeclared import why_never_appeared
+from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.nearest_name import nearest
 from grader.submission.record import SourceError
@@ -182,7 +183,7 @@ def never_appeared(symptom: NoNode) -> Cause | None:
     """The process created a node, but it never appeared in the ROS graph."""
     if not symptom.declares("node"):
         return None
-    return declarations.why_never_appeared(symptom.recording, "a node")
+    return why_never_appeared(symptom.recording, "a node")
 
 
 @explanation(NoNode)
@@ -279,7 +280,7 @@ def node_never_appeared(symptom: OtherNode) -> Cause | None:
     # A process that shows as many nodes as it declared only calls them by other names.
     if symptom.wanted not in declared or len(declared) <= len(set(symptom.names)):
         return None
-    cause = declarations.why_never_appeared(symptom.recording, f"the node {code(symptom.wanted)}")
+    cause = why_never_appeared(symptom.recording, f"the node {code(symptom.wanted)}")
     return cause.after(symptom.there)
 
 

@@ -8,10 +8,10 @@ from functools import cached_property
 from pathlib import PurePosixPath
 
 from grader.checks.finding import Evidence
-from grader.checks.interface.definition import InterfaceName
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, explain, explanation
+from grader.diagnosis.no_definition import InterfaceName
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
 from grader.recording.interface import PRIMITIVES, DefinitionError, sections_of
 from grader.spec.nearest_name import nearest

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from grader.checks import declarations
 from grader.checks.finding import Evidence
 from grader.checks.first_seen import endpoints_seen
 from grader.checks.wording import code, listing
 from grader.diagnosis.cause import Cause
+from grader.measure import declarations
 from grader.recording.model import Kind, Recording
 from grader.spec.unit import format_duration
 

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from grader.assignment.load import load_assignment
 from grader.checks.finding import Status
-from grader.checks.motion.approach import Approach
-from grader.checks.motion.control_law import Sample, examine
-from grader.checks.motion.measure import degrees
 from grader.diagnosis.motion.misread_yaw import misread_yaw
+from grader.measure.motion.approach import Approach
+from grader.measure.motion.control_law import Sample, examine
+from grader.measure.motion.quantities import degrees
 from sim.motion import Pose
 from tests.checks.builder import (
     INSTALLED,

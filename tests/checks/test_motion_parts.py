@@ -8,14 +8,14 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from grader.checks.finding import Status
-from grader.checks.motion.control_law import Law, Sample, examine
-from grader.checks.motion.ground import ahead, edge_m, nearest
-from grader.checks.motion.measure import degrees, metres, point, side, speed
 from grader.checks.reference import (
     Goal,
     GoalPose,
     UnknownValue,
 )
+from grader.measure.motion.control_law import Law, Sample, examine
+from grader.measure.motion.ground import ahead, edge_m, nearest
+from grader.measure.motion.quantities import degrees, metres, point, side, speed
 from grader.recording.model import NS
 from grader.recording.simulated import Scene, Truth
 from sim.motion import ORIGIN, Pose

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.checks.qos.compatibility import refusals
+from grader.measure.compatibility import refusals
 from grader.recording.model import Kind, Qos
 from tests.checks.builder import (
     RELIABLE,

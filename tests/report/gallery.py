@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 
 from grader.checks.finding import Case, Cases, Comparison, Evidence, Finding, Moment, Plot, Span
-from grader.checks.motion.track import speed_plot
 from grader.grade import grade
+from grader.measure.motion.track import speed_plot
 from grader.recording.event import Breach
 from grader.recording.model import Recording
 from grader.report.html.replay import Replay, make_replay

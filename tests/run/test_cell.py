@@ -16,10 +16,10 @@ from uuid import uuid4
 import pytest
 
 from grader import ros
-from grader.checks import declarations
 from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Status
 from grader.errors import GraderFault
+from grader.measure import declarations
 from grader.recording.model import NS, Ending, Kind, Owner, Recording
 from grader.run.environment import cell_environment
 from grader.run.process.descendants import command_line

@@ -9,7 +9,7 @@ from statistics import median
 
 from pydantic import Field, model_validator
 
-from grader.checks import declarations
+from grader.measure import declarations
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.need import Published, Recorded

@@ -7,7 +7,6 @@ from statistics import median
 
 from pydantic import Field, field_validator
 
-from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Finding, Moment, Plot
@@ -20,6 +19,7 @@ from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import why_not_given
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
+from grader.measure import declarations
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Process, Recording
 from grader.spec.name import QualifiedNodeName

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
 from grader.checks.need import Doubt
 from grader.checks.wording import code, counted
 from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.undeclared import why_undeclared
+from grader.measure import declarations
 from grader.recording.model import Recording
 from grader.spec.name import TopicName
 from grader.spec.unit import format_duration
@@ -47,7 +48,7 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
     if not declarations.declares(recording, "publisher", "topic", parameters.topic):
-        cause = declarations.why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
+        cause = why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
         return cause.finding(expected)
     timers = declarations.timers(recording)
     if declarations.not_in_callback(recording, parameters.topic):

@@ -9,7 +9,6 @@ from pydantic import model_validator
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Comparison, Evidence, Finding, Table
-from grader.checks.interface.definition import InterfaceName, find_definition
 from grader.checks.interface.definition_differences import (
     Difference,
     constant_differences,
@@ -17,6 +16,7 @@ from grader.checks.interface.definition_differences import (
 )
 from grader.checks.package.dependency import INSIDE_EXPORT
 from grader.checks.wording import code, codes, listing
+from grader.diagnosis.no_definition import InterfaceName, find_definition
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.diagnosis.not_generated import (
     GENERATORS,

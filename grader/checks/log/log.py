@@ -12,13 +12,13 @@ from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import endpoints_seen
-from grader.checks.log.echo import Echo, Wanted, echoes, wanted_values
-from grader.checks.log.printed import quote
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.process.blocked_executor import why_slow
+from grader.measure.echo import Echo, Wanted, echoes, wanted_values
+from grader.measure.printed import quote
 from grader.recording.model import NS, Kind, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration

@@ -12,12 +12,12 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
 from grader.checks.log.logged import LEVELS, Logged, logged, logger_of, printed
-from grader.checks.log.printed import quote
 from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import why_not_called
 from grader.diagnosis.process.process_exit import why_ended
+from grader.measure.printed import quote
 from grader.recording.model import NS, Recording
 from grader.spec.name import QualifiedNodeName
 from grader.spec.nearest_name import nearest

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from grader.checks.log.printed import logged_text
+from grader.measure.printed import logged_text
 from grader.recording.model import LogLine, Recording
 
 LEVELS = ("DEBUG", "INFO", "WARN", "ERROR", "FATAL")

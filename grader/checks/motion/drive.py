@@ -11,13 +11,16 @@ from pydantic import Field
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
-from grader.checks.motion.contact import why_touched
-from grader.checks.motion.ground import ahead, nearest
-from grader.checks.motion.lateness import stolen_s
-from grader.checks.motion.measure import metres, speed
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.motion.scan import misreading
-from grader.checks.motion.track import (
+from grader.checks.wording import counted, percent
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.contact import why_touched
+from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
+from grader.measure.motion.ground import ahead, nearest
+from grader.measure.motion.lateness import stolen_s
+from grader.measure.motion.quantities import metres, speed
+from grader.measure.motion.scan import misreading
+from grader.measure.motion.track import (
     MOVED_M,
     REST_M_S,
     REST_RAD_S,
@@ -27,9 +30,6 @@ from grader.checks.motion.track import (
     speed_plot,
     way_m,
 )
-from grader.checks.wording import counted, percent
-from grader.diagnosis.cause import Cause
-from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import PositiveLength, Ratio, Speed

@@ -10,19 +10,19 @@ from pydantic import Field, model_validator
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
-from grader.checks.motion.approach import Approach, approach
-from grader.checks.motion.contact import why_touched
-from grader.checks.motion.lateness import stolen_s
-from grader.checks.motion.measure import degrees, metres, point, speed, turn
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.checks.reference import GoalPose
 from grader.checks.wording import percent
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.missed_heading import why_not_aligned
-from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
+from grader.diagnosis.motion.no_motion import approach, why_cut_short, why_not_moved
 from grader.diagnosis.motion.off_course import why_off_course, why_unsteered
+from grader.measure.motion.approach import Approach
+from grader.measure.motion.lateness import stolen_s
+from grader.measure.motion.quantities import degrees, metres, point, speed, turn
+from grader.measure.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Angle, Duration, PositiveLength, Ratio
 from grader.spec.unit import format_duration

@@ -8,13 +8,13 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
-from grader.checks.motion.command import Command, command_topic, commands
-from grader.checks.motion.measure import speed, turn
 from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_judged, why_rejected
 from grader.diagnosis.no_messages import why_silent
+from grader.measure.motion.command import Command, command_topic, commands
+from grader.measure.motion.quantities import speed, turn
 from grader.recording.model import Recording
 from grader.recording.simulated import Scene
 from grader.spec.quantity import Ratio

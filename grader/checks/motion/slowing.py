@@ -10,13 +10,13 @@ from pydantic import Field
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.first_seen import first_seen
-from grader.checks.motion.approach import NO_SPEED_M_S
-from grader.checks.motion.command import Command, command_topic, commands
-from grader.checks.motion.measure import speed
 from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import code, counted, percent
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
 from grader.diagnosis.no_messages import why_silent
+from grader.measure.motion.approach import NO_SPEED_M_S
+from grader.measure.motion.command import Command, command_topic, commands
+from grader.measure.motion.quantities import speed
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Ratio
 

@@ -10,19 +10,19 @@ from pydantic import Field
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.first_seen import until_the_end
-from grader.checks.motion.command import commands, scans
-from grader.checks.motion.contact import why_touched
-from grader.checks.motion.ground import Sight, ahead, edge_m, nearest
-from grader.checks.motion.lateness import stolen_s
-from grader.checks.motion.measure import metres, speed
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.motion.scan import misreading
-from grader.checks.motion.track import REST_M_S, first_rest, over_time, speed_plot, way_m
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
+from grader.measure.motion.command import commands, scans
+from grader.measure.motion.ground import Sight, ahead, edge_m, nearest
+from grader.measure.motion.lateness import stolen_s
+from grader.measure.motion.quantities import metres, speed
+from grader.measure.motion.scan import misreading
+from grader.measure.motion.track import REST_M_S, first_rest, over_time, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import Length, PositiveLength, Speed

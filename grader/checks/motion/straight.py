@@ -6,11 +6,11 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.motion.measure import degrees, turn
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.motion.track import headings, over_time
 from grader.checks.wording import percent
 from grader.diagnosis.motion.no_motion import why_not_moved
+from grader.measure.motion.quantities import degrees, turn
+from grader.measure.motion.track import headings, over_time
 from grader.recording.model import Recording
 from grader.spec.quantity import Angle, AngularSpeed
 

@@ -10,16 +10,17 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.motion.approach import Approach, approach
-from grader.checks.motion.detour import WRAP_HINT, Detour, away
-from grader.checks.motion.measure import degrees, metres, speed
 from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.motion.track import speed_plot
 from grader.checks.reference import GoalPose
 from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
+from grader.diagnosis.motion.no_motion import approach
 from grader.diagnosis.motion.off_course import why_off_course
+from grader.measure.motion.approach import Approach
+from grader.measure.motion.detour import WRAP_HINT, Detour, away
+from grader.measure.motion.quantities import degrees, metres, speed
+from grader.measure.motion.track import speed_plot
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, PositiveLength, Speed

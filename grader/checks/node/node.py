@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks import declarations
 from grader.checks.check import NoParameters, Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import endpoints_seen
@@ -19,6 +18,7 @@ from grader.diagnosis.process.process_exit import (
     why_ended,
     why_it_exited,
 )
+from grader.measure import declarations
 from grader.recording.model import NS, Kind, Node, Process, Recording
 from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.quantity import Duration

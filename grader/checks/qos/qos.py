@@ -9,13 +9,14 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.first_seen import endpoints_seen, first_seen
-from grader.checks.qos.compatibility import Comparison, comparisons, duration_words
 from grader.checks.wording import code, counted
 from grader.diagnosis.no_endpoint import why_no_endpoint
+from grader.diagnosis.undeclared import why_undeclared
+from grader.measure import declarations
+from grader.measure.compatibility import Comparison, comparisons, duration_words
 from grader.recording.model import NS, Kind, Qos, Recording
 from grader.spec.name import Durability, Reliability, TopicName
 from grader.spec.quantity import Duration
@@ -303,7 +304,7 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
         return Finding.error(expected, "the depth cannot be seen: the process declared no number")
     if not declared and shown is None:
         what = f"the {kind.value} on {code(parameters.topic)}"
-        return declarations.why_undeclared(recording, what).finding(expected)
+        return why_undeclared(recording, what).finding(expected)
     source = "declared by the process" if declared else "as the heartbeats of the publisher show"
     return Finding.passed(expected, f"depth {parameters.depth}, {source}")
 

@@ -6,15 +6,15 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import endpoints_seen
 from grader.checks.need import Joined
-from grader.checks.qos.compatibility import comparisons, compatibility_table, refusals
 from grader.checks.wording import code
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.no_endpoint import why_no_endpoint
+from grader.measure import declarations
+from grader.measure.compatibility import comparisons, compatibility_table, refusals
 from grader.recording.model import Endpoint, Kind, Qos, Recording
 from grader.spec.name import Durability, Id, Reliability, TopicName
 from grader.spec.quantity import Duration

@@ -6,7 +6,6 @@ from itertools import pairwise
 
 from pydantic import Field, model_validator
 
-from grader.checks import declarations
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
@@ -15,6 +14,7 @@ from grader.checks.timing.stamps import why_not_believed
 from grader.checks.wording import code, counted
 from grader.diagnosis.few_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
+from grader.measure import declarations
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration, Frequency

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from statistics import mean
 
-from grader.checks import declarations
 from grader.checks.timing.period import Interval, Limits, Verdict, judge
 from grader.diagnosis.process.blocked_executor import long_wait
+from grader.measure import declarations
 from grader.recording.model import Kind, Recording
 from grader.spec.unit import format_duration
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from grader.checks.motion.answer import MOST_BEHIND, Answer, answers
-from grader.checks.motion.approach import Approach
-from grader.checks.motion.control_law import Sample, fit
-from grader.checks.motion.steering import before_arrival
+from grader.measure.motion.answer import MOST_BEHIND, Answer, answers
+from grader.measure.motion.approach import Approach
+from grader.measure.motion.control_law import Sample, fit
+from grader.measure.motion.steering import before_arrival
 from sim.motion import wrap_angle
 
 # Chance does not come near it: nothing is read from fewer commands, or a worse fit.

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from grader.checks.finding import Evidence, Moment
-from grader.checks.motion.approach import NO_SPEED_M_S, Approach
-from grader.checks.motion.contact import why_touched
-from grader.checks.motion.detour import WRAP_HINT, away
-from grader.checks.motion.lateness import stolen_s
-from grader.checks.motion.measure import metres, point, speed, turn
-from grader.checks.motion.track import is_at_rest, turned_rad
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.diagnosis.motion.off_course import why_unsteered
 from grader.diagnosis.process.blocked_executor import stuck_callback
+from grader.measure.motion.approach import NO_SPEED_M_S, Approach
+from grader.measure.motion.detour import WRAP_HINT, away
+from grader.measure.motion.lateness import stolen_s
+from grader.measure.motion.quantities import metres, point, speed, turn
+from grader.measure.motion.track import is_at_rest, turned_rad
 from grader.recording.model import NS, Ending, Recording
 from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration

@@ -8,14 +8,14 @@ from itertools import pairwise
 
 from grader.checks.finding import Evidence
 from grader.checks.first_seen import until_the_end
-from grader.checks.motion.approach import Approach
-from grader.checks.motion.detour import WRAP_HINT
-from grader.checks.motion.measure import degrees, turn
-from grader.checks.motion.track import is_at_rest, turned_rad, turns_one_way
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.diagnosis.motion.off_course import why_off_course
+from grader.measure.motion.approach import Approach
+from grader.measure.motion.detour import WRAP_HINT
+from grader.measure.motion.quantities import degrees, turn
+from grader.measure.motion.track import is_at_rest, turned_rad, turns_one_way
 from grader.recording.model import NS
 from grader.recording.simulated import Truth
 from sim.motion import wrap_angle

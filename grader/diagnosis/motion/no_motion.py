@@ -7,13 +7,7 @@ from functools import cached_property
 
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import endpoints_seen, first_seen
-from grader.checks.motion.command import Command, command_topic, commands, is_zero
-from grader.checks.motion.ground import ahead, nearest
-from grader.checks.motion.lateness import stolen_s
-from grader.checks.motion.measure import metres, speed
-from grader.checks.motion.scan import misreading
-from grader.checks.motion.track import has_moved, index_at, is_at_rest
-from grader.checks.qos.compatibility import compatibility_table, refusals
+from grader.checks.reference import Goal, UnknownValue
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
@@ -21,6 +15,14 @@ from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
 from grader.diagnosis.wrong_value import was_integer, what_was_put
+from grader.measure.compatibility import compatibility_table, refusals
+from grader.measure.motion.approach import Approach
+from grader.measure.motion.command import Command, command_topic, commands, is_zero
+from grader.measure.motion.ground import ahead, nearest
+from grader.measure.motion.lateness import stolen_s
+from grader.measure.motion.quantities import metres, speed
+from grader.measure.motion.scan import misreading
+from grader.measure.motion.track import has_moved, index_at, is_at_rest
 from grader.recording.model import NS, Kind, Owner, Recording
 from grader.recording.simulated import Incident
 from grader.spec.unit import format_duration
@@ -66,6 +68,18 @@ def why_not_moved(recording: Recording) -> Cause | None:
     if cause is not None or has_moved(recording.truth):
         return cause
     return cause_of(NotMoved(recording))
+
+
+def approach(recording: Recording, goal: Goal) -> Approach | Cause:
+    """What there is to judge, or why there is nothing."""
+    cause = why_not_moved(recording)
+    if cause is not None and not recording.truth:
+        return cause
+    try:
+        pose = goal.pose(recording.values)
+    except UnknownValue as error:
+        return Cause(str(error), ours=True)
+    return cause or Approach(recording, pose)
 
 
 def why_cut_short(recording: Recording) -> Cause | None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.checks.finding import Evidence, Moment
-from grader.checks.motion.command import commands, is_zero
-from grader.checks.motion.contact import why_touched
-from grader.checks.motion.track import speed_plot
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, explain, explanation
+from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short
+from grader.measure.motion.command import commands, is_zero
+from grader.measure.motion.track import speed_plot
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 

@@ -7,7 +7,6 @@ import signal
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from grader.checks import declarations
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
@@ -16,6 +15,7 @@ from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
 from grader.diagnosis.process.raised import Failure, fatal_failure, student_place
+from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.submission.record import SourceError
 

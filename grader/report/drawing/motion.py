@@ -9,7 +9,7 @@ from itertools import groupby
 
 from markupsafe import Markup
 
-from grader.checks.motion.track import REST_M_S, REST_RAD_S
+from grader.measure.motion.track import REST_M_S, REST_RAD_S
 from grader.recording.model import Recording
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing import axis

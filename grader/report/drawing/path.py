@@ -10,10 +10,10 @@ from itertools import accumulate
 
 from markupsafe import Markup
 
-from grader.checks.motion.ground import ahead
-from grader.checks.motion.measure import metres
-from grader.checks.motion.track import first_rest, has_moved
 from grader.checks.wording import counted, listing
+from grader.measure.motion.ground import ahead
+from grader.measure.motion.quantities import metres
+from grader.measure.motion.track import first_rest, has_moved
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing import ground_plan

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from grader.checks.qos.compatibility import STRENGTH, duration_words, refusals
 from grader.diagnosis.no_endpoint import OWN_TOPICS
+from grader.measure.compatibility import STRENGTH, duration_words, refusals
 from grader.recording.model import Endpoint, Kind, Owner, Recording
 
 MOST_ROWS = 40

@@ -15,7 +15,7 @@ from typing import Any
 from markupsafe import Markup
 
 from grader.assignment.model import Assignment, Scenario
-from grader.checks.motion.measure import metres
+from grader.measure.motion.quantities import metres
 from grader.recording.model import NS, Message, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing.ground_plan import places

@@ -8,7 +8,7 @@ from typing import Any
 
 from rclpy.serialization import serialize_message
 
-from grader.checks.qos.compatibility import refusals
+from grader.measure.compatibility import refusals
 from grader.recording.event import Wait
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Kind, Qos

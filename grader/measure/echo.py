@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from grader.checks.field import number_at
-from grader.checks.log.printed import exchanged, logged_text, numbers, shows
+from grader.measure.printed import exchanged, logged_text, numbers, shows
 from grader.recording.model import NS, LogLine, Message, Recording
 
 

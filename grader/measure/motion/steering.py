@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from grader.checks.motion.answer import Answer
-from grader.checks.motion.approach import NO_SPEED_M_S, Approach
-from grader.checks.motion.control_law import Law, Sample, examine
+from grader.measure.motion.answer import Answer
+from grader.measure.motion.approach import NO_SPEED_M_S, Approach
+from grader.measure.motion.control_law import Law, Sample, examine
 
 LEAST_SAMPLES = 8
 # A command is in force from the step after it.

@@ -6,8 +6,8 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.checks.motion.command import Command, commands, number, odometry
-from grader.checks.motion.track import pose_at
+from grader.measure.motion.command import Command, commands, number, odometry
+from grader.measure.motion.track import pose_at
 from grader.recording.model import NS, Message, Recording
 from sim.motion import Pose
 

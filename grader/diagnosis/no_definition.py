@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import existing_package, why_no_package
 from grader.spec.nearest_name import nearest
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
@@ -56,23 +57,39 @@ def find_definition(submission: SubmissionRecord, interface: InterfaceName) -> D
         # Where CMakeLists.txt takes it from is the student's affair.
         same = [item for item in (*own, *package.definitions) if item.text == built[0].text]
         return same[0] if same else Definition(package.file(interface.file), built[0].text)
-    return own[0] if own else _why_none(submission, package, interface)
+    return own[0] if own else cause_of(NoDefinition(submission, package, interface))
 
 
-def _why_none(
-    submission: SubmissionRecord, package: PackageRecord, interface: InterfaceName
-) -> Cause:
-    wanted = package.file(interface.file)
-    near = _near(package, interface)
-    if near is not None:
-        found, what = near
-        return Cause(
-            f"found {code(found.file)}: {what}",
-            f"Name it {code(wanted)}, and write {code(interface.file)} in CMakeLists.txt.",
-            Evidence(places=(SourceError(found.file, None, what),)),
-        )
-    for other in submission.packages:
-        if other.name == interface.package:
+@dataclass(frozen=True)
+class NoDefinition(Symptom[Cause]):
+    """The definition of an interface is missing."""
+
+    submission: SubmissionRecord
+    package: PackageRecord
+    interface: InterfaceName
+
+
+@explanation(NoDefinition)
+def near_definition(symptom: NoDefinition) -> Cause | None:
+    """The file lies in a wrong folder, or has a similar name or another suffix."""
+    near = _near(symptom.package, symptom.interface)
+    if near is None:
+        return None
+    found, what = near
+    wanted, file = symptom.package.file(symptom.interface.file), symptom.interface.file
+    return Cause(
+        f"found {code(found.file)}: {what}",
+        f"Name it {code(wanted)}, and write {code(file)} in CMakeLists.txt.",
+        Evidence(places=(SourceError(found.file, None, what),)),
+    )
+
+
+@explanation(NoDefinition)
+def in_other_package(symptom: NoDefinition) -> Cause | None:
+    """The file lies in another package."""
+    wanted = symptom.package.file(symptom.interface.file)
+    for other in symptom.submission.packages:
+        if other.name == symptom.interface.package:
             continue
         for item in other.definitions:
             if PurePosixPath(item.file).name == PurePosixPath(wanted).name:
@@ -81,7 +98,14 @@ def _why_none(
                     f"Move it to {code(wanted)}: the package is a part of the interface's name.",
                     Evidence(places=(SourceError(item.file, None, "in another package"),)),
                 )
-    there = [item.file for item in package.definitions]
+    return None
+
+
+@explanation(NoDefinition, general=True)
+def no_definition(symptom: NoDefinition) -> Cause:
+    """There is no such file."""
+    interface = symptom.interface
+    there = [item.file for item in symptom.package.definitions]
     return Cause(
         f"there is no {code(interface.file)}"
         + (f"; found {codes(there)} only" if there else f", and no .{interface.kind} file at all"),

@@ -6,10 +6,7 @@ import math
 from dataclasses import dataclass
 
 from grader.checks.finding import Plot
-from grader.checks.motion.track import over_time
-from grader.checks.reference import Goal, UnknownValue
-from grader.diagnosis.cause import Cause
-from grader.diagnosis.motion.no_motion import why_not_moved
+from grader.measure.motion.track import over_time
 from grader.recording.model import Recording
 from grader.recording.simulated import Truth
 from sim.motion import Pose, wrap_angle
@@ -87,15 +84,3 @@ class Approach:
             "heading error (°)",
             lambda step: math.degrees(self.heading_error_rad(step)),
         )
-
-
-def approach(recording: Recording, goal: Goal) -> Approach | Cause:
-    """What there is to judge, or why there is nothing."""
-    cause = why_not_moved(recording)
-    if cause is not None and not recording.truth:
-        return cause
-    try:
-        pose = goal.pose(recording.values)
-    except UnknownValue as error:
-        return Cause(str(error), ours=True)
-    return cause or Approach(recording, pose)

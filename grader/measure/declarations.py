@@ -12,9 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from grader.checks.doubt import was_held_up
-from grader.checks.finding import Evidence, Moment
-from grader.diagnosis.cause import Cause
 from grader.recording.model import Declaration, Kind, Process, Qos, Recording
 
 _RELIABILITIES = ("reliable", "best_effort")
@@ -196,48 +193,10 @@ def not_in_callback(recording: Recording, topic: str) -> bool:
     return newest == [False] and not declares(recording, "spin", "executor", "EventsExecutor")
 
 
-def why_undeclared(recording: Recording, what: str) -> Cause:
-    """Why the process did not declare what the ROS graph shows of it.
-
-    The tracer is in each program of Python that is started by its entry point, and in the Python
-    programs that this one starts.
-    """
-    seen = f"the process did not declare {what}"
-    compiled = any(item.build_type == "ament_cmake" for item in recording.submission.packages)
-    launched = any("launch" in item.name.rpartition("/")[2] for item in recording.processes)
-    if not traced(recording) and (compiled or launched):
-        return Cause(f"{seen}: only programs in Python declare what they create", ours=True)
-    return Cause(
-        f"{seen}: it was created past rclpy, in a program that was started without the "
-        "environment of the first, or after the file descriptors of rosgrade were closed",
-        "Create it by the method of rclpy's Node, in the program that `ros2 run` starts, and "
-        "leave its environment and the file descriptors that you did not open as they are.",
-        Evidence(moments=(Moment("launched", 0.0),)),
-    )
-
-
-def why_never_appeared(recording: Recording, what: str) -> Cause:
-    """Why what the process declared is not in the ROS graph."""
-    seen = f"the process declared {what}, but it never appeared in the ROS graph"
+def changed_environment(recording: Recording) -> list[str]:
+    """Environment variables of discovery that a program changed before rclpy.init()."""
     changed = sorted({_text(item.data, "changed") or "" for item in recording.declared("init")})
-    names = [name for text in changed for name in text.split()]
-    if names:
-        return Cause(
-            f"{seen}: the program changed {', '.join(names)}, by which a node finds others",
-            f"Leave {', '.join(names)} as the environment has it, in the code too: no "
-            "os.environ[...] and no domain_id.",
-            Evidence(moments=(Moment("launched", 0.0),)),
-        )
-    if was_held_up(recording):
-        return Cause.to_repeat(f"{seen}, while the machine was busy")
-    return Cause(
-        seen,
-        "A node must stay where the environment puts it: set no ROS_DOMAIN_ID, no discovery "
-        "server and no profile of the middleware, and leave the names of rclpy's methods alone.",
-        Evidence(moments=(Moment("launched", 0.0),)),
-        # What was created right before the end may not have been seen yet.
-        disturbed=True,
-    )
+    return [name for text in changed for name in text.split()]
 
 
 def made_twice(recording: Recording) -> str:

@@ -7,11 +7,11 @@ from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from grader.checks.motion import ground
-from grader.checks.motion.command import number, scans
-from grader.checks.motion.ground import Sight
-from grader.checks.motion.measure import metres, side
 from grader.checks.wording import code
+from grader.measure.motion import ground
+from grader.measure.motion.command import number, scans
+from grader.measure.motion.ground import Sight
+from grader.measure.motion.quantities import metres, side
 from grader.recording.model import NS, Message, Recording
 from grader.recording.simulated import Truth
 

@@ -1,0 +1,1 @@
+"""What a recording shows, as numbers: no verdict, and no cause."""
