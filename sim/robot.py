@@ -26,7 +26,7 @@ from sim.motion import NS, REST, Pose, Twist, integrate
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class RobotLimits:
     """What the drive can do, the same forwards and backwards."""
 
     speed_m_s: float
@@ -45,13 +45,13 @@ class RobotModel:
     """
 
     name: str
-    limits: Limits
+    limits: RobotLimits
     radius_m: float
     wheel_separation_m: float
 
 
-BURGER = RobotModel("burger", Limits(0.22, 2.84, 1.0, 3.2), 0.10, 0.160)
-WAFFLE = RobotModel("waffle", Limits(0.26, 1.82, 1.0, 3.2), 0.22, 0.287)
+BURGER = RobotModel("burger", RobotLimits(0.22, 2.84, 1.0, 3.2), 0.10, 0.160)
+WAFFLE = RobotModel("waffle", RobotLimits(0.26, 1.82, 1.0, 3.2), 0.22, 0.287)
 MODELS = {model.name: model for model in (BURGER, WAFFLE)}
 
 
@@ -85,7 +85,7 @@ class State:
     twist: Twist = REST
 
 
-def velocity(twist: Twist, command: Twist, dt_s: float, limits: Limits) -> Twist:
+def velocity(twist: Twist, command: Twist, dt_s: float, limits: RobotLimits) -> Twist:
     """The velocity during the next step: as near to the command as the limits allow.
 
     Args:
@@ -109,7 +109,7 @@ def velocity(twist: Twist, command: Twist, dt_s: float, limits: Limits) -> Twist
     )
 
 
-def step(state: State, command: Twist, dt_s: float, limits: Limits) -> State:
+def step(state: State, command: Twist, dt_s: float, limits: RobotLimits) -> State:
     """Move for one step in free space.
 
     The velocity changes at the beginning of the step and is constant in it, so that the path
@@ -130,7 +130,7 @@ def step(state: State, command: Twist, dt_s: float, limits: Limits) -> State:
 def make_robot(options: RobotOptions, start: Pose) -> Robot:
     """The robot that the YAML describes, at a start pose."""
     model = MODELS[options.model]
-    limits = Limits(
+    limits = RobotLimits(
         options.max_speed or model.limits.speed_m_s,
         options.max_angular_speed or model.limits.angular_speed_rad_s,
         options.max_acceleration or model.limits.acceleration_m_s2,

@@ -6,11 +6,11 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from grader.sandbox.limits import BUILD, BUILD_OUTPUT_BYTES, Limits
+from grader.sandbox.limits import BUILD, BUILD_OUTPUT_BYTES, SandboxLimits
 from grader.spec.quantity import Duration, Size
 from grader.spec.source import Model
 
-_DEFAULTS = Limits()
+_DEFAULTS = SandboxLimits()
 
 
 class _Bounds(Model):
@@ -26,9 +26,9 @@ class _Bounds(Model):
     files: int
     output: Size
 
-    def limits(self) -> Limits:
+    def limits(self) -> SandboxLimits:
         """For the sandbox."""
-        return Limits(
+        return SandboxLimits(
             memory_bytes=int(self.memory),
             processes=self.processes,
             cpu_s=max(1, round(self.cpu_time)),

@@ -197,7 +197,7 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class MutantVerdict:
     """What the checks made of one submission whose grade is known.
 
     Attributes:
@@ -223,9 +223,9 @@ class Verdict:
         return all(one.actual is not Status.ERROR for one in self.differences)
 
 
-def verdict(expected: Mapping[str, Status], actual: Mapping[str, Status]) -> Verdict:
+def verdict(expected: Mapping[str, Status], actual: Mapping[str, Status]) -> MutantVerdict:
     """Compare how checks ended with how they must end, by id of the check."""
-    return Verdict(
+    return MutantVerdict(
         tuple(
             Difference(check, status, actual.get(check))
             for check, status in expected.items()

@@ -26,7 +26,7 @@ from grader.submission.record_json import read_record
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundRecordings:
     """What there is to judge again.
 
     Attributes:
@@ -65,7 +65,7 @@ class Found:
         return result.assignment.location if result is not None else None
 
 
-def find(path: Path) -> Found:
+def find(path: Path) -> FoundRecordings:
     """Find the recordings at a path.
 
     Raises:
@@ -76,7 +76,7 @@ def find(path: Path) -> Found:
     if path.is_file():
         recording = read_recording(path)
         files = {recording.scenario: path}
-        return Found(
+        return FoundRecordings(
             path.parent, {recording.scenario: recording}, files, recording.submission, None
         )
     folder = path / RECORDINGS_FOLDER if (path / RECORDINGS_FOLDER).is_dir() else path
@@ -93,7 +93,7 @@ def find(path: Path) -> Found:
     )
     report = folder.parent if folder.name == RECORDINGS_FOLDER else folder
     result = read_result(report / RESULT_FILE) if (report / RESULT_FILE).is_file() else None
-    return Found(report, recordings, files, submission, result)
+    return FoundRecordings(report, recordings, files, submission, result)
 
 
 def stored_assignment(path: Path, name: str, location: str | None, *command: str) -> str:
@@ -133,7 +133,7 @@ def refuse_other(folder: Path, name: str, loaded: LoadedAssignment) -> None:
         raise UsageError(f"{folder}: holds the grades of {name}, not of {loaded.assignment.id}")
 
 
-def regrade(loaded: LoadedAssignment, found: Found) -> Graded:
+def regrade(loaded: LoadedAssignment, found: FoundRecordings) -> Graded:
     """Judge what was recorded with an assignment as it is now.
 
     A result that was made for a student is judged again as far as the student may see it.

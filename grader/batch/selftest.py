@@ -19,7 +19,7 @@ from grader.assignment.mutant import (
     Change,
     Difference,
     Mutant,
-    Verdict,
+    MutantVerdict,
     expected_statuses,
     verdict,
 )
@@ -75,7 +75,7 @@ class TrialResult:
     """
 
     trial: Trial
-    verdict: Verdict
+    verdict: MutantVerdict
     lost: tuple[str, ...]
     graded: bool
     repeated: bool
@@ -156,7 +156,7 @@ def run_trial(
     )
 
 
-def _starter_verdict(grade: Grade) -> Verdict:
+def _starter_verdict(grade: Grade) -> MutantVerdict:
     not_judged = tuple(
         Difference(result.id, Status.FAILED, result.status) for result in grade.of(Status.ERROR)
     )
@@ -166,7 +166,7 @@ def _starter_verdict(grade: Grade) -> Verdict:
             f"{counted_points(grade.score)} of {number(grade.max_score)}, and a starter package "
             f"may have {MOST_FOR_STARTER:.0%} at most: give the points to what the lesson is about"
         )
-    return Verdict(not_judged, problem)
+    return MutantVerdict(not_judged, problem)
 
 
 def _told(graded: Graded, check: str) -> Iterator[str]:

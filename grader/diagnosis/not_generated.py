@@ -15,7 +15,7 @@ from grader.diagnosis.no_definition import InterfaceName
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
 from grader.recording.interface import PRIMITIVES, DefinitionError, sections_of
 from grader.spec.nearest_name import nearest
-from grader.submission.read.cmake import Command, read_commands
+from grader.submission.read.cmake import CMakeCommand, read_commands
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 
 CMAKE = "CMakeLists.txt"
@@ -59,11 +59,11 @@ class NotGenerated(Symptom[Cause]):
     definition: Definition
 
     @cached_property
-    def commands(self) -> tuple[Command, ...]:
+    def commands(self) -> tuple[CMakeCommand, ...]:
         """Those of CMakeLists.txt."""
         return read_commands(self.package.cmake or "")
 
-    def calls(self, name: str) -> list[Command]:
+    def calls(self, name: str) -> list[CMakeCommand]:
         """The calls of a command of CMake."""
         return [command for command in self.commands if command.name == name]
 

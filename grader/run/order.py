@@ -19,7 +19,7 @@ GO = b"go\n"
 
 
 @dataclass(frozen=True)
-class Command:
+class ProcessCommand:
     """A process of the student to start.
 
     Attributes:
@@ -44,7 +44,7 @@ class Topic:
 
 
 @dataclass(frozen=True)
-class Limits:
+class RunLimits:
     """Bounds of one run; times in seconds.
 
     Attributes:
@@ -107,13 +107,13 @@ class CellOrder:
 
     scenario: str
     seed: int
-    commands: tuple[Command, ...]
+    commands: tuple[ProcessCommand, ...]
     environment: dict[str, str]
     prefixes: tuple[str, ...]
     topics: tuple[Topic, ...]
     stimuli: tuple[dict[str, Any], ...]
     until: Until
-    limits: Limits
+    limits: RunLimits
     scratch: str
     submission: str
     simulator: SimulatorOrder | None = None
@@ -132,14 +132,14 @@ class CellOrder:
         """Read what :meth:`to_json` wrote."""
         data = json.loads(text)
         data["commands"] = tuple(
-            Command(item["name"], tuple(item["argv"])) for item in data["commands"]
+            ProcessCommand(item["name"], tuple(item["argv"])) for item in data["commands"]
         )
         data["topics"] = tuple(Topic(**item) for item in data["topics"])
         data["stimuli"] = tuple(data["stimuli"])
         data["until"] = Until.from_dict(data["until"])
         if data["simulator"] is not None:
             data["simulator"] = SimulatorOrder(**data["simulator"])
-        data["limits"] = Limits(**data["limits"])
+        data["limits"] = RunLimits(**data["limits"])
         data["prefixes"] = tuple(data["prefixes"])
         data["type_support"] = tuple(data["type_support"])
         if data["process_sandbox"] is not None:

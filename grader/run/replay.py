@@ -19,7 +19,7 @@ from grader.recording.inputs import read_inputs
 from grader.recording.model import NS, Kind, Owner, Qos, Recording
 from grader.ros import RosInstallation
 from grader.run.environment import cell_environment, student_environment
-from grader.run.order import Command
+from grader.run.order import ProcessCommand
 from grader.run.runner import Runner
 from grader.scratch import Scratch
 
@@ -46,7 +46,7 @@ class ReplayOrder:
     """What is replayed."""
 
     recording: str
-    commands: tuple[Command, ...]
+    commands: tuple[ProcessCommand, ...]
     environment: Mapping[str, str]
     scratch: str
     inputs: tuple[Input, ...]
@@ -67,7 +67,7 @@ class ReplayOrder:
         """Read what :meth:`to_json` wrote."""
         data: dict[str, Any] = json.loads(text)
         data["commands"] = tuple(
-            Command(item["name"], tuple(item["argv"])) for item in data["commands"]
+            ProcessCommand(item["name"], tuple(item["argv"])) for item in data["commands"]
         )
         data["inputs"] = tuple(Input(**item) for item in data["inputs"])
         data["type_support"] = tuple(data["type_support"])

@@ -24,7 +24,7 @@ from grader.run.cell.middleware_hang import MiddlewareHung, hung_recording
 from grader.run.cell.prefork_server import SIMULATOR_MODULE, PreforkServer
 from grader.run.environment import RMW, student_environment
 from grader.run.host.load import cpu_count
-from grader.run.order import CellOrder, Command, Limits, SimulatorOrder, Topic, Until
+from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, Until
 from grader.run.sandboxed_order import sandboxed
 from grader.run.stimulus_orders import stimulus_orders
 from grader.sandbox.python_tree import unlisted
@@ -347,7 +347,7 @@ class Runner:
             topics=_topics(scenario),
             stimuli=stimulus_orders(scenario, commands, worlds, definitions, seed, values),
             until=_until(scenario.until),
-            limits=Limits(
+            limits=RunLimits(
                 discovery_s=scenario.discovery,
                 timeout_s=scenario.timeout,
                 shutdown_s=scenario.shutdown,
@@ -386,7 +386,7 @@ class Runner:
         install: Path,
         values: dict[str, float],
         files: Mapping[str, Path] = MappingProxyType({}),
-    ) -> Command:
+    ) -> ProcessCommand:
         """What to execute for a launch.
 
         Args:
@@ -398,7 +398,7 @@ class Runner:
         else:
             place = f"lib/{package}/{launch.executable}"
             program = self._program(files.get(place, install / place))
-        return Command(
+        return ProcessCommand(
             name=f"{package}/{launch.program}", argv=(*program, *ros_arguments(launch, values))
         )
 

@@ -18,7 +18,7 @@ from grader.run.order import CellOrder
 from grader.run.process.process_sandbox import HOME, WORKSPACE, ProcessSandbox
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
-from grader.sandbox.limits import Limits
+from grader.sandbox.limits import SandboxLimits
 from grader.sandbox.namespaces import CELL, STUDENT
 from grader.sandbox.sandbox import TREES, Sandbox, hide
 
@@ -35,7 +35,7 @@ def sandboxed(
     sandbox: Sandbox,
     ros: RosInstallation,
     install: Path,
-    limits: Limits,
+    limits: SandboxLimits,
 ) -> CellOrder:
     """Make an order for a sandbox, and copy into the cell's folder what it needs."""
     support = [Path(path) for path in order.type_support]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.recording.definition import definition_finder
-from grader.run.order import Command
+from grader.run.order import ProcessCommand
 
 if TYPE_CHECKING:
     from grader.assignment.model import Scenario
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def stimulus_orders(
     scenario: Scenario,
-    commands: Sequence[Command],
+    commands: Sequence[ProcessCommand],
     folder: Path,
     prefixes: Sequence[str],
     seed: int,

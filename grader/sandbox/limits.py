@@ -31,7 +31,7 @@ _OPTIONS = {
 
 
 @dataclass(frozen=True)
-class Limits:
+class SandboxLimits:
     """Bounds of one sandbox.
 
     Attributes:
@@ -117,7 +117,7 @@ def raise_open_files(wanted: int = _OWN_SHARE * OPEN_FILES) -> int:
 
 
 BUILD_OUTPUT_BYTES = 64 * MIB
-BUILD = Limits(
+BUILD = SandboxLimits(
     memory_bytes=2048 * MIB,
     processes=128,
     cpu_s=600,

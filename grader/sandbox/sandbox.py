@@ -20,7 +20,7 @@ from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
-from grader.sandbox.limits import BUILD, Limits, size_words
+from grader.sandbox.limits import BUILD, SandboxLimits, size_words
 from grader.sandbox.namespaces import MOUNT_POINTS
 from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
 from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
@@ -193,7 +193,7 @@ class Sandbox:
 
     @contextmanager
     def build(
-        self, ros: RosInstallation, folders: Sequence[Path], limits: Limits = BUILD
+        self, ros: RosInstallation, folders: Sequence[Path], limits: SandboxLimits = BUILD
     ) -> Iterator[BuildRoom]:
         """Let a part of a build write to folders.
 
@@ -218,7 +218,7 @@ class BuildRoom:
     sandbox: Sandbox
     ros: RosInstallation
     folders: tuple[Path, ...]
-    limits: Limits = BUILD
+    limits: SandboxLimits = BUILD
     uid: int = bubblewrap.UID
     environment: Mapping[str, str] = field(
         default_factory=lambda: dict(bubblewrap.PLAIN_ENVIRONMENT)

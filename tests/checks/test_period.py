@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.timing.period import MOST_INTERVALS, Limits, forgiven, intervals, judge
+from grader.checks.timing.period import MOST_INTERVALS, PeriodLimits, forgiven, intervals, judge
 from tests.checks.builder import after, every, message, messages, recording, taken
 
-LIMITS = Limits(period_s=0.3, median_s=0.015, spread_s=0.03, outliers=0.1)
+LIMITS = PeriodLimits(period_s=0.3, median_s=0.015, spread_s=0.03, outliers=0.1)
 
 
 def stream(times):
@@ -70,7 +70,7 @@ def test_irregular_intervals(seconds, irregular):
     [(0.1, 5, 1), (0.1, 11, 1), (0.1, 20, 2), (0.1, 29, 2), (0.0, 100, 0), (0.25, 8, 2)],
 )
 def test_how_many_may_be_irregular(outliers, intervals_, allowed):
-    assert Limits(0.3, 0.015, 0.03, outliers).allowed(intervals_) == allowed
+    assert PeriodLimits(0.3, 0.015, 0.03, outliers).allowed(intervals_) == allowed
 
 
 @given(st.lists(st.floats(0.01, 1.0), min_size=1, max_size=30))

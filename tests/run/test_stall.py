@@ -13,7 +13,7 @@ from grader.checks.check import Subject
 from grader.checks.finding import Status
 from grader.grade.judge import grade
 from grader.run.cell.middleware_hang import ENDED_BY, HangMonitor, hung_recording
-from grader.run.order import CellOrder, Command, Limits, Until
+from grader.run.order import CellOrder, ProcessCommand, RunLimits, Until
 from tests.checks.builder import submission
 
 
@@ -73,13 +73,13 @@ def order(scenario: Scenario) -> CellOrder:
     return CellOrder(
         scenario=scenario.id,
         seed=0,
-        commands=tuple(Command(launch.program, ()) for launch in scenario.launch),
+        commands=tuple(ProcessCommand(launch.program, ()) for launch in scenario.launch),
         environment={},
         prefixes=(),
         topics=(),
         stimuli=(),
         until=Until(),
-        limits=Limits(1.0, 1.0, 1.0),
+        limits=RunLimits(1.0, 1.0, 1.0),
         scratch="",
         submission="",
     )

@@ -8,7 +8,7 @@ import pytest
 
 from grader.run.host import watchdog
 from grader.run.host.watchdog import Watchdog
-from grader.sandbox.limits import Limits
+from grader.sandbox.limits import SandboxLimits
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def watched(limits: Limits) -> list[str]:
+def watched(limits: SandboxLimits) -> list[str]:
     dog = Watchdog(limits, inits=lambda: (), output_bytes=lambda: 0)
     dog.start()
     return [breach.taken for breach in dog.stop() if breach.what == "memory"]
@@ -29,7 +29,7 @@ def watched(limits: Limits) -> list[str]:
 def test_messages_that_fill_the_cell_are_the_submission_s(
     place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert watched(Limits()) == []
+    assert watched(SandboxLimits()) == []
     monkeypatch.setattr(watchdog, "_OWN_BYTES", 2**20)
-    (taken,) = watched(Limits())
+    (taken,) = watched(SandboxLimits())
     assert taken.endswith("of memory where messages wait")

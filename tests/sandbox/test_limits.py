@@ -1,4 +1,4 @@
-"""Limits as an author writes them, and as the sandbox's commands get them."""
+"""SandboxLimits as an author writes them, and as the sandbox's commands get them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.errors import GraderFault
 from grader.recording.event import Breach
 from grader.run.process.process_sandbox import ProcessSandbox
-from grader.sandbox.limits import BUILD, Limits
+from grader.sandbox.limits import BUILD, SandboxLimits
 from grader.sandbox.usage import (
     files_in_flight,
     folder_usage,
@@ -74,7 +74,7 @@ def test_a_wrong_limit_is_refused_with_its_reason(written: object, problem: str)
 def test_the_enclosure_of_an_order_survives_json() -> None:
     files = ("/cell/x", "/cell/y", "/cell/z")
     process_sandbox = ProcessSandbox(
-        ("--ro-bind", "/a", "/b"), *files, {"bpf": 1}, Limits(), {"/ws/a": "/cell/a"}
+        ("--ro-bind", "/a", "/b"), *files, {"bpf": 1}, SandboxLimits(), {"/ws/a": "/cell/a"}
     )
     assert (
         ProcessSandbox.from_dict(json.loads(json.dumps(dataclasses.asdict(process_sandbox))))
@@ -176,11 +176,11 @@ def test_what_the_shell_does_not_allow_is_no_fault_of_the_student(
         resource, "getrlimit", lambda one: (1, allowed) if one == what else real(one)
     )
     with pytest.raises(GraderFault, match=said):
-        Limits().check_allowed()
+        SandboxLimits().check_allowed()
 
 
 def test_limits_of_a_usual_shell_are_enough() -> None:
-    Limits().check_allowed()
+    SandboxLimits().check_allowed()
     BUILD.check_allowed()
 
 

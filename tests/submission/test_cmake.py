@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.submission.read.cmake import Command, read_commands
+from grader.submission.read.cmake import CMakeCommand, read_commands
 
 
 def arguments(text: str, name: str = "rosidl_generate_interfaces") -> tuple[str, ...]:
@@ -14,8 +14,8 @@ def arguments(text: str, name: str = "rosidl_generate_interfaces") -> tuple[str,
 def test_commands_have_names_in_lower_case_and_lines() -> None:
     text = "# a comment\nProject(bot)\n\nFIND_PACKAGE(ament_cmake\n  REQUIRED)\n"
     assert read_commands(text) == (
-        Command("project", ("bot",), 2),
-        Command("find_package", ("ament_cmake", "REQUIRED"), 4),
+        CMakeCommand("project", ("bot",), 2),
+        CMakeCommand("find_package", ("ament_cmake", "REQUIRED"), 4),
     )
 
 
@@ -56,7 +56,7 @@ def test_a_variable_that_nobody_knows_stays_as_it_is_written() -> None:
 
 
 def test_the_arguments_behind_a_keyword() -> None:
-    command = Command("f", ("bot", "DEPENDENCIES", "a", "b", "SKIP_INSTALL"), 1)
+    command = CMakeCommand("f", ("bot", "DEPENDENCIES", "a", "b", "SKIP_INSTALL"), 1)
     keywords = frozenset({"DEPENDENCIES", "SKIP_INSTALL"})
     assert command.after("DEPENDENCIES", keywords) == ("a", "b")
     assert command.after("LIBRARY_NAME", keywords) is None

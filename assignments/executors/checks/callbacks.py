@@ -13,7 +13,7 @@ from grader.measure import declarations
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.need import Published, Recorded
-from grader.checks.timing.period import Interval, Limits, forgiven, judge
+from grader.checks.timing.period import Interval, PeriodLimits, forgiven, judge
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.delivery import why_not_sent
@@ -132,7 +132,7 @@ def _judge_period(
         Interval(a, b, (b - a) / NS, begins[max(0, index - 1)])
         for index, (a, b) in enumerate(pairwise(begins))
     ]
-    limits = Limits(period_s, parameters.tolerance.of(period_s), math.inf, 0.0)
+    limits = PeriodLimits(period_s, parameters.tolerance.of(period_s), math.inf, 0.0)
     seconds = [item.seconds for item in measured]
     good = bool(seconds) and judge(seconds, limits).good
     evidence = Evidence(spans=spans(recording, reports, reports.of(callback)))
@@ -165,7 +165,7 @@ def _judge_period(
     return None if cause is None else cause.finding(expected)
 
 
-def _declares(recording: Recording, parameters: Runs, limits: Limits) -> bool:
+def _declares(recording: Recording, parameters: Runs, limits: PeriodLimits) -> bool:
     """Whether the process declared a timer of the right period for each callback, and no other.
 
     Those that wait for a lock do not get it in the order in which they came: one that was late
@@ -178,7 +178,7 @@ def _declares(recording: Recording, parameters: Runs, limits: Limits) -> bool:
 
 
 def _by_chance(
-    recording: Recording, parameters: Runs, reports: Reports, callback: str, limits: Limits
+    recording: Recording, parameters: Runs, reports: Reports, callback: str, limits: PeriodLimits
 ) -> Finding | None:
     """The finding where the work alone may have made the period, or None.
 

@@ -16,7 +16,7 @@ from grader.measure.motion.answer import MOST_BEHIND, answers
 from grader.measure.motion.approach import Approach
 from grader.diagnosis.motion.no_motion import approach
 from grader.measure.motion.command import command_topic, commands
-from grader.measure.motion.control_law import Law, Sample, Verdict, examine
+from grader.measure.motion.control_law import Law, Sample, LawVerdict, examine
 from grader.measure.motion.quantities import metres
 from grader.checks.motion.robot_check import RobotParameters
 from grader.measure.motion.steering import LEAST_SAMPLES, at_the_goal, on_the_way
@@ -140,7 +140,7 @@ def _range_words(parameters: Proportional) -> str:
     return f", gain at most {high:.3g} 1/s" if high is not None else ""
 
 
-def _is_good(verdict: Verdict, parameters: Proportional) -> bool:
+def _is_good(verdict: LawVerdict, parameters: Proportional) -> bool:
     return verdict.law is Law.PROPORTIONAL and verdict.r2 >= parameters.r2 and verdict.gain > 0.0
 
 
@@ -154,7 +154,7 @@ def _samples(
 
 
 def _judge_gain(
-    verdict: Verdict, parameters: Proportional, expected: str, evidence: Evidence
+    verdict: LawVerdict, parameters: Proportional, expected: str, evidence: Evidence
 ) -> Finding:
     low, high = parameters.gain_min or 0.0, parameters.gain_max or math.inf
     seen = f"gain {verdict.gain:.3g} 1/s, R² {verdict.r2:.3f}, {counted(verdict.used, 'command')}"
@@ -165,7 +165,7 @@ def _judge_gain(
     return Finding.failed(expected, f"{seen}: the gain is too {size}", hint, evidence)
 
 
-def _words(verdict: Verdict, parameters: Proportional, number: int) -> tuple[str, str]:
+def _words(verdict: LawVerdict, parameters: Proportional, number: int) -> tuple[str, str]:
     """What the commands are instead, and what to try."""
     formula = f"angular.z = gain * error, with the error {_FORMULA[parameters.phase]}"
     wrap = "normalised by atan2(sin(e), cos(e))"

@@ -26,7 +26,7 @@ from .pairing import pair
 
 
 @dataclass(frozen=True)
-class Limits:
+class CaseLimits:
     """What is right.
 
     Attributes:
@@ -102,7 +102,7 @@ def rows(messages: Sequence[Message], paths: Sequence[str]) -> Rows:
 
 
 def cases(
-    conversion: str, sent: Sequence[Message], received: Sequence[Message], limits: Limits
+    conversion: str, sent: Sequence[Message], received: Sequence[Message], limits: CaseLimits
 ) -> tuple[Case, ...]:
     """Pair answers with questions and measure them.
 

@@ -28,7 +28,7 @@ from grader.spec.name import TopicName
 from grader.spec.quantity import QuantityOf
 from grader.spec.unit import Dimension
 
-from .case import Case, Limits, cases
+from .case import Case, CaseLimits, cases
 from .common_mistakes import explain, wrong_part
 from .conversion import (
     CONVERSIONS,
@@ -103,9 +103,9 @@ class Answers(Parameters):
         )
 
     @property
-    def limits(self) -> Limits:
+    def limits(self) -> CaseLimits:
         """What is right."""
-        return Limits(self.tolerance, self.length)
+        return CaseLimits(self.tolerance, self.length)
 
     def judges(self, case: Case) -> bool:
         """Whether a case is judged."""

@@ -37,7 +37,7 @@ from grader.spec.quantity import Duration, Frequency, Ratio
 from grader.spec.unit import format_duration
 
 
-class Exists(Parameters):
+class ActionExists(Parameters):
     """Parameters of action.exists."""
 
     doubt = Doubt.ANSWER_MISSED
@@ -48,8 +48,8 @@ class Exists(Parameters):
     )
 
 
-@check("action.exists", Subject.RECORDING, Exists)
-def exists(recording: Recording, parameters: Exists) -> Finding:
+@check("action.exists", Subject.RECORDING, ActionExists)
+def exists(recording: Recording, parameters: ActionExists) -> Finding:
     """The node offers the action.
 
     Judged by the ROS graph: an action server of the student's was there, with this type.

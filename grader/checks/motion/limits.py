@@ -13,7 +13,7 @@ from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.no_motion import why_not_judged, why_rejected
 from grader.diagnosis.no_messages import why_silent
-from grader.measure.motion.command import Command, command_topic, commands
+from grader.measure.motion.command import VelocityCommand, command_topic, commands
 from grader.measure.motion.quantities import speed, turn
 from grader.recording.model import Recording
 from grader.recording.simulated import Scene
@@ -72,7 +72,7 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     )
 
 
-def _excess(item: Command, scene: Scene) -> float:
+def _excess(item: VelocityCommand, scene: Scene) -> float:
     """How many times the nearer limit is asked for; inf for what is not finite."""
     twist = item.twist
     if not twist.is_finite:
@@ -83,7 +83,7 @@ def _excess(item: Command, scene: Scene) -> float:
     )
 
 
-def _words(item: Command, scene: Scene) -> str:
+def _words(item: VelocityCommand, scene: Scene) -> str:
     twist = item.twist
     linear = abs(twist.linear_m_s) / scene.max_linear_m_s
     if linear >= abs(twist.angular_rad_s) / scene.max_angular_rad_s:
@@ -91,7 +91,7 @@ def _words(item: Command, scene: Scene) -> str:
     return f"angular.z = {turn(twist.angular_rad_s)}"
 
 
-def _evidence(recording: Recording, sent: tuple[Command, ...], scene: Scene) -> Evidence:
+def _evidence(recording: Recording, sent: tuple[VelocityCommand, ...], scene: Scene) -> Evidence:
     shown = sent[:: max(1, len(sent) // _MOST_POINTS)]
     x = tuple(recording.since_launch_s(item.time_ns) for item in shown)
     linear, angular = scene.max_linear_m_s, scene.max_angular_rad_s

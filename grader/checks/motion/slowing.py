@@ -15,7 +15,7 @@ from grader.checks.wording import code, counted, percent
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
 from grader.diagnosis.no_messages import why_silent
 from grader.measure.motion.approach import NO_SPEED_M_S
-from grader.measure.motion.command import Command, command_topic, commands
+from grader.measure.motion.command import VelocityCommand, command_topic, commands
 from grader.measure.motion.quantities import speed
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Ratio
@@ -99,7 +99,7 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     )
 
 
-def _stays(driving: list[Command], levels: Collection[float]) -> bool:
+def _stays(driving: list[VelocityCommand], levels: Collection[float]) -> bool:
     """Whether the lower of two sizes is no step of a proportion that was rounded or held."""
     lower = min(levels)
     times_ns = [item.time_ns for item in driving if round(_size(item), _DIGITS) == lower]
@@ -107,15 +107,17 @@ def _stays(driving: list[Command], levels: Collection[float]) -> bool:
     return standalone_build > _STEP_M_S and times_ns[-1] - times_ns[0] > _HELD_NS
 
 
-def _size(item: Command) -> float:
+def _size(item: VelocityCommand) -> float:
     return abs(item.twist.linear_m_s)
 
 
-def _when_s(recording: Recording, item: Command) -> float:
+def _when_s(recording: Recording, item: VelocityCommand) -> float:
     return recording.since_launch_s(item.time_ns)
 
 
-def _evidence(recording: Recording, driving: list[Command], last: Command) -> Evidence:
+def _evidence(
+    recording: Recording, driving: list[VelocityCommand], last: VelocityCommand
+) -> Evidence:
     shown = driving[:: max(1, len(driving) // _MOST_POINTS)]
     return Evidence(
         moments=(Moment("end of the way", _when_s(recording, last)),),

@@ -44,7 +44,7 @@ def starts(recording: Recording, parameters: NoParameters) -> Finding:
     )
 
 
-class Exists(Parameters):
+class NodeExists(Parameters):
     """Parameters of node.exists."""
 
     name: QualifiedNodeName = Field(
@@ -55,8 +55,8 @@ class Exists(Parameters):
     )
 
 
-@check("node.exists", Subject.RECORDING, Exists)
-def exists(recording: Recording, parameters: Exists) -> Finding:
+@check("node.exists", Subject.RECORDING, NodeExists)
+def exists(recording: Recording, parameters: NodeExists) -> Finding:
     """The node appears under its name.
 
     Judged by the ROS graph: a node of the student with this fully qualified name was seen.
@@ -74,7 +74,7 @@ def exists(recording: Recording, parameters: Exists) -> Finding:
     )
 
 
-def _other_publisher(recording: Recording, parameters: Exists) -> Cause | None:
+def _other_publisher(recording: Recording, parameters: NodeExists) -> Cause | None:
     """Another node publishes what this one should; a topic without a publisher is no matter."""
     if parameters.publishes is None:
         return None

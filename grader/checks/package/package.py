@@ -19,7 +19,7 @@ from grader.spec.nearest_name import nearest
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 
 
-class Found(Parameters):
+class PackageFound(Parameters):
     """Parameters of package.found."""
 
     needs = (Submitted(),)
@@ -30,8 +30,8 @@ class Found(Parameters):
     )
 
 
-@check("package.found", Subject.SUBMISSION, Found)
-def found(submission: SubmissionRecord, parameters: Found) -> Finding:
+@check("package.found", Subject.SUBMISSION, PackageFound)
+def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
     """The package is there, with a sound package.xml.
 
     Judged by the files that were handed in: a package.xml with this name, which can be read,

@@ -38,7 +38,7 @@ from grader.spec.unit import format_duration
 _TOGETHER, _APART = 0.5, 0.75
 
 
-class Exists(Parameters):
+class ServiceExists(Parameters):
     """Parameters of service.exists."""
 
     doubt = Doubt.ANSWER_MISSED
@@ -49,8 +49,8 @@ class Exists(Parameters):
     )
 
 
-@check("service.exists", Subject.RECORDING, Exists)
-def exists(recording: Recording, parameters: Exists) -> Finding:
+@check("service.exists", Subject.RECORDING, ServiceExists)
+def exists(recording: Recording, parameters: ServiceExists) -> Finding:
     """The node offers the service.
 
     Judged by the ROS graph: a service server of the student's was there, with this type.

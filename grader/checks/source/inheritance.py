@@ -39,7 +39,7 @@ class Kinship(Enum):
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundClass:
     """A class with the file that it is in."""
 
     file: SourceFile
@@ -55,11 +55,11 @@ class Family:
         self._modules = {file.module: file for file in files}
 
     @property
-    def classes(self) -> tuple[Found, ...]:
+    def classes(self) -> tuple[FoundClass, ...]:
         """Every class, in the order of files and lines."""
-        return tuple(Found(file, one) for file in self._files for one in file.classes)
+        return tuple(FoundClass(file, one) for file in self._files for one in file.classes)
 
-    def ancestors(self, item: Found) -> set[str]:
+    def ancestors(self, item: FoundClass) -> set[str]:
         """Dotted names of everything that a class inherits, as far as the files tell."""
         pending = self._resolved(item.found.bases, item.file, item.found)
         known: set[str] = set()
@@ -79,14 +79,14 @@ class Family:
                 pending += [found for found in _named(rest, module) if found != rest]
         return known
 
-    def inherits(self, item: Found, base: str) -> Kinship:
+    def inherits(self, item: FoundClass, base: str) -> Kinship:
         """Whether a class inherits another one."""
         ancestors = self.ancestors(item)
         if ancestors & _SAME.get(base, frozenset({base})):
             return Kinship.YES
         return Kinship.UNKNOWN if any(map(self._is_foreign, ancestors)) else Kinship.NO
 
-    def foreign(self, item: Found) -> list[str]:
+    def foreign(self, item: FoundClass) -> list[str]:
         """Classes that it inherits from packages that were not handed in."""
         return sorted(filter(self._is_foreign, self.ancestors(item)))
 

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, field_validator
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.need import Need, RuffRules, Submitted
-from grader.checks.source.inheritance import NODE, Family, Found, Kinship
+from grader.checks.source.inheritance import NODE, Family, FoundClass, Kinship
 from grader.checks.wording import code, codes, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
@@ -107,7 +107,7 @@ def class_(submission: SubmissionRecord, parameters: Class) -> Finding:
 
 
 def _why_no_class(
-    family: Family, classes: Sequence[Found], named: Sequence[Found], parameters: Class
+    family: Family, classes: Sequence[FoundClass], named: Sequence[FoundClass], parameters: Class
 ) -> Cause:
     base = parameters.inherits.rpartition(".")[2]
     module = parameters.inherits.rpartition(".")[0]
@@ -142,16 +142,16 @@ def _why_no_class(
     return Cause(seen, hint, evidence)
 
 
-def _inherits(item: Found) -> str:
+def _inherits(item: FoundClass) -> str:
     bases = codes(item.found.bases) or "nothing"
     return f"{code(item.found.name)} inherits {bases}"
 
 
-def _short(item: Found) -> str:
+def _short(item: FoundClass) -> str:
     return item.found.name.rpartition(".")[2]
 
 
-def _place(item: Found, message: str) -> SourceError:
+def _place(item: FoundClass, message: str) -> SourceError:
     return SourceError(item.file.path, item.found.line, message)
 
 

@@ -39,7 +39,7 @@ class Interval:
 
 
 @dataclass(frozen=True)
-class Limits:
+class PeriodLimits:
     """What is allowed.
 
     Attributes:
@@ -58,7 +58,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class PeriodVerdict:
     """How intervals compare with limits."""
 
     median_s: float
@@ -92,7 +92,7 @@ def intervals(messages: Sequence[Message]) -> tuple[Interval, ...]:
     return tuple(found)
 
 
-def judge(seconds: Sequence[float], limits: Limits) -> Verdict:
+def judge(seconds: Sequence[float], limits: PeriodLimits) -> PeriodVerdict:
     """Judge intervals.
 
     Args:
@@ -100,7 +100,7 @@ def judge(seconds: Sequence[float], limits: Limits) -> Verdict:
     """
     middle = median(seconds)
     irregular = _irregular([value - middle for value in seconds], limits.spread_s + _EPSILON_S)
-    return Verdict(
+    return PeriodVerdict(
         median_s=middle,
         irregular=irregular,
         period_good=abs(middle - limits.period_s) <= limits.median_s + _EPSILON_S,
@@ -131,7 +131,7 @@ def _irregular(deviations: Sequence[float], allowed_s: float) -> tuple[int, ...]
 
 
 def forgiven(
-    recording: Recording, measured: Sequence[Interval], limits: Limits
+    recording: Recording, measured: Sequence[Interval], limits: PeriodLimits
 ) -> tuple[float, ...]:
     """The intervals as they could have been if the host had taken nothing.
 

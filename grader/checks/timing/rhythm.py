@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from statistics import mean
 
-from grader.checks.timing.period import Interval, Limits, Verdict, judge
+from grader.checks.timing.period import Interval, PeriodLimits, PeriodVerdict, judge
 from grader.diagnosis.process.blocked_executor import long_wait
 from grader.measure import declarations
 from grader.recording.model import Kind, Recording
@@ -44,8 +44,8 @@ def explain(
     recording: Recording,
     topic: str,
     measured: tuple[Interval, ...],
-    verdict: Verdict,
-    limits: Limits,
+    verdict: PeriodVerdict,
+    limits: PeriodLimits,
 ) -> Explanation:
     """Explain why the rhythm is not the expected one.
 
@@ -61,7 +61,7 @@ def explain(
     return _wrong_period(recording, topic, verdict, limits, declared)
 
 
-def is_declared(recording: Recording, verdict: Verdict, limits: Limits) -> bool:
+def is_declared(recording: Recording, verdict: PeriodVerdict, limits: PeriodLimits) -> bool:
     """Whether the process declared a wrong period that is the median, and no right one.
 
     A hold-up moves single messages of a timer, never its period: then it is not the machine's
@@ -80,8 +80,8 @@ def _too_often(
     recording: Recording,
     topic: str,
     measured: tuple[Interval, ...],
-    verdict: Verdict,
-    limits: Limits,
+    verdict: PeriodVerdict,
+    limits: PeriodLimits,
     declared: list[float],
 ) -> Explanation | None:
     """Several messages in each expected period, evenly spaced or not."""
@@ -112,7 +112,11 @@ def _too_often(
 
 
 def _wrong_period(
-    recording: Recording, topic: str, verdict: Verdict, limits: Limits, declared: list[float]
+    recording: Recording,
+    topic: str,
+    verdict: PeriodVerdict,
+    limits: PeriodLimits,
+    declared: list[float],
 ) -> Explanation:
     wanted_s, median_s = limits.period_s, verdict.median_s
     wanted, found = format_duration(wanted_s), format_duration(median_s)
@@ -173,7 +177,7 @@ def _wrong_period(
 
 
 def _skipped(
-    recording: Recording, declared: list[float], verdict: Verdict, limits: Limits
+    recording: Recording, declared: list[float], verdict: PeriodVerdict, limits: PeriodLimits
 ) -> Explanation | None:
     """One timer that is fast enough, and a callback that publishes in some of its calls only."""
     if len(declared) != 1 or not verdict.regular or declared[0] <= 0.0:
@@ -197,13 +201,13 @@ def _skipped(
     )
 
 
-def _comes_round(recording: Recording, limits: Limits) -> bool:
+def _comes_round(recording: Recording, limits: PeriodLimits) -> bool:
     """Whether the executor answers so soon that no callback keeps a timer waiting."""
     waited = long_wait(recording, {node.name for node in recording.student_nodes})
     return waited is not None and waited[1] < _AT_ONCE * limits.period_s
 
 
-def _too_fast(recording: Recording, topic: str, limits: Limits) -> Explanation:
+def _too_fast(recording: Recording, topic: str, limits: PeriodLimits) -> Explanation:
     if declarations.timer_of_zero(recording):
         return Explanation(
             "messages come too often: the process declared a timer of 0 s, which fires again and "
@@ -220,7 +224,7 @@ def _too_fast(recording: Recording, topic: str, limits: Limits) -> Explanation:
 
 
 def _irregular(
-    measured: tuple[Interval, ...], verdict: Verdict, declared: list[float]
+    measured: tuple[Interval, ...], verdict: PeriodVerdict, declared: list[float]
 ) -> Explanation:
     ratios = [
         measured[index].seconds / verdict.median_s if verdict.median_s else 0.0
@@ -252,7 +256,7 @@ def _irregular(
     )
 
 
-def _seconds_hint(limits: Limits) -> str:
+def _seconds_hint(limits: PeriodLimits) -> str:
     return (
         f"create_timer takes its period in seconds: {format_duration(limits.period_s)} is "
         f"{limits.period_s:g}."

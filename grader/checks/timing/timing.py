@@ -10,8 +10,8 @@ from grader.checks.need import Recorded
 from grader.checks.timing.period import (
     MOST_INTERVALS,
     Interval,
-    Limits,
-    Verdict,
+    PeriodLimits,
+    PeriodVerdict,
     forgiven,
     intervals,
     judge,
@@ -64,9 +64,9 @@ class Period(Parameters):
         return self.at_least + 1
 
     @property
-    def limits(self) -> Limits:
+    def limits(self) -> PeriodLimits:
         """The same in seconds."""
-        return Limits(
+        return PeriodLimits(
             period_s=self.period,
             median_s=self.tolerance.of(self.period),
             spread_s=self.spread.of(self.period),
@@ -161,7 +161,7 @@ def _why_ended(
     )
 
 
-def _too_slow(messages: tuple[Message, ...], limits: Limits) -> bool:
+def _too_slow(messages: tuple[Message, ...], limits: PeriodLimits) -> bool:
     """Whether there are few messages because their period is too long."""
     measured = intervals(messages)
     if not measured:
@@ -170,7 +170,7 @@ def _too_slow(messages: tuple[Message, ...], limits: Limits) -> bool:
     return not verdict.period_good and verdict.median_s > limits.period_s
 
 
-def _figures(measured: tuple[Interval, ...], verdict: Verdict) -> str:
+def _figures(measured: tuple[Interval, ...], verdict: PeriodVerdict) -> str:
     worst_s = max(abs(item.seconds - verdict.median_s) for item in measured)
     return (
         f"median {format_duration(verdict.median_s)}, largest deviation from it "
@@ -179,7 +179,7 @@ def _figures(measured: tuple[Interval, ...], verdict: Verdict) -> str:
 
 
 def _evidence(
-    recording: Recording, parameters: Period, measured: tuple[Interval, ...], verdict: Verdict
+    recording: Recording, parameters: Period, measured: tuple[Interval, ...], verdict: PeriodVerdict
 ) -> Evidence:
     limits = parameters.limits
     # Shown is the band that decided: that of the median, or that of the single intervals.

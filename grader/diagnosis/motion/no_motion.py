@@ -17,7 +17,7 @@ from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exit
 from grader.diagnosis.wrong_value import was_integer, what_was_put
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.command import Command, command_topic, commands, is_zero
+from grader.measure.motion.command import VelocityCommand, command_topic, commands, is_zero
 from grader.measure.motion.ground import ahead, nearest
 from grader.measure.motion.lateness import stolen_s
 from grader.measure.motion.quantities import metres, speed
@@ -53,11 +53,11 @@ class NotMoved(Symptom[Cause]):
     recording: Recording
 
     @cached_property
-    def sent(self) -> tuple[Command, ...]:
+    def sent(self) -> tuple[VelocityCommand, ...]:
         """The velocity commands."""
         return commands(self.recording)
 
-    def moment(self, label: str, command: Command) -> Evidence:
+    def moment(self, label: str, command: VelocityCommand) -> Evidence:
         """Evidence at a command."""
         return Evidence(moments=(Moment(label, self.recording.since_launch_s(command.time_ns)),))
 
@@ -265,6 +265,6 @@ def told_too_late(symptom: NotMoved) -> Cause:
     )
 
 
-def _first_to_move(symptom: NotMoved) -> tuple[Command, Evidence]:
+def _first_to_move(symptom: NotMoved) -> tuple[VelocityCommand, Evidence]:
     first = next(item for item in symptom.sent if not is_zero(item.twist))
     return first, symptom.moment("first command to move", first)

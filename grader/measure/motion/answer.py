@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.measure.motion.command import Command, commands, number, odometry
+from grader.measure.motion.command import VelocityCommand, commands, number, odometry
 from grader.measure.motion.track import pose_at
 from grader.recording.model import NS, Message, Recording
 from sim.motion import Pose
@@ -19,7 +19,7 @@ MOST_BEHIND = 2
 class Answer:
     """A command with what its sender can have known."""
 
-    command: Command
+    command: VelocityCommand
     seen_ns: int
     pose: Pose
 

@@ -14,7 +14,7 @@ _TOPIC = "/cmd_vel"
 
 
 @dataclass(frozen=True)
-class Command:
+class VelocityCommand:
     """A velocity command.
 
     Attributes:
@@ -42,7 +42,7 @@ def scans(recording: Recording) -> tuple[Message, ...]:
     return () if recording.scene is None else recording.on(recording.scene.scan_topic)
 
 
-def commands(recording: Recording) -> tuple[Command, ...]:
+def commands(recording: Recording) -> tuple[VelocityCommand, ...]:
     """Every readable command, oldest first; a TwistStamped counts like a Twist."""
     found = []
     for message in recording.on(command_topic(recording)):
@@ -56,7 +56,7 @@ def commands(recording: Recording) -> tuple[Command, ...]:
                 )
                 if number(value, part, axis)
             )  # fmt: skip
-            found.append(Command(message.stamp_ns, Twist(linear, angular), stray))
+            found.append(VelocityCommand(message.stamp_ns, Twist(linear, angular), stray))
     return tuple(found)
 
 

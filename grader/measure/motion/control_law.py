@@ -59,7 +59,7 @@ class Law(Enum):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class LawVerdict:
     """A law with its figures.
 
     Attributes:
@@ -77,7 +77,7 @@ class Verdict:
     share: float = 0.0
 
 
-def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> Verdict:
+def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> LawVerdict:
     """Find the law behind commands.
 
     Args:
@@ -90,14 +90,14 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> V
     if (largest_rad <= _SMALL_RAD and len(turning) < _FEW_TURNS) or (
         largest_rad <= _TINY_RAD and fastest_rad_s <= _SLOW_RAD_S
     ):
-        return Verdict(Law.NOTHING_TO_DO, used=len(samples))
+        return LawVerdict(Law.NOTHING_TO_DO, used=len(samples))
     if len(samples) < _LEAST_FIT:
-        return Verdict(Law.TOO_FEW, used=len(samples))
+        return LawVerdict(Law.TOO_FEW, used=len(samples))
     if not turning:
-        return Verdict(Law.ZERO, used=len(samples))
+        return LawVerdict(Law.ZERO, used=len(samples))
     steps = _steps(turning)
     if steps:
-        return Verdict(Law.STEPS, used=len(turning), values=steps)
+        return LawVerdict(Law.STEPS, used=len(turning), values=steps)
     telling = [
         _toward(item)
         for item in samples
@@ -124,7 +124,7 @@ def _steps(turning: Sequence[Sample]) -> tuple[float, ...]:
 
 def _otherwise(
     samples: Sequence[Sample], limit_rad_s: float, least_r2: float, wrong: float
-) -> Verdict | None:
+) -> LawVerdict | None:
     """A mistake that explains commands which are not in proportion to the error."""
     if wrong <= _FEW_WRONG:
         return None
@@ -137,12 +137,12 @@ def _otherwise(
     turned = fit(raw, limit_rad_s)
     mirrored = fit([Sample(-item.error_rad, item.command_rad_s) for item in samples], limit_rad_s)
     if turned.gain > 0.0 and turned.r2 >= max(0.8 * least_r2, mirrored.r2):
-        return Verdict(Law.NOT_NORMALISED, turned.gain, turned.r2, turned.used, share=wrong)
+        return LawVerdict(Law.NOT_NORMALISED, turned.gain, turned.r2, turned.used, share=wrong)
     if mirrored.gain > 0.0 and wrong > 0.5:
-        return Verdict(Law.WRONG_SIGN, -mirrored.gain, mirrored.r2, mirrored.used)
+        return LawVerdict(Law.WRONG_SIGN, -mirrored.gain, mirrored.r2, mirrored.used)
     # The line of those that turn the right way, with no merit for the others.
     line = fit(samples, limit_rad_s)
-    return Verdict(Law.PROPORTIONAL, line.gain, min(line.r2, 1.0 - wrong - least_r2), line.used)
+    return LawVerdict(Law.PROPORTIONAL, line.gain, min(line.r2, 1.0 - wrong - least_r2), line.used)
 
 
 def _toward(item: Sample) -> Sample:
@@ -154,14 +154,14 @@ def _toward(item: Sample) -> Sample:
     return item
 
 
-def fit(samples: Sequence[Sample], limit_rad_s: float) -> Verdict:
+def fit(samples: Sequence[Sample], limit_rad_s: float) -> LawVerdict:
     """Lay a line through the origin and the commands that are at no limit.
 
     A command at a limit is left out only if the line asks for at least that much there, so that
     a step does not pass for a clamp.
     """
     if not samples:
-        return Verdict(Law.TOO_FEW)
+        return LawVerdict(Law.TOO_FEW)
     sizes = [abs(item.command_rad_s) for item in samples]
     highest = max(sizes)
     lowest = min((size for size in sizes if size > _ZERO_RAD_S), default=0.0)
@@ -183,7 +183,7 @@ def fit(samples: Sequence[Sample], limit_rad_s: float) -> Verdict:
 
     kept = _without_strays([item for item in samples if counts(item)])
     gain = _gain(kept)
-    return Verdict(Law.PROPORTIONAL, gain, _r2(kept, gain), len(kept))
+    return LawVerdict(Law.PROPORTIONAL, gain, _r2(kept, gain), len(kept))
 
 
 def _without_strays(samples: list[Sample]) -> list[Sample]:

@@ -24,7 +24,7 @@ from grader.run.host.memory_shortage import Shortage
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.host.wall_clock import WallClock
 from grader.run.host.watchdog import Watchdog
-from grader.run.order import CellOrder, Command
+from grader.run.order import CellOrder, ProcessCommand
 from grader.run.process.descendants import Family
 from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
@@ -210,7 +210,7 @@ class Cell:
         self._probe.counts_servers = False
         self._start(next(item for item in self._order.commands if item.name == name))
 
-    def _start(self, command: Command) -> None:
+    def _start(self, command: ProcessCommand) -> None:
         """Start a process of the student.
 
         Raises:

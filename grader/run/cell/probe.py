@@ -23,7 +23,7 @@ from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Call, Endpoint, Kind, Owner
 from grader.run.cell.rosout import RosoutLog, told_of_matches
-from grader.run.order import Limits, Topic
+from grader.run.order import RunLimits, Topic
 
 NAME = "rosgrade_probe"
 _BEFORE_ALL_NS = 1
@@ -93,7 +93,7 @@ class Probe:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._topics: dict[str, Topic] = {}
-        self._limits: Limits | None = None
+        self._limits: RunLimits | None = None
         self._fallbacks: set[str] = set()
         self._seen: set[tuple[str, int, int]] = set()
         self._clients: dict[str, Any] = {}
@@ -107,7 +107,7 @@ class Probe:
         self.counts_servers = True
         self._has_met = False
 
-    def listen(self, topics: tuple[Topic, ...], limits: Limits) -> None:
+    def listen(self, topics: tuple[Topic, ...], limits: RunLimits) -> None:
         """Record topics from now on.
 
         Raises:

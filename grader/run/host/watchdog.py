@@ -16,7 +16,7 @@ from pathlib import Path
 
 from grader.recording.event import Breach
 from grader.run.process.descendants import send
-from grader.sandbox.limits import MIB, Limits, size_words
+from grader.sandbox.limits import MIB, SandboxLimits, size_words
 from grader.sandbox.namespaces import STUDENT
 from grader.sandbox.usage import (
     CpuAccount,
@@ -45,7 +45,7 @@ class Watchdog:
 
     def __init__(
         self,
-        limits: Limits,
+        limits: SandboxLimits,
         inits: Callable[[], Sequence[int]],
         output_bytes: Callable[[], int],
         violations: Callable[[], Iterable[tuple[str, str]]] = tuple,

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.run.process.descendants import descendants
-from grader.sandbox.limits import Limits
+from grader.sandbox.limits import SandboxLimits
 
 WORKSPACE = "/ws"
 """Where a student sees what is installed."""
@@ -42,13 +42,17 @@ class ProcessSandbox:
     guard: str
     unheard: str
     calls: dict[str, int]
-    limits: Limits
+    limits: SandboxLimits
     folders: dict[str, str]
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> ProcessSandbox:
         """Read what :func:`dataclasses.asdict` made."""
-        given = {**data, "arguments": tuple(data["arguments"]), "limits": Limits(**data["limits"])}
+        given = {
+            **data,
+            "arguments": tuple(data["arguments"]),
+            "limits": SandboxLimits(**data["limits"]),
+        }
         return cls(**given)
 
     def outside(self, path: str) -> Path:

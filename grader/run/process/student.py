@@ -16,7 +16,7 @@ from grader.recording.event import Breach
 from grader.recording.model import NS, Process
 from grader.run.host.disturbance import DisturbanceMeter
 from grader.run.host.stopwatch import Stopwatch
-from grader.run.order import Limits
+from grader.run.order import RunLimits
 from grader.run.process.descendants import (
     descendants,
     is_init,
@@ -244,7 +244,7 @@ class StudentProcesses:
                 process.signal(number)
         return running
 
-    def stop(self, limits: Limits, meter: DisturbanceMeter) -> None:
+    def stop(self, limits: RunLimits, meter: DisturbanceMeter) -> None:
         """SIGINT, SIGTERM, SIGKILL, each with a bounded wait; dates the end of each process."""
         self.let_exit()
         watch = Stopwatch(meter)

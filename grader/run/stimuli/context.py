@@ -16,7 +16,7 @@ from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
 from grader.run.host.disturbance import DisturbanceMeter
 from grader.run.host.stopwatch import Stopwatch
-from grader.run.order import Limits
+from grader.run.order import RunLimits
 from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.asking import Asker
 
@@ -44,7 +44,7 @@ class StimulusContext:
     graph: GraphObserver
     students: StudentProcesses
     meter: DisturbanceMeter
-    limits: Limits
+    limits: RunLimits
     start: Callable[[str], None]
     waits: list[Wait]
     joins: dict[str, Join] = field(default_factory=dict)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from grader.sandbox.limits import BUILD, Limits
+from grader.sandbox.limits import BUILD, SandboxLimits
 from grader.submission.build.bounded import OutputLimits
 from grader.submission.intake.members import MIB
 
@@ -22,4 +22,4 @@ class BuildLimits:
     install_bytes: int = 512 * MIB
     install_files: int = 20_000
     output: OutputLimits = field(default_factory=OutputLimits)
-    room: Limits = BUILD
+    room: SandboxLimits = BUILD

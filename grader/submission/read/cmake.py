@@ -32,7 +32,7 @@ _LONGEST_VALUE = 10_000
 
 
 @dataclass(frozen=True)
-class Command:
+class CMakeCommand:
     """One command.
 
     Attributes:
@@ -54,13 +54,13 @@ class Command:
         return rest[:end]
 
 
-def read_commands(text: str) -> tuple[Command, ...]:
+def read_commands(text: str) -> tuple[CMakeCommand, ...]:
     """The commands of a CMakeLists.txt in their order; what comes after broken syntax is lost."""
     variables: dict[str, str] = {}
     found = []
     for name, written, line in _commands(text):
         arguments = tuple(_expanded(written, variables))
-        found.append(Command(name, arguments, line))
+        found.append(CMakeCommand(name, arguments, line))
         if name == "project" and arguments:
             variables["PROJECT_NAME"] = arguments[0]
         elif name == "set" and arguments:
