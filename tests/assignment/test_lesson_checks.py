@@ -23,7 +23,7 @@ from grader.checks.finding import Finding
 from grader.checks.need import Recorded
 from grader.spec.name import TopicName
 
-from .texts import PASSED
+from tests.assignment.texts import PASSED
 
 
 class There(Parameters):

@@ -6,7 +6,6 @@ import pytest
 
 from grader.checks.finding import Status
 from grader.recording.model import Ending
-from tests.checks.asking import FIBONACCI, acting, action, goal, service
 from tests.checks.builder import (
     SOURCE,
     at,
@@ -18,6 +17,7 @@ from tests.checks.builder import (
     taken,
     traceback,
 )
+from tests.checks.requests import FIBONACCI, acting, action, goal, service
 
 FIB = {"action": "/fibonacci"}
 RESULT = {**FIB, "result": {"sequence": [0, 1, 1, 2, 3]}, "within": "2 s"}

@@ -8,7 +8,6 @@ import pytest
 from grader.checks.finding import Status
 from grader.checks.log.logged import logged
 from grader.recording.model import Ending
-from tests.checks.asking import logs
 from tests.checks.builder import (
     at,
     call,
@@ -20,6 +19,7 @@ from tests.checks.builder import (
     taken,
     traceback,
 )
+from tests.checks.requests import logs
 
 READY = {"text": "ready", "level": "INFO"}
 

@@ -6,7 +6,6 @@ import pytest
 
 from grader.checks.finding import Status
 from grader.recording.model import NS
-from tests.checks.asking import asked, parameter_set, parameters_read, service
 from tests.checks.builder import (
     NODE,
     at,
@@ -19,6 +18,7 @@ from tests.checks.builder import (
     taken,
     text,
 )
+from tests.checks.requests import asked, parameter_set, parameters_read, service
 
 SPEED = {"node": "bot_publisher", "name": "speed"}
 RANGE = {"speed": {"from_value": 0.0, "to_value": 1.0, "step": 0.0}}

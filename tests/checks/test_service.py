@@ -4,7 +4,6 @@ import pytest
 
 from grader.checks.finding import Status
 from grader.recording.model import Ending
-from tests.checks.asking import SET_BOOL, action, asked, service, serving
 from tests.checks.builder import (
     NODE,
     SOURCE,
@@ -19,6 +18,7 @@ from tests.checks.builder import (
     text,
     traceback,
 )
+from tests.checks.requests import SET_BOOL, action, asked, service, serving
 
 ENABLE = {"service": "/enable"}
 TRUE = {**ENABLE, "response": {"success": True}}

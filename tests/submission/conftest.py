@@ -8,8 +8,7 @@ import pytest
 
 from grader import ros as ros_module
 from grader.ros import RosInstallation
-
-from .samples import Tree
+from tests.submission.samples import Tree
 
 
 @pytest.fixture

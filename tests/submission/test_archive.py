@@ -17,8 +17,7 @@ from grader.errors import GraderFault, SubmissionError
 from grader.submission.intake.archive import unpack
 from grader.submission.intake.leftovers import is_left_out
 from grader.submission.intake.members import ArchiveLimits
-
-from .samples import tar_bytes, tar_member, zip_bytes
+from tests.submission.samples import tar_bytes, tar_member, zip_bytes
 
 MIB = 2**20
 

@@ -22,8 +22,7 @@ from grader.submission.build.build_key import build_key
 from grader.submission.build.build_limits import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
 from grader.submission.record import BuildRecord, PackageRecord
-
-from .samples import INTERFACES, MANIFEST, NODE, SETUP_PY, Tree, zip_bytes
+from tests.submission.samples import INTERFACES, MANIFEST, NODE, SETUP_PY, Tree, zip_bytes
 
 pytestmark = pytest.mark.ros
 

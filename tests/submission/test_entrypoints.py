@@ -5,8 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.submission.read.entrypoints import Setup, parse_entry_point, parse_installed, read_setup
-
-from .samples import SETUP_CFG, SETUP_PY
+from tests.submission.samples import SETUP_CFG, SETUP_PY
 
 
 def setup(source: str, config: str = "") -> Setup:

@@ -15,8 +15,7 @@ from grader.submission.build.installed import (
     tidy,
 )
 from grader.submission.record import Definition
-
-from .samples import Tree
+from tests.submission.samples import Tree
 
 SITE = "lib/python3.12/site-packages"
 

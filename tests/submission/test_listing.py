@@ -8,8 +8,7 @@ import pytest
 from grader.errors import SubmissionError
 from grader.submission.intake.listing import find_packages, list_files
 from grader.submission.intake.members import ArchiveLimits
-
-from .samples import Tree
+from tests.submission.samples import Tree
 
 
 def listed(root: Path) -> list[str]:

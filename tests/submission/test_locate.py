@@ -9,8 +9,7 @@ import pytest
 
 from grader.errors import GraderFault, SubmissionError, UsageError
 from grader.submission.intake.locate import opened, submission_id
-
-from .samples import PACKAGE, Tree, tar_bytes, tar_member, zip_bytes
+from tests.submission.samples import PACKAGE, Tree, tar_bytes, tar_member, zip_bytes
 
 
 def sha256(path: Path) -> str:

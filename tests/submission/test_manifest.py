@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 
 from grader.submission.read.manifest import Manifest, read_manifest
 from grader.submission.record import Dependency
-
-from .samples import MANIFEST
+from tests.submission.samples import MANIFEST
 
 # catkin_pkg calls pyparsing by names that its newer versions deprecate.
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")

@@ -7,8 +7,7 @@ from grader.submission.build.installed import InstallSpace
 from grader.submission.intake.locate import opened
 from grader.submission.read.package import read_package, record_packages
 from grader.submission.record import Import, PackageRecord
-
-from .samples import MANIFEST, NODE, SETUP_PY, Tree
+from tests.submission.samples import MANIFEST, NODE, SETUP_PY, Tree
 
 FOLDER = "src/bot_publisher"
 

@@ -11,8 +11,7 @@ from grader.errors import UsageError
 from grader.ros import RosInstallation
 from grader.submission.intake.members import ArchiveLimits
 from grader.submission.prepare import Prepared, PrepareLimits, fingerprint, prepare
-
-from .samples import MANIFEST, NODE, Tree, tar_bytes, tar_member, zip_bytes
+from tests.submission.samples import MANIFEST, NODE, Tree, tar_bytes, tar_member, zip_bytes
 
 
 def prepared(path: Path, ros: RosInstallation) -> Prepared:

@@ -14,9 +14,8 @@ from grader.submission.intake.locate import only, opened
 from grader.submission.prepare import Prepared, prepare
 from grader.submission.read.package import read_package
 from grader.submission.record import Definition
-
-from .samples import CMAKE_OF_MSGS as CMAKE
-from .samples import INTERFACES, MANIFEST, MANIFEST_OF_MSGS, SETUP_PY, Tree
+from tests.submission.samples import CMAKE_OF_MSGS as CMAKE
+from tests.submission.samples import INTERFACES, MANIFEST, MANIFEST_OF_MSGS, SETUP_PY, Tree
 
 MSGS = "src/bot_msgs"
 NODE = "from bot_msgs.msg import Bot\n\n\ndef main():\n    print(Bot(model=Bot.BURGER))\n"

@@ -9,8 +9,7 @@ import pytest
 
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
 from grader.submission.record import SourceError
-
-from .samples import SETUP_PY
+from tests.submission.samples import SETUP_PY
 
 FILES = {
     "src/bot/setup.py",

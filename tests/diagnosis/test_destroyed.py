@@ -7,7 +7,6 @@ import pytest
 from grader.checks.finding import Status
 from grader.recording.event import Intervention
 from grader.recording.model import Kind
-from tests.checks.asking import acting, action, asked, goal, parameters_read, service, serving
 from tests.checks.builder import (
     BOT,
     LAUNCH_NS,
@@ -28,6 +27,7 @@ from tests.checks.builder import (
     stimulus,
     taken,
 )
+from tests.checks.requests import acting, action, asked, goal, parameters_read, service, serving
 
 LATCHED = replace(RELIABLE, durability="transient_local")
 LISTENER = endpoint("/chatter", kind=Kind.SUBSCRIPTION, type="std_msgs/msg/String")
