@@ -23,7 +23,7 @@ from grader.checks.finding import Finding
 from grader.checks.need import Recorded
 from grader.spec.name import TopicName
 
-from tests.assignment.texts import PASSED
+from .texts import PASSED
 
 
 class There(Parameters):
