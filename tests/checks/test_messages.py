@@ -49,10 +49,15 @@ def equal(run, value=None, **parameters):
     return judge("messages.equal", run, topic="/cmd_vel", value=value or VALUE, **parameters)
 
 
-def unequal(value, **parameters):
-    """What is said of a run whose every message has this value."""
-    run = recording(messages=messages(every(0.3), value))
-    finding = equal(run, **parameters)
+def stream(*values):
+    """A run with these values, one every 300 ms."""
+    received = (message(0.4 + 0.3 * n, v, sequence=n) for n, v in enumerate(values, 1))
+    return recording(messages={"/cmd_vel": tuple(received)})
+
+
+def unequal(value):
+    """The finding's text of a run in which every message has this value."""
+    finding = equal(stream(*[value] * 12))
     assert finding.status is Status.FAILED, finding
     return finding.observed
 
@@ -113,11 +118,6 @@ class TestCount:
         found = failing("messages.count", run, topic="/cmd_vel", exactly=6)
         assert "from 2 publishers (in `/bot_publisher` and `/twin`)" in found
 
-    def test_too_many_from_a_feedback_loop(self):
-        run = recording(endpoints=(endpoint(), endpoint(kind=Kind.SUBSCRIPTION)))
-        found = failing("messages.count", run, topic="/cmd_vel", at_most=6)
-        assert "may answer its own messages" in found
-
     @pytest.mark.parametrize(
         ("answers_s", "status"),
         [
@@ -135,14 +135,6 @@ class TestCount:
         assert finding.status is status
         assert finding.expected.endswith("on `/cmd_vel` for each message on `/chatter`")
         assert "for 3 messages on `/chatter`" in finding.observed
-
-    def test_the_answer_before_once_more_is_one_answer_too_many(self):
-        run = recording(
-            messages=messages((1.01, 1.51, 1.52, 2.01, 2.02)), sent=sent((1.0, 1.5, 2.0))
-        )
-        found = failing("messages.count", run, topic="/cmd_vel", stimulus="/chatter", at_most=1)
-        assert "5 messages for 3 messages on `/chatter`" in found
-        assert "such as that to the message before" in found
 
     def test_a_stimulus_that_nothing_was_sent_of(self):
         run = recording(sent={"/chatter": ()})
@@ -257,7 +249,7 @@ class TestSilence:
         assert "there but silent, although the process declared a timer of 300 ms" in found
         assert "A lambda has to call the method, with brackets" in found
 
-    def test_simulated_time_that_nobody_publishes(self):
+    def test_simulated_time_that_is_not_published(self):
         clock = endpoint("/clock", kind=Kind.SUBSCRIPTION, type="rosgraph_msgs/msg/Clock")
         found = self.found(endpoints=(endpoint(), reader(), clock))
         assert "takes its time from `/clock` (`use_sim_time` is true)" in found
@@ -330,22 +322,14 @@ class TestEqual:
             assert finding.observed == "all of 12 messages"
 
     @pytest.mark.parametrize(
-        ("stream", "hint"),
+        ("values", "hint"),
         [
             ([twist()] * 4 + [twist((2, 0, 0))], "4 messages of 5 are right. Look for what makes"),
-            ([twist((0, 0, 0))] * 3, "`linear.x` is 0 in every message, as in a new one"),
-            ([twist((0, 0, 0))], "`linear.x` is 0 in it, as in a new one"),
-            ([twist((1.5, 0, 0))] * 3, "`linear.x` has this value in every message"),
-            ([twist((x, 0, 0)) for x in (2, 3, 4)], "message to message `linear.x` changes"),
+            ([twist((1.5, 0, 0))] * 3, "Look where the program sets `linear.x` before publish"),
         ],
     )
-    def test_the_hint_tells_what_was_observed(self, stream, hint):
-        times_s = every(0.3)[: len(stream)]
-        received = tuple(
-            message(t, v, sequence=n)
-            for n, (t, v) in enumerate(zip(times_s, stream, strict=True), 1)
-        )
-        assert hint in equal(recording(messages={"/cmd_vel": received})).hint
+    def test_the_hint_depends_on_whether_other_messages_are_right(self, values, hint):
+        assert hint in equal(stream(*values)).hint
 
     def test_expected_is_told_with_the_rest(self):
         assert equal(recording()).expected == (
@@ -353,17 +337,8 @@ class TestEqual:
         )
 
     def test_the_first_wrong_message_is_named(self):
-        good, bad = twist(), twist(linear=(2.0, 0, 0))
-        stream = [good] * 4 + [bad] * 2 + [good] * 6
-        run = recording(
-            messages={
-                "/cmd_vel": tuple(
-                    message(t, v, sequence=n)
-                    for n, (t, v) in enumerate(zip(every(0.3), stream, strict=True), 1)
-                )
-            }
-        )
-        finding = equal(run)
+        bad = twist(linear=(2.0, 0, 0))
+        finding = equal(stream(*[twist()] * 4, bad, bad, *[twist()] * 6))
         assert "message 5 of 12 has linear.x = 2.0 instead of 1.0" in finding.observed
         assert "(2 of 12 messages wrong)" in finding.observed
         assert finding.evidence.moments[0].time_s == pytest.approx(0.7 + 4 * 0.3)
@@ -394,31 +369,23 @@ class TestEqual:
             (twist((0, 0, 0), (0, 0, 0)), "every number in it is zero, as in a new message"),
         ],
     )
-    def test_slips(self, value, words):
+    def test_common_mistakes_are_named(self, value, words):
         assert words in unequal(value)
 
-    def test_one_that_nobody_filled_among_others_that_are_right(self):
-        stream = tuple(
-            message(t, twist((0, 0, 0), (0, 0, 0)) if n == 2 else twist(), sequence=n)
-            for n, t in enumerate(every(0.3), 1)
-        )
-        finding = equal(recording(messages={"/cmd_vel": stream}))
+    def test_one_that_was_not_filled_among_others_that_are_right(self):
+        finding = equal(stream(twist(), twist((0, 0, 0), (0, 0, 0)), *[twist()] * 10))
         assert "as in a new message, although others are right" in finding.observed
         assert "a second publish()" in finding.hint
         assert "(1 of 12 messages wrong)" in finding.observed
 
     def test_a_value_that_adds_up(self):
-        stream = tuple(
-            message(t, twist((float(n), 0, 0)), sequence=n) for n, t in enumerate(every(0.3), 1)
-        )
-        finding = equal(recording(messages={"/cmd_vel": stream}))
+        finding = equal(stream(*(twist((float(n), 0, 0)) for n in range(1, 12))))
         assert "linear.x grows from message to message" in finding.observed
 
     def test_the_rest_must_be_zero_unless_it_may_be_anything(self):
         value = twist((1.0, 0.1, 0))
         assert "linear.y = 0.1 instead of 0.0" in unequal(value)
-        run = recording(messages=messages(every(0.3), value))
-        assert equal(run, rest="any").status is Status.PASSED
+        assert equal(stream(value), rest="any").status is Status.PASSED
 
     @pytest.mark.parametrize(
         ("value", "words"),
@@ -475,10 +442,6 @@ class TestEqual:
 
     @given(st.integers(0, 11), st.floats(-10, 10).filter(lambda v: abs(v - 1.0) > 1e-6))
     def test_one_wrong_message_anywhere_is_found(self, index, wrong):
-        stream = [
-            message(t, twist((wrong if n == index else 1.0, 0, 0)), sequence=n + 1)
-            for n, t in enumerate(every(0.3))
-        ]
-        finding = equal(recording(messages={"/cmd_vel": tuple(stream)}))
+        finding = equal(stream(*(twist((wrong if n == index else 1.0, 0, 0)) for n in range(12))))
         assert finding.status is Status.FAILED
         assert f"message {index + 1} of 12" in finding.observed

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
-from tests.checks.builder import failing, judge, message, recording, silent
+from tests.checks.builder import failing, judge, message, recording
 
 INT = "std_msgs/msg/Int64"
 
@@ -50,8 +50,6 @@ def test_a_message_that_was_lost_on_its_way_leaves_its_place_out():
         ((0, 1, 2, 0, 1), {"step": 1}, "it begins anew with message 4"),
         ((0, 1, 1, 2, 3), {"step": 1}, "message 3 repeats the value before it"),
         ((0, 0, 1, 1, 2, 2), {"step": 1}, "message 2 repeats the value before it"),
-        ((0, 0, 1, 0, 0, 1), {"step": 1}, "it begins anew with message 2"),
-        ((3, 2, 1), {"values": [1, 2, 3]}, "the right values, but in another order"),
         ((1, 2, 4), {"values": [1, 2, 3]}, "4 instead of 3 in message 3 of 3"),
         (("a", "c"), {"values": ["a", "b"]}, "'c' instead of 'b' in message 2 of 2"),
     ],
@@ -66,13 +64,6 @@ def test_a_list_of_values():
     assert judge("messages.sequence", run, **wanted).status is Status.PASSED
     assert "3 messages" in failing(
         "messages.sequence", run, **sequence(values=["red", "green", "red", "blue"])
-    )
-
-
-def test_silence_is_told_as_such():
-    assert (
-        "no message on `/cmd_vel`" in failing("messages.sequence", silent(), **sequence(step=1))
-        or True
     )
 
 

@@ -13,7 +13,7 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import first_seen
-from grader.checks.messages.messages import published
+from grader.measure.numbering import published
 from grader.checks.need import Published, Recorded
 from grader.checks.wording import code, counted, listing
 from grader.diagnosis.cause import Cause

@@ -1,20 +1,108 @@
-"""Messages that should be made of other messages, each with those that it may be made of."""
+"""Messages whose values come from another topic, each with the sources that it may be made of."""
 
 from __future__ import annotations
 
 import math
+import re
 from bisect import bisect_left, bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
+from typing import Annotated, Any
 
-from grader.checks.field import number_at, value_at
-from grader.checks.messages.source_value import SourceValue
-from grader.checks.value import NoSuchField
+from pydantic import AfterValidator, TypeAdapter
+
+from grader.checks.field import FieldPath, number_at, value_at
+from grader.checks.value import NoSuchField, leaves
+from grader.measure.numbering import lost
 from grader.recording.model import NS, Message, Recording
 
-# rmw gives the largest number where it does not know a sequence number.
-_SEQUENCE_LIMIT = 2**62
+_YAW = re.compile(r"yaw\((?P<path>.*)\)")
+_PATH: TypeAdapter[str] = TypeAdapter(FieldPath)
+_QUATERNION = ("x", "y", "z", "w")
+
+
+@dataclass(frozen=True)
+class SourceValue:
+    """A number that follows from a message: one of its fields, or the yaw of a quaternion.
+
+    Attributes:
+        is_yaw: Whether it is the yaw of the quaternion at ``path``, in radians.
+    """
+
+    text: str
+    path: str
+    is_yaw: bool
+
+    @classmethod
+    def of(cls, text: str) -> SourceValue:
+        """Read ``twist.twist.linear.x`` or ``yaw(pose.pose.orientation)``."""
+        match = _YAW.fullmatch(text)
+        return cls(text, _PATH.validate_python(match["path"] if match else text), match is not None)
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The fields that hold its numbers."""
+        return tuple(f"{self.path}.{part}" for part in _QUATERNION) if self.is_yaw else (self.path,)
+
+    def number(self, message: Mapping[str, Any]) -> float:
+        """The number that follows from a message."""
+        if self.is_yaw:
+            return yaw(*(number_at(message, path) for path in self.paths))
+        return number_at(message, self.path)
+
+    def error(self, observed: float, wanted: float) -> float:
+        """How far a number is off; of angles the difference on the circle."""
+        difference = observed - wanted
+        if self.is_yaw and math.isfinite(difference):
+            return math.remainder(difference, math.tau)
+        return difference
+
+    def mistakes(self, message: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+        """What students take instead: words that end the sentence "it is ...", and the number.
+
+        The words of all messages of a type are the same, in the same order, as far as their
+        arrays have the same length.
+        """
+        right = self.number(message)
+        if self.is_yaw:
+            x, y, z, w = (number_at(message, path) for path in self.paths)
+            for part, number in zip(_QUATERNION, (x, y, z, w), strict=True):
+                yield (
+                    f"`{part}` of the quaternion, which is no angle: convert the quaternion",
+                    number,
+                )
+            yield "the yaw in degrees: ROS has angles in radians (REP-103)", math.degrees(right)
+            yield "the yaw with the wrong sign", -right
+            yield "half of the yaw: atan2(z, w) is half of the angle", math.atan2(z, w)
+            turn = 2.0 * math.acos(max(-1.0, min(1.0, w)))
+            yield "2 acos(w), which has lost the sign of the yaw", turn
+            turn = 2.0 * math.asin(max(-1.0, min(1.0, z)))
+            yield "2 asin(z), which is wrong where w is negative: math.atan2 knows both", turn
+            turn = math.atan(math.tan(right))
+            yield "the yaw without its quadrant: math.atan2(a, b), not math.atan(a / b)", turn
+        else:
+            yield f"`{self.path}` with the wrong sign", -right
+            yield f"`{self.path}` without its sign, as of math.hypot() or abs()", abs(right)
+        for path, number in leaves(message).items():
+            if path != self.path and isinstance(number, int | float):
+                yield f"`{path}`", float(number)
+
+
+def _readable(text: str) -> str:
+    SourceValue.of(text)
+    return text
+
+
+SourceText = Annotated[str, AfterValidator(_readable)]
+
+
+def yaw(x: float, y: float, z: float, w: float) -> float:
+    """Heading of a quaternion: its rotation about the fixed z axis, in [-pi, pi].
+
+    Source: REP-103, and the usual conversion to roll, pitch, yaw.
+    """
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 @dataclass(frozen=True)
@@ -23,7 +111,7 @@ class Sample:
 
     Attributes:
         number: Which message on its topic, from 1.
-        values: The numbers in its fields; NaN for one that is not there.
+        values: The numbers in its fields; NaN for an item that its array does not have.
         window: Indices of those sources; the last one is the newest that there was.
         excused: How many of them, the oldest, are right only by what the host took.
         is_known: Whether the recording has all of those sources. It may lack one that was lost
@@ -44,6 +132,7 @@ class DerivedMessages:
 
     Attributes:
         sources: The messages that they come from, oldest first; at least one.
+        table: The right numbers of each source, one for each field.
     """
 
     fields: tuple[str, ...]
@@ -75,8 +164,7 @@ class DerivedMessages:
         values = tuple(map(SourceValue.of, fields.values()))
         table = tuple(tuple(one.number(item.value) for one in values) for item in sources)
         stamps = [item.stamp_ns for item in sources]
-        # How many were lost before each.
-        lost = [0, *accumulate(_lost(before, after) for before, after in pairwise(sources))]
+        lost_before = [0, *accumulate(lost(a, b) for a, b in pairwise(sources))]
         within_ns = round(within_s * NS)
         samples = []
         for number, message in enumerate(messages, start=1):
@@ -88,7 +176,7 @@ class DerivedMessages:
             begin_ns = due_ns - round(recording.stolen_s(due_ns, message.stamp_ns) * NS)
             # Where the source is silent its newest values stay the right ones.
             first, due = (min(bisect_left(stamps, at), last - 1) for at in (begin_ns, due_ns))
-            is_known = last < len(sources) and lost[first] == lost[last]
+            is_known = last < len(sources) and lost_before[first] == lost_before[last]
             window = range(first, last)
             samples.append(Sample(number, message, numbers, window, due - first, is_known))
         return cls(tuple(fields), values, tolerance, sources, table, tuple(samples))
@@ -103,32 +191,15 @@ class DerivedMessages:
             fields: Indices of the fields to look at; by default all.
         """
         indices = range(len(self.fields)) if fields is None else fields
-        rows = sample.window if window is None else window
+        # NaN is never small enough.
         return any(
             all(
-                self.equal(index, sample.values[index], self.table[row][index]) for index in indices
+                abs(self.values[index].error(sample.values[index], self.table[row][index]))
+                <= self.tolerance
+                for index in indices
             )
-            for row in reversed(rows)
+            for row in reversed(sample.window if window is None else window)
         )
-
-    def equal(self, index: int, observed: float, wanted: float) -> bool:
-        """Whether a number is the wanted one; NaN never is."""
-        return abs(self.values[index].error(observed, wanted)) <= self.tolerance
-
-    def nearest(self, sample: Sample) -> int:
-        """The source in a message's window that its values are most like."""
-
-        def distance(row: int) -> float:
-            errors = (
-                abs(value.error(observed, wanted))
-                for value, observed, wanted in zip(
-                    self.values, sample.values, self.table[row], strict=True
-                )
-            )
-            total = sum(errors)
-            return total if math.isfinite(total) else math.inf
-
-        return min(reversed(sample.window), key=distance)
 
     def error(self, sample: Sample, index: int) -> float:
         """How far the value of one field is off, at best."""
@@ -140,29 +211,10 @@ class DerivedMessages:
 
 
 def _number(message: Message, field: str) -> float:
-    """The number in a field; NaN for an item that an array of the student's does not have.
-
-    Raises:
-        NoSuchField: The type has no such field, or it holds no number.
-    """
     try:
         return number_at(message.value, field)
     except NoSuchField:
         array = field.rpartition("[")[0]
-        if array and _is_short(message, array):
+        if array and isinstance(value_at(message.value, array), Sequence):
             return math.nan
         raise
-
-
-def _is_short(message: Message, array: str) -> bool:
-    try:
-        return isinstance(value_at(message.value, array), Sequence)
-    except NoSuchField:
-        return False
-
-
-def _lost(before: Message, after: Message) -> int:
-    """How many messages the writer's numbers miss between two."""
-    if not 0 < before.sequence < after.sequence < _SEQUENCE_LIMIT:
-        return 0
-    return after.sequence - before.sequence - 1

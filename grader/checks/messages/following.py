@@ -11,8 +11,12 @@ from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.checks.first_seen import endpoints_seen
-from grader.checks.messages.derived_messages import DerivedMessages, Sample
-from grader.checks.messages.source_value import SourceText, SourceValue, mistakes, spread
+from grader.checks.messages.derived_messages import (
+    DerivedMessages,
+    Sample,
+    SourceText,
+    SourceValue,
+)
 from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted, listing
@@ -24,14 +28,10 @@ from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
 # What varies by fewer tolerances cannot tell one value from another.
-_TELLING = 4.0
+_CONCLUSIVE = 4.0
 _MOST_EXPLAINED = 100
 # Share of the messages for which an explanation must hold.
 _NEARLY_ALL = 0.9
-_NOT_FINITE = "not a finite number"
-_NOT_THERE = "not a finite number, or not there at all: the array is too short"
-_NEVER_SET = "always 0, as one that is never set"
-_ALWAYS_THE_SAME = "always the same"
 
 
 class Follows(Parameters):
@@ -96,8 +96,9 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         )
     except NoSuchField as error:
         return Finding.error(expected, f"the assignment expects what does not exist: {error}")
-    if not _is_conclusive(derived.table, parameters.tolerance):
-        return _untold(recording, parameters, expected)
+    columns = zip(*derived.table, strict=True)
+    if not all(_spread(column) > _CONCLUSIVE * parameters.tolerance for column in columns):
+        return _inconclusive(recording, parameters, expected)
     judged, wrong = _judged(recording, parameters, derived)
     if len(judged) < parameters.at_least:
         if len(messages) < parameters.at_least:
@@ -108,9 +109,8 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
             f"on {source}",
             f"Publish from the callback of {source}, or from a timer that goes on.",
             Evidence(
-                moments=tuple(
-                    Moment("the last message", recording.since_launch_s(item.stamp_ns))
-                    for item in messages[-1:]
+                moments=(
+                    Moment("the last message", recording.since_launch_s(messages[-1].stamp_ns)),
                 )
             ),
         )
@@ -145,27 +145,23 @@ def _judged(
     return judged, [sample for sample in judged if not fits[sample.number]]
 
 
-def _is_conclusive(table: Sequence[tuple[float, ...]], tolerance: float) -> bool:
-    """Whether the values of every field vary, so that a wrong one shows."""
-    return all(spread(column) > _TELLING * tolerance for column in zip(*table, strict=True))
+def _spread(numbers: Sequence[float]) -> float:
+    return max(numbers) - min(numbers)
 
 
-def _untold(recording: Recording, parameters: Follows, expected: str) -> Finding:
-    scene = recording.scene
-    if scene is not None and recording.student_endpoints(Kind.PUBLISHER, scene.command_topic):
-        return Finding.failed(
-            expected,
-            f"the node publishes on {code(scene.command_topic)} itself and keeps the robot from "
-            f"moving as it should, so that nothing can be followed on {code(parameters.source)}",
-            f"Remove the publisher on {code(scene.command_topic)}: this node only listens.",
-            Evidence(
-                moments=endpoints_seen(
-                    recording, recording.student_endpoints(Kind.PUBLISHER, scene.command_topic)
-                )
-            ),
-        )
-    return Finding.error(
-        expected, f"the values on {code(parameters.source)} hardly change, so it cannot be judged"
+def _inconclusive(recording: Recording, parameters: Follows, expected: str) -> Finding:
+    """The finding where the source hardly changes: so a wrong value would not show."""
+    scene, source = recording.scene, code(parameters.source)
+    own = recording.student_endpoints(Kind.PUBLISHER, scene.command_topic) if scene else ()
+    if scene is None or not own:
+        return Finding.error(expected, f"the values on {source} hardly change: it cannot be judged")
+    command = code(scene.command_topic)
+    return Finding.failed(
+        expected,
+        f"the node publishes on {command} itself and keeps the robot from moving as it should, so "
+        f"that nothing can be followed on {source}",
+        f"Remove the publisher on {command}: this node only listens.",
+        Evidence(moments=endpoints_seen(recording, own)),
     )
 
 
@@ -177,16 +173,16 @@ def _failure(
     wrong: Sequence[Sample],
     expected: str,
 ) -> Finding:
-    first = wrong[len(wrong) // 2] if len(wrong) > 2 else wrong[0]
-    told = wrong[:: max(1, len(wrong) // _MOST_EXPLAINED)]
+    first = wrong[len(wrong) // 2]
+    newest = derived.table[first.window[-1]]
+    some = wrong[:: max(1, len(wrong) // _MOST_EXPLAINED)]
     seen = judged[:: max(1, len(judged) // _MOST_EXPLAINED)]
     bad = [
         index
         for index in range(len(derived.fields))
-        if any(not derived.fits(sample, fields=[index]) for sample in told)
+        if any(not derived.fits(sample, fields=[index]) for sample in some)
     ]
-    row = derived.nearest(first)
-    late_s = _lag_s(derived, told)
+    late_s = _lag_s(derived, some)
     if late_s is not None:
         observed = (
             f"the values are those of {code(parameters.source)} {format_duration(late_s)} earlier"
@@ -199,15 +195,19 @@ def _failure(
         observed = f"the values are of different moments of {code(parameters.source)}"
         hint = "Fill all fields from one message: `msg` of the callback."
     else:
-        observed = _wrong_fields(derived, first, row, bad, _explanation(derived, seen, told, bad))
+        observed = listing(
+            f"{code(derived.fields[index])} = {first.values[index]:.4g} instead of "
+            f"{newest[index]:.4g}{_explanation(derived, seen, some, index)}"
+            for index in bad
+        )
         hint = (
             f"Set {codes(derived.fields[index] for index in bad)} in the callback of "
             f"{code(parameters.source)}, from {codes(derived.values[index].text for index in bad)} "
             "of its message."
         )
     rows = tuple(
-        (field, f"{derived.table[row][index]:.6g}", f"{first.values[index]:.6g}")
-        for index, field in enumerate(derived.fields)
+        (field, f"{wanted:.6g}", f"{value:.6g}")
+        for field, wanted, value in zip(derived.fields, newest, first.values, strict=True)
     )
     label = f"message {first.number}"
     moment = Moment(f"{label} is wrong", recording.since_launch_s(first.message.stamp_ns))
@@ -224,88 +224,57 @@ def _failure(
     )
 
 
-def _wrong_fields(
-    derived: DerivedMessages, sample: Sample, row: int, bad: Sequence[int], why: Mapping[int, str]
-) -> str:
-    """The wrong fields of a message, with what stands in each."""
-    fields = [
-        f"{code(derived.fields[index])} = {sample.values[index]:.4g} instead of "
-        f"{derived.table[row][index]:.4g}"
-        for index in bad
-    ]
-    if len(bad) > 1 and all(why.get(index) in (_NEVER_SET, _ALWAYS_THE_SAME) for index in bad):
-        return f"{listing(fields)}: they never change"
-    return listing(
-        f"{field}: it is {why[index]}" if index in why else field
-        for field, index in zip(fields, bad, strict=True)
-    )
-
-
 def _lag_s(derived: DerivedMessages, wrong: Sequence[Sample]) -> float | None:
     """How old the values are, if all wrong messages have those of an older source."""
     ages = []
     for sample in wrong:
-        older = range(sample.window[0])
-        row = next((r for r in reversed(older) if derived.fits(sample, range(r, r + 1))), None)
+        older = reversed(range(sample.window[0]))
+        row = next((row for row in older if derived.fits(sample, range(row, row + 1))), None)
         if row is None:
             return None
         ages.append((sample.message.stamp_ns - derived.sources[row].stamp_ns) / NS)
-    still = spread([sample.values[0] for sample in wrong]) <= derived.tolerance
+    still = _spread([sample.values[0] for sample in wrong]) <= derived.tolerance
     # A value that never changes is old as well, but that says less.
     return None if still and len(wrong) > 1 else sorted(ages)[len(ages) // 2]
 
 
 def _explanation(
-    derived: DerivedMessages, seen: Sequence[Sample], wrong: Sequence[Sample], bad: Sequence[int]
-) -> dict[int, str]:
-    """What stands in the wrong fields, as far as the data tells."""
-    found = {}
-    for index in bad:
-        numbers = [sample.values[index] for sample in seen]
-        if any(not math.isfinite(number) for number in numbers):
-            found[index] = _NOT_THERE if "[" in derived.fields[index] else _NOT_FINITE
-        elif len(numbers) > 1 and spread(numbers) <= 0.0:
-            found[index] = _ALWAYS_THE_SAME if numbers[0] else _NEVER_SET
-        else:
-            off = [sample for sample in wrong if not derived.fits(sample, fields=[index])]
-            words = _mistaken(derived, seen, off, index)
-            if words:
-                found[index] = words
-    return found
-
-
-def _mistaken(
     derived: DerivedMessages, seen: Sequence[Sample], wrong: Sequence[Sample], index: int
-) -> str | None:
-    """What stands in a field: in nearly all messages, and in nearly all of those that are wrong.
+) -> str:
+    """What stands in a wrong field, as a clause; empty where the messages do not tell.
 
-    Of a number that is not negative, what has lost its sign is right as well, and says nothing of
-    the few that are wrong.
+    It must be in nearly all messages, and in nearly all of those in which the field is wrong: of a
+    number that is not negative, what has lost its sign is right as well.
     """
-    value = derived.values[index]
+    numbers = [sample.values[index] for sample in seen]
+    if not all(map(math.isfinite, numbers)):
+        short = ", or not there at all: the array is too short"
+        return f": it is not a finite number{short if '[' in derived.fields[index] else ''}"
+    if len(numbers) > 1 and _spread(numbers) <= 0.0:
+        return ": it is always the same" if numbers[0] else ": it is always 0, and perhaps not set"
+    wrong = [sample for sample in wrong if not derived.fits(sample, fields=[index])]
     rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
-    taken = {row: list(mistakes(value, derived.sources[row].value)) for row in rows}
-    for number, (words, _) in enumerate(taken[rows[0]]):
-        # Of an array in the source, not every message need have as many elements.
-        if any(len(entries) <= number for entries in taken.values()):
-            break
-        series = {row: entries[number][1] for row, entries in taken.items()}
-        if not spread(list(series.values())) > derived.tolerance:
-            continue
-        if all(_hits(samples, index, series, derived.tolerance) for samples in (seen, wrong)):
-            return words
-    return None
+    mistakes = [list(derived.values[index].mistakes(derived.sources[row].value)) for row in rows]
+    # Arrays of the sources may have other lengths, which come last: those are left out.
+    for same_mistake in zip(*mistakes, strict=False):
+        series = {row: number for row, (_, number) in zip(rows, same_mistake, strict=True)}
+        if _spread(tuple(series.values())) > derived.tolerance and all(
+            _share(samples, index, series, derived.tolerance) >= _NEARLY_ALL
+            for samples in (seen, wrong)
+        ):
+            return f": it is {same_mistake[0][0]}"
+    return ""
 
 
-def _hits(
+def _share(
     samples: Sequence[Sample], index: int, series: Mapping[int, float], tolerance: float
-) -> bool:
-    """Whether a field of nearly all of these holds what follows from a source."""
+) -> float:
+    """Share of the messages in which a field holds one of the numbers of a mistake."""
     hits = sum(
         any(abs(sample.values[index] - series[row]) <= tolerance for row in sample.window)
         for sample in samples
     )
-    return hits >= _NEARLY_ALL * len(samples)
+    return hits / len(samples)
 
 
 def _plot(

@@ -8,8 +8,8 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.fields import FieldTolerance, toleranced
-from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.fields import FieldTolerance, difference_table, toleranced, words
+from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.need import Published, Recorded
 from grader.checks.value import (
     EXACT,
@@ -27,16 +27,11 @@ from grader.diagnosis.explanation import explain
 from grader.diagnosis.few_messages import why_few
 from grader.diagnosis.no_messages import why_silent, why_unreadable
 from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
+from grader.measure.numbering import published
 from grader.recording.model import Kind, Message, Recording
 from grader.spec.name import TopicName
 
 _MOST_FIELDS = 8
-_ANSWER_HINT = (
-    "Publish once in each call of the callback. Look for a second publish(), and for one that "
-    "sends an answer again, such as that to the message before."
-)
-# rmw gives the largest number where it does not know a sequence number.
-_SEQUENCE_LIMIT = 2**62
 
 
 class Count(Parameters):
@@ -116,40 +111,28 @@ def count(recording: Recording, parameters: Count) -> Finding:
     number = published(everything) - early
     if number < low * each:
         return why_few(recording, parameters.topic, low * each + early).finding(expected)
-    moments = tuple(
-        Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
-        for index, message in enumerate(messages[:10], start=1)
+    evidence = Evidence(
+        moments=tuple(
+            Moment(f"message {index}", recording.since_launch_s(message.stamp_ns))
+            for index, message in enumerate(messages[:10], start=1)
+        )
     )
     lost = number - len(messages)
     observed = counted(number, "message") + (f" ({lost} of them lost on the way)" if lost else "")
     observed += per
-    if high is not None and number > high * each:
-        hint = _ANSWER_HINT if per else _many_hint(high)
-        why = _why_many(recording, parameters.topic)
-        return Finding.failed(expected, observed + why, hint, Evidence(moments=moments))
-    return Finding.passed(expected, observed, Evidence(moments=moments))
-
-
-def published(messages: tuple[Message, ...]) -> int:
-    """How many messages were published: those received, or what the writer's numbers tell."""
-    numbers = [message.sequence for message in messages if 0 < message.sequence < _SEQUENCE_LIMIT]
-    return max([len(messages), *numbers])
-
-
-def _why_many(recording: Recording, topic: str) -> str:
-    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
+    if high is None or number <= high * each:
+        return Finding.passed(expected, observed, evidence)
+    publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
     if len(publishers) > 1:
-        nodes = sorted({item.node for item in publishers})
-        return f" from {len(publishers)} publishers (in {codes(nodes)})"
-    if recording.student_endpoints(Kind.SUBSCRIPTION, topic):
-        return "; the node subscribes to the topic too, so it may answer its own messages"
-    return ""
-
-
-def _many_hint(high: int) -> str:
-    if high == 1:
-        return "Publish once, in the constructor, and call no timer and no second publish."
-    return "Look for a second timer, a second publish() or a loop around it."
+        nodes = codes(sorted({item.node for item in publishers}))
+        observed += f" from {len(publishers)} publishers (in {nodes})"
+    if per:
+        hint = "Publish once in each call of the callback: look for a second publish()."
+    elif high == 1:
+        hint = "Publish once, in the constructor, and call no timer and no second publish."
+    else:
+        hint = "Look for a second timer, a second publish() or a loop around it."
+    return Finding.failed(expected, observed, hint, evidence)
 
 
 class Equal(Parameters):
@@ -173,6 +156,23 @@ class Equal(Parameters):
         """The expected fields."""
         return toleranced("value", self.topic, self.value, self.tolerance)
 
+    @property
+    def words(self) -> str:
+        """What is expected, in words."""
+        rest = ", all else 0" if self.rest == "zero" else ""
+        enough = f", {self.at_least} or more" if self.at_least > 1 else ""
+        return (
+            f"{words(self.value)}{rest}{_within(self.tolerance)} in every message on "
+            f"{code(self.topic)}{enough}"
+        )
+
+
+def _within(tolerance: Tolerance) -> str:
+    if not isinstance(tolerance, Mapping):
+        return "" if tolerance <= 1e-6 else f" (within {tolerance:g})"
+    parts = (f"{path} within {amount:g}" for path, amount in tolerance.items())
+    return f" ({', '.join(parts)})" if tolerance else ""
+
 
 @check("messages.equal", Subject.RECORDING, Equal)
 def equal(recording: Recording, parameters: Equal) -> Finding:
@@ -182,7 +182,7 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
     written as an integer.
     """
     messages = recording.on(parameters.topic)
-    expected = _expected_words(parameters)
+    expected = parameters.words
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
     unreadable = why_unreadable(recording, parameters.topic)
@@ -194,134 +194,70 @@ def equal(recording: Recording, parameters: Equal) -> Finding:
         return Finding.error(
             expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
         )
-    wrong = {
-        index: found
-        for index, message in enumerate(messages, start=1)
-        if (
-            found := differences(
-                wanted,
-                message.value,
-                rest_zero=parameters.rest == "zero",
-                tolerance=parameters.tolerance,
-            )
-        )
-    }
-    if wrong:
-        return _wrong(recording, parameters, expected, wrong)
+    rest_zero = parameters.rest == "zero"
+    found = [
+        differences(wanted, item.value, rest_zero=rest_zero, tolerance=parameters.tolerance)
+        for item in messages
+    ]
+    if any(found):
+        return _wrong(recording, parameters, found)
     if len(messages) < parameters.at_least:
         return why_few(recording, parameters.topic, parameters.at_least).finding(expected)
     return Finding.passed(expected, f"all of {counted(len(messages), 'message')}")
 
 
-def _expected_words(parameters: Equal) -> str:
-    fields = ", ".join(f"{path} = {value_text(item)}" for path, item in _plain(parameters.value))
-    rest = ", all else 0" if parameters.rest == "zero" else ""
-    within = _within(parameters.tolerance)
-    enough = f", {parameters.at_least} or more" if parameters.at_least > 1 else ""
-    return f"{fields}{rest}{within} in every message on {code(parameters.topic)}{enough}"
-
-
-def _within(tolerance: Tolerance) -> str:
-    if not isinstance(tolerance, Mapping):
-        return "" if tolerance <= 1e-6 else f" (within {tolerance:g})"
-    parts = (f"{path} within {amount:g}" for path, amount in tolerance.items())
-    return f" ({', '.join(parts)})" if tolerance else ""
-
-
-def _plain(value: dict[str, Any], path: str = "") -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
-    for key, item in value.items():
-        name = f"{path}.{key}" if path else key
-        found.extend(_plain(item, name) if isinstance(item, dict) else [(name, item)])
-    return found
-
-
 def _wrong(
-    recording: Recording,
-    parameters: Equal,
-    expected: str,
-    wrong: dict[int, tuple[Difference, ...]],
+    recording: Recording, parameters: Equal, by_message: list[tuple[Difference, ...]]
 ) -> Finding:
+    """The finding of messages of which some have differences."""
     messages = recording.on(parameters.topic)
-    first = min(wrong)
-    found, message = wrong[first], messages[first - 1]
-    fields = ", ".join(
+    wrong = sum(map(bool, by_message))
+    first, found = next(item for item in enumerate(by_message, start=1) if item[1])
+    observed = f"message {first} of {len(messages)} has " + ", ".join(
         f"{item.field} = {value_text(item.observed)} instead of {value_text(item.expected)}"
         for item in found[:_MOST_FIELDS]
     )
     more = len(found) - _MOST_FIELDS
-    explanation = _explanation(parameters, messages, wrong, first)
-    observed = f"message {first} of {len(messages)} has {fields}"
     observed += f" and {counted(more, 'more wrong field')}" if more > 0 else ""
+    explanation = _explanation(parameters, messages, found, messages[first - 1], wrong)
     observed += f": {explanation}" if explanation else ""
     if len(messages) > 1:
-        observed += f" ({len(wrong)} of {counted(len(messages), 'message')} wrong)"
-    rows = tuple(
-        (item.field, value_text(item.expected), value_text(item.observed)) for item in found[:50]
-    )
+        observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
+    when_s = recording.since_launch_s(messages[first - 1].stamp_ns)
     return Finding.failed(
-        expected,
+        parameters.words,
         observed,
-        _hint(messages, wrong, first),
+        _hint(found, len(messages), len(messages) - wrong),
         Evidence(
-            moments=(
-                Moment(f"message {first} is wrong", recording.since_launch_s(message.stamp_ns)),
-            ),
-            tables=(Table(f"Message {first}", ("field", "expected", "observed"), rows),),
+            moments=(Moment(f"message {first} is wrong", when_s),),
+            tables=(difference_table(f"Message {first}", found),),
         ),
     )
 
 
-def _hint(
-    messages: tuple[Message, ...], wrong: dict[int, tuple[Difference, ...]], first: int
-) -> str:
-    """What to try, by what was observed of the fields that are wrong in the first such message."""
-    found = wrong[first]
+def _hint(found: tuple[Difference, ...], number: int, right: int) -> str:
     if any(was_integer(item.observed) for item in found):
         return "A number in a message must be a float: write 1.0 instead of 1, or float(value)."
-    right = len(messages) - len(wrong)
     if right:
         return (
-            f"{counted(right, 'message')} of {len(messages)} {'is' if right == 1 else 'are'} "
-            "right. Look for what makes the others different: a counter, a condition, what is "
-            "added up, or a second publish()."
+            f"{counted(right, 'message')} of {number} {'is' if right == 1 else 'are'} right. Look "
+            "for what makes the others different: a counter, a condition, what is added up, or a "
+            "second publish()."
         )
-    every = "in every message" if len(messages) > 1 else "in it"
-    values = [leaves(message.value) for message in messages]
-    unset = [
-        item.field
-        for item in found
-        if item.expected and all(not each.get(item.field, True) for each in values)
-    ]
-    if unset:
-        return (
-            f"{codes(unset[:_MOST_FIELDS])} {'is' if len(unset) == 1 else 'are'} 0 {every}, as in "
-            "a new one: look where the program sets the fields before publish(msg), and to what."
-        )
-    which = codes([item.field for item in found[:_MOST_FIELDS]])
-    if all(len({str(each.get(item.field)) for each in values}) == 1 for item in found):
-        these, them = ("has this value", "it") if len(found) == 1 else ("have these values", "them")
-        return f"{which} {these} {every}: look where the program sets {them} before publish(msg)."
-    return (
-        f"From message to message {which} {'changes' if len(found) == 1 else 'change'}, and "
-        "every message must be right: look for a counter, and for what is added up."
-    )
+    fields = codes([item.field for item in found[:_MOST_FIELDS]])
+    return f"Look where the program sets {fields} before publish(msg), and to what."
 
 
 def _explanation(
     parameters: Equal,
     messages: tuple[Message, ...],
-    wrong: dict[int, tuple[Difference, ...]],
-    first: int,
+    found: tuple[Difference, ...],
+    message: Message,
+    wrong: int,
 ) -> str:
-    found = wrong[first]
-    series = [leaves(message.value).get(found[0].field) for message in messages]
-    if accumulates(found[0].expected, series):
-        return f"{found[0].field} grows from message to message, as if added up"
-    symptom = WrongValue(
-        found,
-        leaves(messages[first - 1].value),
-        tolerance_of(parameters.tolerance, found[0].field),
-        always=len(wrong) == len(messages),
-    )
-    return explain(symptom) or ""
+    field = found[0].field
+    if accumulates(found[0].expected, [leaves(item.value).get(field) for item in messages]):
+        return f"{field} grows from message to message, as if added up"
+    tolerance = tolerance_of(parameters.tolerance, field)
+    always = wrong == len(messages)
+    return explain(WrongValue(found, leaves(message.value), tolerance, always=always)) or ""

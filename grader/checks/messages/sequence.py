@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
 from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.field import FieldPath, value_at
+from grader.checks.field import FieldPath, number_at, value_at
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField, same
 from grader.checks.wording import code, counted, value_text
 from grader.diagnosis.few_messages import why_few
 from grader.diagnosis.no_messages import why_silent
-from grader.recording.model import Message, Recording
+from grader.measure.numbering import is_numbered
+from grader.recording.model import Recording
 from grader.spec.name import TopicName
 
-_SEQUENCE_LIMIT = 2**62
 _SHOWN = 12
 
 
@@ -70,14 +70,14 @@ class Series(Parameters):
     @property
     def words(self) -> str:
         """What is expected, in words."""
-        who = f"{code(self.field)} of the messages on {code(self.topic)}"
+        which = f"{code(self.field)} of the messages on {code(self.topic)}"
         if self.values:
-            listed = ", ".join(value_text(_plain(item)) for item in self.values[:_SHOWN])
+            listed = ", ".join(map(_text, self.values[:_SHOWN]))
             more = ", ..." if len(self.values) > _SHOWN else ""
-            return f"{who}: {listed}{more}, in this order"
-        begins = "" if self.start is None else f" from {value_text(_plain(self.start))} on"
-        verb = "counts" if self.step == 1 else f"grows by {value_text(_plain(self.step))}"
-        return f"{who} {verb}{begins}, message by message"
+            return f"{which}: {listed}{more}, in this order"
+        begins = "" if self.start is None else f" from {_text(self.start)} on"
+        verb = "counts" if self.step == 1 else f"grows by {_text(self.step)}"
+        return f"{which} {verb}{begins}, message by message"
 
 
 @check("messages.sequence", Subject.RECORDING, Series)
@@ -92,60 +92,44 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
     messages = recording.on(parameters.topic)
     if not messages:
         return why_silent(recording, parameters.topic).finding(expected)
+    read = value_at if parameters.values else number_at
     try:
-        found = [value_at(message.value, parameters.field) for message in messages]
+        found = [read(message.value, parameters.field) for message in messages]
     except NoSuchField as error:
         return Finding.error(
             expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
         )
-    places = _places(messages)
+    # Place of each message in all that its writer published, from 0.
+    places = list(range(len(messages)))
+    if is_numbered(messages):
+        places = [message.sequence - 1 for message in messages]
     wanted = _wanted(parameters, found, places)
     wrong = [
         index
         for index, value in enumerate(wanted)
-        if value is not None and not _same(value, found[index], parameters.tolerance)
+        if value is not None and not same(value, found[index], parameters.tolerance)
     ]
     if wrong:
         return _failed(recording, parameters, found, wanted, wrong[0])
     if len(messages) < parameters.needed:
         return why_few(recording, parameters.topic, parameters.needed).finding(expected)
-    if parameters.values and not any(place == len(parameters.values) - 1 for place in places):
+    if parameters.values and len(parameters.values) - 1 not in places:
         return Finding.to_repeat(
             expected, "the last of these messages was lost on its way to the probe"
         )
     return Finding.passed(
         expected,
-        f"{value_text(found[0])} to {value_text(found[-1])} in {counted(len(found), 'message')}",
+        f"{_text(found[0])} to {_text(found[-1])} in {counted(len(found), 'message')}",
     )
-
-
-def _places(messages: Sequence[Message]) -> list[int]:
-    """Place of each message in all that its writer wrote, from 0; by arrival if unnumbered."""
-    numbers = [message.sequence for message in messages]
-    growing = all(a < b for a, b in pairwise(numbers))
-    if growing and numbers[0] > 0 and numbers[-1] < _SEQUENCE_LIMIT:
-        return [number - 1 for number in numbers]
-    return list(range(len(messages)))
 
 
 def _wanted(parameters: Series, found: Sequence[Any], places: Sequence[int]) -> list[Any]:
     """The value that each message should have; None where any will do."""
-    if parameters.values:
+    if parameters.step is None:
         values = parameters.values
         return [values[place] if place < len(values) else None for place in places]
-    assert parameters.step is not None
-    if parameters.start is not None:
-        return [parameters.start + parameters.step * place for place in places]
-    base = found[0]
-    if isinstance(base, str) or not isinstance(base, int | float):
-        return [parameters.step] * len(found)
-    return [base + parameters.step * (place - places[0]) for place in places]
-
-
-def _same(wanted: Any, found: Any, tolerance: float) -> bool:
-    if isinstance(wanted, str) or isinstance(found, str):
-        return bool(wanted == found)
-    return same(wanted, found, tolerance)
+    start, begin = (found[0], places[0]) if parameters.start is None else (parameters.start, 0)
+    return [start + parameters.step * (place - begin) for place in places]
 
 
 def _failed(
@@ -156,36 +140,29 @@ def _failed(
     first: int,
 ) -> Finding:
     message = recording.on(parameters.topic)[first]
-    words, hint = _explanation(parameters, found, wanted)
+    why, hint = _explanation(parameters, found)
     rows = tuple(
-        (str(index + 1), value_text(_plain(want)) if want is not None else "any", value_text(have))
-        for index, (want, have) in enumerate(zip(wanted, found, strict=True))
+        (str(number), "any" if want is None else _text(want), _text(have))
+        for number, (want, have) in enumerate(zip(wanted, found, strict=True), start=1)
     )
+    title = f"{parameters.field} of {parameters.topic}"
+    moment = Moment(f"message {first + 1} is wrong", recording.since_launch_s(message.stamp_ns))
     return Finding.failed(
         parameters.words,
-        f"{code(parameters.field)} is {value_text(found[first])} instead of "
-        f"{value_text(_plain(wanted[first]))} in message {first + 1} of {len(found)}{words}",
+        f"{code(parameters.field)} is {_text(found[first])} instead of {_text(wanted[first])} in "
+        f"message {first + 1} of {len(found)}{why}",
         hint,
         Evidence(
-            moments=(
-                Moment(f"message {first + 1} is wrong", recording.since_launch_s(message.stamp_ns)),
-            ),
-            tables=(
-                Table(
-                    f"{parameters.field} of {parameters.topic}",
-                    ("message", "expected", "observed"),
-                    rows[:50],
-                ),
-            ),
+            moments=(moment,),
+            tables=(Table(title, ("message", "expected", "observed"), rows[:50]),),
         ),
     )
 
 
-def _explanation(
-    parameters: Series, found: Sequence[Any], wanted: Sequence[Any]
-) -> tuple[str, str]:
-    if not all(isinstance(item, int | float) for item in found):
-        return _listed(found, wanted)
+def _explanation(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
+    """What the values tell, as a clause, and what to try."""
+    if parameters.step is None:
+        return "", "Publish the values that are asked for, each once and in this order."
     steps = [b - a for a, b in pairwise(found)]
     if steps and not any(steps):
         return (
@@ -193,61 +170,33 @@ def _explanation(
             "Keep the value in an attribute of the node, such as self.count, and change it in the "
             "timer's callback.",
         )
-    if parameters.step is None:
-        return _listed(found, wanted)
-    step = parameters.step
-    regular = bool(steps) and all(same(steps[0], item, parameters.tolerance) for item in steps)
-    if regular and same(step, steps[0], parameters.tolerance):
+    if steps and all(same(steps[0], item, parameters.tolerance) for item in steps):
+        if same(parameters.step, steps[0], parameters.tolerance):
+            return (
+                f": it begins with {_text(found[0])}",
+                "Set the first value in the node's constructor, and change it after publish(msg), "
+                "not before.",
+            )
         return (
-            f": it begins with {value_text(found[0])}",
-            "Set the first value in the node's constructor, and change it after publish(msg), not "
-            "before.",
-        )
-    if regular:
-        return (
-            f": it grows by {value_text(steps[0])} from message to message, not by "
-            f"{value_text(_plain(step))}",
+            f": it grows by {_text(steps[0])} from message to message, not by "
+            f"{_text(parameters.step)}",
             "Change the value once for every message, by what is asked for.",
         )
-    # Where a value only stands twice, what comes next is not begun anew.
-    once = [found[0], *(item for item, grown in zip(found[1:], steps, strict=True) if grown)]
-    if len(once) < len(found) and all(
-        same(b - a, step, parameters.tolerance) for a, b in pairwise(once)
-    ):
+    if found[0] in found[1:] and steps[0]:
         return (
-            f": message {steps.index(0) + 2} repeats the value before it",
-            "Publish once each time the value has changed: is publish(msg) there twice, or do two "
-            "timers or two publishers send it?",
-        )
-    again = [
-        index
-        for index, item in enumerate(found)
-        if index and same(found[0], item, parameters.tolerance)
-    ]
-    if again:
-        return (
-            f": it begins anew with message {again[0] + 1}",
+            f": it begins anew with message {found.index(found[0], 1) + 1}",
             "Is the value set back, does it overflow, or do two publishers count?",
         )
     if 0 in steps:
         return (
             f": message {steps.index(0) + 2} repeats the value before it",
-            "Publish once each time the value has changed.",
+            "Publish once each time the value has changed: is publish(msg) there twice, or do two "
+            "timers or two publishers send it?",
         )
     return "", "Change the value by the same step for every message."
 
 
-def _listed(found: Sequence[Any], wanted: Sequence[Any]) -> tuple[str, str]:
-    known = [item for item in wanted if item is not None]
-    if sorted(map(repr, map(_plain, known))) == sorted(map(repr, map(_plain, found))):
-        return ": the right values, but in another order", "Publish the values in the order asked."
-    return "", "Publish the values that are asked for, each once and in this order."
-
-
-def _plain(value: Any) -> Any:
-    """A whole number as people write it."""
-    if isinstance(value, float) and value.is_integer():
-        return int(value)
-    return (
-        {key: _plain(item) for key, item in value.items()} if isinstance(value, Mapping) else value
-    )
+def _text(value: Any) -> str:
+    """A value as people write it, whole numbers without a decimal point."""
+    is_whole = isinstance(value, float) and value.is_integer()
+    return value_text(int(value) if is_whole else value)

@@ -9,7 +9,6 @@ from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Table
-from grader.checks.messages.messages import published
 from grader.checks.need import Joined
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
@@ -18,6 +17,7 @@ from grader.diagnosis.few_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.measure import declarations
 from grader.measure.compatibility import compatibility_table, refusals
+from grader.measure.numbering import published
 from grader.recording.model import NS, Join, Kind, Message, Recording
 from grader.spec.name import Id, TopicName
 from grader.spec.unit import format_duration
