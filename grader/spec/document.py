@@ -8,6 +8,7 @@ true, 750, text and eight.)
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,6 @@ MAX_VALUES = 20_000
 MAX_DEPTH = 50
 
 _TAG = "tag:yaml.org,2002:"
-_SCALARS = ("null", "bool", "int", "float", "str")
 
 
 class _Loader(yaml.SafeLoader):
@@ -97,85 +97,63 @@ class _Reader:
         if len(place) > MAX_DEPTH:
             text = f"more than {MAX_DEPTH} levels deep (does an alias contain itself?)"
             raise AssignmentError(self.file, [Problem(text, line, path(place[:3]) + "…")])
-        if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
+        kind = node.tag.removeprefix(_TAG)
+        if isinstance(node, yaml.MappingNode) and kind == "map":
             return self._mapping(node, place)
-        if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
+        if isinstance(node, yaml.SequenceNode) and kind == "seq":
             return [self.value(item, (*place, i)) for i, item in enumerate(node.value)]
-        if isinstance(node, yaml.ScalarNode) and node.tag.removeprefix(_TAG) in _SCALARS:
-            return self._scalar(node, place)
-        tag = "!!" + node.tag.removeprefix(_TAG) if node.tag.startswith(_TAG) else node.tag
-        self.problems.append(Problem(f"the tag {tag} is not allowed here", line, path(place)))
+        if isinstance(node, yaml.ScalarNode) and kind in _SCALARS:
+            return self._scalar(node, kind, place)
+        tag = f"!!{kind}" if node.tag.startswith(_TAG) else node.tag
+        self._report(node, place, f"the tag {tag} is not allowed here")
         return None
 
     def _mapping(self, node: yaml.MappingNode, place: Place) -> dict[str, Any]:
         result: dict[str, Any] = {}
         for key_node, value_node in node.value:
-            line = key_node.start_mark.line + 1
             if not isinstance(key_node, yaml.ScalarNode):
-                self.problems.append(Problem("a key must be a plain word", line, path(place)))
+                self._report(key_node, place, "a key must be a plain word")
                 continue
-            key = key_node.value
-            if not _is_text(key):
-                self.problems.append(Problem("a key has half a character", line, path(place)))
-                continue
+            key = self._scalar(key_node, "str", place)
             if key == "<<":
                 text = "merging (<<) is not part of YAML 1.2: write the keys out"
-                self.problems.append(Problem(text, line, path(place)))
-                continue
-            if key in result:
+                self._report(key_node, place, text)
+            elif key in result:
                 first = self.lines[(*place, key)]
                 text = f"the key {key!r} stands twice (first in line {first})"
-                self.problems.append(Problem(text, line, path(place)))
-                continue
-            self.lines[(*place, key)] = line
-            result[key] = self.value(value_node, (*place, key))
+                self._report(key_node, place, text)
+            elif key is not None:
+                self.lines[(*place, key)] = key_node.start_mark.line + 1
+                result[key] = self.value(value_node, (*place, key))
         return result
 
-    def _scalar(self, node: yaml.ScalarNode, place: Place) -> Any:
-        kind = node.tag.removeprefix(_TAG)
+    def _scalar(self, node: yaml.ScalarNode, kind: str, place: Place) -> Any:
         try:
-            return _SCALAR_READERS[kind](node.value)
+            return _SCALARS[kind](node.value)
         except (ValueError, KeyError):
             shown = node.value.encode("ascii", "backslashreplace").decode()
             shown = shown if len(shown) <= 40 else f"{shown[:40]}…"
-            line = node.start_mark.line + 1
-            text = f"{shown!r} cannot be read as !!{kind}"
-            self.problems.append(Problem(text, line, path(place)))
+            self._report(node, place, f"{shown!r} cannot be read as !!{kind}")
             return None
 
-
-def _is_text(text: str) -> bool:
-    # YAML can write half of a surrogate pair, which no file or terminal can hold.
-    return not any("\ud800" <= character <= "\udfff" for character in text)
+    def _report(self, node: yaml.Node, place: Place, text: str) -> None:
+        self.problems.append(Problem(text, node.start_mark.line + 1, path(place)))
 
 
 def _string(text: str) -> str:
-    if not _is_text(text):
-        raise ValueError("half a character")
+    # YAML can write half of a surrogate pair, which no file or terminal can hold.
+    text.encode()
     return text
 
 
-def _integer(text: str) -> int:
-    base = {"0o": 8, "0x": 16}.get(text[:2], 10)
-    return int(text, base)
-
-
-def _floating(text: str) -> float:
-    lowered = text.lower()
-    if lowered.endswith(("inf", "nan")):
-        return float(lowered.replace(".", ""))
-    return float(text)
-
-
-_SCALAR_READERS: dict[str, Any] = {
+_SCALARS: dict[str, Callable[[str], Any]] = {
     "null": lambda _: None,
     "bool": lambda text: {"true": True, "false": False}[text.lower()],
-    "int": _integer,
-    "float": _floating,
+    "int": lambda text: int(text, {"0o": 8, "0x": 16}.get(text[:2], 10)),
+    "float": lambda text: float(re.sub(r"\.(?=inf|nan)", "", text.lower())),
     "str": _string,
 }
 
-_EMPTY_CONTEXT = "while scanning for the next token"
 _ADVICE = {
     "a quoted scalar, found unexpected end": "its closing quote is missing",
     "found character '\\t'": "indent with spaces, not with tabs",
@@ -183,17 +161,11 @@ _ADVICE = {
     "mapping values are not allowed here": "a text with ': ' in it needs quotes, and a key "
     "stands as far to the right as the keys beside it",
     "but found '<block mapping start>'": "is a line indented further than those around it?",
-    "but found '-'": "is a list indented less than the list before?",
-    "but got '['": "does a text with brackets or commas need quotes around it?",
-    "but found '<scalar>'": "does a text with quotes, brackets or commas need quotes around it?",
     "unknown escape character": "in double quotes a backslash begins an escape: write the text in "
     "single quotes, as in '\\d+'",
-    "undefined alias": "a text that begins with * needs quotes",
-    "but found ','": "something stands behind a closing quote or bracket",
-    "but got ':'": "is a comma or a closing bracket missing before it?",
-    "but got ']'": "the bracket that was opened is of another kind",
-    "but got '}'": "the bracket that was opened is of another kind",
-    "expected <block end>": "does this line stand as far to the right as those that it belongs to?",
+    "expected <block end>": "does this line stand as far to the right as those that it belongs to, "
+    "and is every quote before it closed?",
+    "while parsing a flow": "is a comma, a bracket or a quote missing?",
 }
 
 
@@ -205,43 +177,12 @@ def _syntax(error: yaml.YAMLError, text: str) -> Problem:
     message = str(error).splitlines()[0]
     line: int | None = None
     if isinstance(error, yaml.MarkedYAMLError):
-        context = error.context if error.context != _EMPTY_CONTEXT else None
+        context = error.context if error.context != "while scanning for the next token" else None
         message = ", ".join(filter(None, (context, error.problem)))
         # What was never closed is mended where it was opened.
         unclosed = "end of stream" in message or "<stream end>" in message
         marks = (error.problem_mark, error.context_mark)
         mark = next(filter(None, reversed(marks) if unclosed else marks), None)
         line = mark.line + 1 if mark else None
-    quoted = _long_quoted(text, line) if line is not None else None
-    if quoted is not None:
-        begin, end = quoted
-        return Problem(
-            f"not valid YAML: the text in quotes that begins here ends only in line {end}: is its "
-            f"closing quote missing? (line {line}: {message})",
-            begin,
-        )
     advice = next((advice for sign, advice in _ADVICE.items() if sign in message), "")
     return Problem(f"not valid YAML: {message}" + (f" ({advice})" if advice else ""), line)
-
-
-def _long_quoted(text: str, line: int) -> tuple[int, int] | None:
-    """First and last line of a text in quotes over several lines that ends where an error is.
-
-    A quote that is not closed lasts until the next one, wherever that is, and turns all quotes
-    after it inside out.
-    """
-    begin, end = 0, 0
-    try:
-        for token in yaml.scan(text, Loader=yaml.SafeLoader):
-            if token.start_mark.line >= line:
-                break
-            if not isinstance(token, yaml.ScalarToken) or token.style not in ("'", '"'):
-                continue
-            if token.start_mark.line == token.end_mark.line:
-                begin = 0
-            else:
-                begin, end = begin or token.start_mark.line + 1, token.end_mark.line + 1
-    except (yaml.YAMLError, ValueError, OverflowError):
-        # As far as it can be read is far enough; the last two are numbers of no character.
-        pass
-    return (begin, end) if begin and line - end in (0, 1) else None

@@ -1,12 +1,14 @@
 """Rules for names: ids of ours, Python's, and ROS's (REP-144, the ROS 2 topic name design).
 
 Sources: https://ros.org/reps/rep-0144.html,
-https://design.ros2.org/articles/topic_and_service_names.html
+https://design.ros2.org/articles/topic_and_service_names.html,
+https://packaging.python.org/en/latest/specifications/name-normalization/
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, WithJsonSchema
@@ -18,105 +20,55 @@ LIBRARY = r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?"
 INTERFACE = r"[a-z][a-z0-9_]*/(msg|srv|action)/[A-Z][A-Za-z0-9]*"
 
 
-def check_id(name: str) -> str:
-    """An id of ours: lower case letters, digits and underscores.
+def _rule(pattern: str, words: str) -> Callable[[str], str]:
+    """A validator that lets names of one form pass; its ValueError says what is expected."""
 
-    Raises:
-        ValueError: It is anything else.
-    """
-    if not re.fullmatch(ID, name):
-        raise ValueError(f"{name!r} is not an id: use lower case letters, digits and underscores")
-    return name
+    def check(name: str) -> str:
+        if not re.fullmatch(pattern, name):
+            raise ValueError(f"{name!r} is not {words}")
+        return name
+
+    return check
 
 
-def package_name(name: str) -> str:
-    """A package name (REP-144).
-
-    Raises:
-        ValueError: It is not one.
-    """
-    if not re.fullmatch(ID, name):
-        raise ValueError(
-            f"{name!r} is not a package name: lower case letters, digits and underscores, "
-            "beginning with a letter (REP-144)"
-        )
-    return name
+check_id = _rule(ID, "an id: use lower case letters, digits and underscores")
+package_name = _rule(
+    ID,
+    "a package name: lower case letters, digits and underscores, beginning with a letter (REP-144)",
+)
+node_name = _rule(NODE, "a node name: letters, digits and underscores, not beginning with a digit")
+library_name = _rule(
+    LIBRARY,
+    "the name of a Python library, such as 'scipy': letters, digits, '-', '_' and '.', without a "
+    "version",
+)
+_full_topic_name = _rule(rf"(?!.*__){TOPIC}", "a ROS topic name: letters, digits, '_' and '/'")
+_full_node_name = _rule(rf"(/{NODE})+", "a node name: letters, digits, '_' and '/'")
 
 
 def topic_name(name: str) -> str:
-    """A fully qualified topic or service name.
-
-    Raises:
-        ValueError: It is relative, or has characters that ROS does not allow.
-    """
+    """A fully qualified topic or service name."""
     if not name.startswith("/"):
         raise ValueError(f"{name!r} is relative: write the full name, '/{name}'")
-    if not re.fullmatch(TOPIC, name) or "__" in name:
-        raise ValueError(f"{name!r} is not a ROS topic name: letters, digits, '_' and '/'")
-    return name
-
-
-def node_name(name: str) -> str:
-    """A node name without its namespace.
-
-    Raises:
-        ValueError: It is not one.
-    """
-    if not re.fullmatch(NODE, name):
-        raise ValueError(
-            f"{name!r} is not a node name: letters, digits and underscores, not beginning "
-            "with a digit"
-        )
-    return name
+    return _full_topic_name(name)
 
 
 def qualified_node_name(name: str) -> str:
-    """A node name with its namespace: ``bot`` is ``/bot``.
-
-    Raises:
-        ValueError: It is not the name of a node.
-    """
-    full = name if name.startswith("/") else f"/{name}"
-    if not re.fullmatch(rf"(/{NODE})+", full):
-        raise ValueError(f"{name!r} is not a node name: letters, digits, '_' and '/'")
-    return full
+    """A node name with its namespace: ``bot`` is ``/bot``."""
+    return _full_node_name(name if name.startswith("/") else f"/{name}")
 
 
 def namespace(name: str) -> str:
-    """A namespace, which begins with a slash; ``/`` is the root.
-
-    Raises:
-        ValueError: It is relative, or has characters that ROS does not allow.
-    """
+    """A namespace, which begins with a slash; ``/`` is the root."""
     return name if name == "/" else topic_name(name)
 
 
 def interface_name(name: str) -> str:
-    """An interface name such as ``geometry_msgs/msg/Twist``.
-
-    Raises:
-        ValueError: It has another form.
-    """
+    """An interface name such as ``geometry_msgs/msg/Twist``."""
     if not re.fullmatch(INTERFACE, name):
         short = re.fullmatch(r"([a-z][a-z0-9_]*)/([A-Z][A-Za-z0-9]*)", name)
-        remedy = f" Did you mean '{short[1]}/msg/{short[2]}'?" if short else ""
-        raise ValueError(f"{name!r} is not an interface name (package/msg/Type).{remedy}")
-    return name
-
-
-def library_name(name: str) -> str:
-    """The name of a Python distribution, as pip knows it.
-
-    Source: https://packaging.python.org/en/latest/specifications/name-normalization/
-
-    Raises:
-        ValueError: It has another form, such as a module's with a dot, or a version.
-    """
-    if not re.fullmatch(LIBRARY, name):
-        raise ValueError(
-            f"{name!r} is not the name of a Python library, such as 'scipy': letters, digits, "
-            "'-', '_' and '.', without a version"
-        )
+        advice = f" Did you mean '{short[1]}/msg/{short[2]}'?" if short else ""
+        raise ValueError(f"{name!r} is not an interface name (package/msg/Type).{advice}")
     return name
 
 

@@ -68,19 +68,16 @@ class QuantityOf:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """Describe the quantity to an editor."""
-        units = UNITS[self.dimension]
-        ratio = self.dimension is Dimension.RATIO
-        forms: list[dict[str, Any]] = [
-            {"type": "string", "pattern": quantity_pattern(self.dimension)}
-        ]
-        if ratio:
+        pattern = quantity_pattern(self.dimension)
+        forms: list[dict[str, Any]] = [{"type": "string", "pattern": pattern}]
+        if self.dimension is Dimension.RATIO:
             forms.append({"type": "number", "exclusiveMinimum": -1, "exclusiveMaximum": 1})
         elif not self.exclusive:
             forms.append({"const": 0})
         phrase = self.dimension.phrase.capitalize()
         return {
             "anyOf": forms,
-            "description": f"{phrase} with its unit: {', '.join(units)}.",
+            "description": f"{phrase} with its unit: {', '.join(UNITS[self.dimension])}.",
             "x-dimension": self.dimension.value,
         }
 

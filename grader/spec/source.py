@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.spec.document import Place, parse_yaml, path
-from grader.spec.mistake import Mistake, mistakes
+from grader.spec.mistake import mistakes
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -66,9 +67,6 @@ class Source:
 
         Args:
             place: The part to read; a part that was not written down reads as empty.
-
-        Raises:
-            AssignmentError: With every problem that was found.
         """
         result, problems = self.examine(model, place)
         if result is None:
@@ -76,11 +74,7 @@ class Source:
         return result
 
     def examine(self, model: type[M], place: Place = ()) -> tuple[M | None, list[Problem]]:
-        """Validate like :meth:`read`, but hand the problems back.
-
-        Returns:
-            The model and no problem, or None and at least one.
-        """
+        """Validate like :meth:`read`: the model and no problem, or None and at least one."""
         # Strict in the way of JSON: a list is a tuple and a word is an enum's member, but true
         # is no number and '3' neither. By alias only: the name in Python is no key of the YAML.
         text = json.dumps(self._part(place))
@@ -88,7 +82,8 @@ class Source:
             return model.model_validate_json(text, strict=True, by_alias=True, by_name=False), []
         except ValidationError as error:
             found = mistakes(error, model, lambda step: (*place, *step) in self.lines)
-        return None, _sorted([self._problem(place, mistake) for mistake in found])
+        problems = [self.problem((*place, *inside), message) for inside, message in found]
+        return None, in_order(problems)
 
     def _part(self, place: Place) -> Any:
         data: Any = self.data
@@ -96,11 +91,9 @@ class Source:
             data = data[step] if place[:end] in self.lines else {}
         return data
 
-    def _problem(self, place: Place, mistake: Mistake) -> Problem:
-        return self.problem((*place, *mistake.place), mistake.message)
 
-
-def _sorted(problems: list[Problem]) -> list[Problem]:
+def in_order(problems: Iterable[Problem]) -> list[Problem]:
+    """Problems in the order of their lines, each once."""
     return sorted(dict.fromkeys(problems), key=lambda problem: problem.line or 0)
 
 
@@ -128,11 +121,7 @@ def read_source(file: Path) -> Source:
 
 
 def parse_source(text: str, file: Path) -> Source:
-    """Read YAML text; ``file`` is only named in errors.
-
-    Raises:
-        AssignmentError: As :func:`read_source`.
-    """
+    """Read YAML text; ``file`` is only named in errors."""
     data, lines = parse_yaml(text, file)
     if not isinstance(data, dict):
         raise AssignmentError(file, [Problem("expected keys and values at the top", 1)])
