@@ -37,7 +37,7 @@ def replay(
     from grader.batch.regrading import find, stored_assignment
     from grader.batch.type_support import TypeSupport
     from grader.errors import UsageError
-    from grader.grade.unrun import why_not_run
+    from grader.grade.judge import why_not_run
     from grader.recording.mcap_reader import read_recording
     from grader.run.replay import make_order, play
     from grader.submission.intake.locate import check_path

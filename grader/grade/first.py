@@ -1,45 +1,24 @@
-"""What the checks of a submission say together: is it graded, what should be mended first? Pure."""
+"""What the checks of a submission say together: is it graded, what should be mended first? Pure.
+
+Asked of a grade and of a result that was read from a file, whose parts have the same attributes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from typing import Protocol
+from typing import Any
 
 from grader.checks.finding import Status
 
 
-class _Place(Protocol):
-    """A line of the student's code with what is wrong there."""
-
-    @property
-    def file(self) -> str: ...
-    @property
-    def line(self) -> int | None: ...
-    @property
-    def message(self) -> str: ...
-
-
-class _Moment(Protocol):
-    """A time in a run."""
-
-    @property
-    def time_s(self) -> float: ...
-
-
-class _Evidence(Protocol):
-    """Where a finding can be seen."""
-
-    @property
-    def places(self) -> Sequence[_Place]: ...
-    @property
-    def moments(self) -> Sequence[_Moment]: ...
-
-
-def reason(check: str, scenario: str | None, observed: str, evidence: _Evidence) -> Hashable:
+def reason(check: str, scenario: str | None, observed: str, evidence: Any) -> Hashable:
     """Why a check failed: equal for those that name the same mistake.
 
     That is the same line of the student's code, in whichever run, or the same said of the same
     moment of a run. What names neither, or only a file, is a mistake of its own.
+
+    Args:
+        evidence: Has ``places`` in the student's code and ``moments`` of the run.
     """
     if evidence.places and all(one.line is not None for one in evidence.places):
         return tuple((one.file, one.line, one.message) for one in evidence.places)
@@ -61,6 +40,7 @@ def first_to_fix(
 
     Args:
         reasons: Why each check failed, in the author's order; for the same reason, equal.
+        waits: Of every check the failed ones that it waits for.
         without_points: Checks that are worth none.
 
     Returns:
@@ -75,20 +55,7 @@ def first_to_fix(
     return max((check for check in reasons if check not in shown), key=others, default=None)
 
 
-class _Judged(Protocol):
-    """How a check ended."""
-
-    @property
-    def id(self) -> str: ...
-    @property
-    def status(self) -> Status: ...
-    @property
-    def max_points(self) -> float: ...
-    @property
-    def waits_for(self) -> tuple[str, ...]: ...
-
-
-def every_point_judged(checks: Iterable[_Judged]) -> bool:
+def every_point_judged(checks: Iterable[Any]) -> bool:
     """Whether no check with points ended as an error, or waits for one that did."""
     checks = tuple(checks)
     errors = {check.id for check in checks if check.status is Status.ERROR}

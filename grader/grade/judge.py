@@ -8,8 +8,9 @@ for each scenario writes a check for each.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from graphlib import TopologicalSorter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +19,9 @@ from grader.checks.check import Subject
 from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Finding, Status
 from grader.checks.package.runtime_imports import with_runtime_imports
+from grader.diagnosis.not_built import why_lacking, why_not_built
 from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding
-from grader.grade.order import dependency_order
 from grader.grade.points import points_for
-from grader.grade.unrun import why_incomplete, why_not_run
 from grader.recording.model import Ending, Recording
 from grader.submission.record import SubmissionRecord
 
@@ -41,25 +41,23 @@ def grade(
     """Judge a submission.
 
     A check whose requirement did not pass is skipped, unless that failed by a wrong name which the
-    runs put right. A check that itself fails (an exception)
-    is an error of ours and keeps its traceback.
+    runs put right. A check that raises is an error of ours and keeps its traceback.
 
     Args:
         recordings: By scenario id; empty where nothing could be launched.
-
-    Raises:
-        ValueError: A requirement does not exist, or the requirements form a circle.
+        faults: By scenario id: why there is no recording.
     """
     bound = {item.spec.id: item for item in loaded.checks}
     known = with_runtime_imports(submission, recordings.values())
     results: dict[str, CheckResult] = {}
-    for name in dependency_order({name: item.spec.requires for name, item in bound.items()}):
+    requires = {name: item.spec.requires for name, item in bound.items()}
+    for name in TopologicalSorter(requires).static_order():
         roots = _roots(bound[name].spec, results)
-        findings = (
-            (_skipped([results[root] for root in roots]),)
-            if roots
-            else tuple(_findings(bound[name], loaded, known, recordings, faults))
-        )
+        findings: tuple[ScenarioFinding, ...]
+        if roots:
+            findings = (_skipped([results[root] for root in roots]),)
+        else:
+            findings = tuple(_findings(bound[name], loaded, known, recordings, faults))
         put_right = all(_is_put_right(item, recordings) for item in findings)
         results[name] = _result(bound[name], loaded, findings, roots, put_right=put_right)
     ordered = tuple(results[name] for name in bound)
@@ -87,10 +85,8 @@ def _result(
 ) -> CheckResult:
     spec = bound.spec
     status = min((item.finding.status for item in findings), key=SEVERITY.index)
-    credit = 0.0
-    if status is Status.PASSED:
-        credit = 1.0
-    elif status is Status.FAILED:
+    credit = 1.0 if status is Status.PASSED else 0.0
+    if status is Status.FAILED:
         credit = min(item.finding.credit for item in findings)
     return CheckResult(
         id=spec.id,
@@ -143,7 +139,7 @@ def _findings(
         if recording is None:
             lost = faults.get(scenario, f"there is no recording of the scenario {scenario!r}")
             launched, others = _launched(loaded, scenario), loaded.assignment.packages
-            finding = why_incomplete(submission, launched, "a run of what was handed in")
+            finding = _why_incomplete(submission, launched, "a run of what was handed in")
             finding = finding or why_not_run(submission, [*launched, *(one.name for one in others)])
             yield ScenarioFinding(scenario, finding or _fault(lost))
         elif fault := _recording_fault(recording, scenario, submission):
@@ -153,9 +149,31 @@ def _findings(
             finding = judged.finding
             if finding.status is Status.FAILED:
                 launched = _launched(loaded, scenario)
-                incomplete = why_incomplete(submission, launched, finding.expected)
+                incomplete = _why_incomplete(submission, launched, finding.expected)
                 judged = replace(judged, finding=incomplete or finding)
             yield judged
+
+
+def why_not_run(submission: SubmissionRecord, packages: Iterable[str]) -> Finding | None:
+    """Why nothing of a submission could be launched, or None where every package was built."""
+    for package in packages:
+        cause = why_not_built(submission, package)
+        if cause is not None:
+            return cause.after("was not run because the package was not built").finding(
+                f"the package {package} to build, so that its nodes can be launched"
+            )
+    return None
+
+
+def _why_incomplete(
+    submission: SubmissionRecord, packages: Iterable[str], expected: str
+) -> Finding | None:
+    """What this machine lacks for something that a scenario launches: an error, or None."""
+    for package in packages:
+        cause = why_lacking(submission, package)
+        if cause is not None:
+            return cause.after(f"`{package}` could not run here").finding(expected)
+    return None
 
 
 def _launched(loaded: LoadedAssignment, scenario: str) -> tuple[str, ...]:
@@ -187,13 +205,10 @@ def _judge(
     try:
         finding = bound.check.judge(subject, bound.parameters)
         misuse = _misuse(finding)
-        if (
-            not misuse
-            and finding.status is Status.FAILED
-            and isinstance(subject, Recording)
-            and is_doubtful(subject, bound.parameters.doubt)
-        ):
-            finding = replace(finding, disturbed=True)
+        failed = not misuse and finding.status is Status.FAILED
+        if failed and isinstance(subject, Recording):
+            doubtful = is_doubtful(subject, bound.parameters.doubt)
+            finding = replace(finding, disturbed=doubtful or finding.disturbed)
     except Exception as error:
         # Whatever a check raises is a bug in it, and must not cost the student anything.
         told = "".join(traceback.format_exception(error))
