@@ -1,6 +1,6 @@
 """Fields of messages that checks name, against the definitions of those messages.
 
-What a message cannot have would end as an error, for everybody, once they have published one.
+What a message cannot have would end as an error, for every student, once they have published one.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ from typing import Any
 
 from grader.assignment.binding import BoundCheck
 from grader.assignment.interfaces import Interfaces
-from grader.assignment.model import Assignment, Scenario
-from grader.assignment.stimuli.message import Find
-from grader.assignment.stimuli.request_values import SEPARATOR
+from grader.assignment.model import Assignment
+from grader.assignment.stimuli.message import Find, part_of
 from grader.checks.check import NamedFields
 from grader.checks.field import value_at
 from grader.checks.value import NoSuchField, expected_leaves, tolerance_of, unreachable
@@ -22,7 +21,7 @@ from grader.recording.interface import FLOATS, TEXTS, fields_of
 from grader.spec.source import Source
 
 _INDEX = re.compile(r"\[\d+\]")
-_ZERO = {"bool": False, **dict.fromkeys(FLOATS, 0.0)}
+_ZERO = {"bool": False, **dict.fromkeys(FLOATS, 0.0), **dict.fromkeys(TEXTS, "")}
 
 
 def problems(
@@ -37,7 +36,8 @@ def problems(
         for named in bound.parameters.named_fields():
             for interface in _types(assignment, bound, named.endpoint):
                 try:
-                    message = _sample(interface, _part(known.find, interface, named.part))
+                    find = part_of(known.find, interface, named.part)
+                    message = _sample(interface, find, ())
                 except (KeyError, IndexError):
                     continue
                 lack = _lack(named, message)
@@ -48,26 +48,12 @@ def problems(
 
 def _types(assignment: Assignment, bound: BoundCheck, endpoint: str) -> list[str]:
     """The types that a topic, a service or an action has in the scenarios of a check."""
-    wanted = bound.spec.scenarios
-    judged = [one for one in assignment.scenarios if not wanted or one.id in wanted]
-    found = (_type(scenario, endpoint) for scenario in judged)
+    found = []
+    for scenario in assignment.scenarios:
+        if not bound.spec.scenarios or scenario.id in bound.spec.scenarios:
+            used = dict(one.exchanged for one in scenario.stimuli if one.exchanged)
+            found.append({**used, **scenario.recorded_types}.get(endpoint))
     return list(dict.fromkeys(interface for interface in found if interface is not None))
-
-
-def _type(scenario: Scenario, endpoint: str) -> str | None:
-    used = dict(one.exchanged for one in scenario.stimuli if one.exchanged)
-    return {**used, **scenario.recorded_types}.get(endpoint)
-
-
-def _part(find: Find, interface: str, number: int) -> Find:
-    """Find definitions, of the interface itself only one part.
-
-    Raises:
-        KeyError: It is not at hand.
-        IndexError: It has fewer parts.
-    """
-    text = SEPARATOR.split(find(interface))[number]
-    return lambda name: text if name == interface else find(name)
 
 
 def _lack(named: NamedFields, message: dict[str, Any]) -> str:
@@ -90,18 +76,18 @@ def _lack(named: NamedFields, message: dict[str, Any]) -> str:
     return ""
 
 
-def _sample(interface: str, find: Find, around: tuple[str, ...] = ()) -> dict[str, Any]:
+def _sample(interface: str, find: Find, around: tuple[str, ...]) -> dict[str, Any]:
     """A message of a type, with one value in each of its arrays.
 
     Raises:
-        KeyError: A definition is missing, or is of a message that holds itself, of which
-            :mod:`grader.assignment.interfaces` tells.
+        KeyError: A definition is missing, or the message holds itself.
     """
     if interface in around:
         raise KeyError(interface)
     found: dict[str, Any] = {}
     for name, field in fields_of(interface, find(interface)).items():
-        plain: Any = "" if field.type in TEXTS else _ZERO.get(field.type, 0)
-        value = _sample(field.type, find, (*around, interface)) if field.is_message else plain
+        value = _ZERO.get(field.type, 0)
+        if field.is_message:
+            value = _sample(field.type, find, (*around, interface))
         found[name] = [value] if field.is_array else value
     return found

@@ -8,7 +8,6 @@ the grader's own process: their author is trusted, a student never is.
 from __future__ import annotations
 
 import sys
-import traceback
 from collections.abc import Mapping
 from hashlib import sha256
 from importlib import import_module
@@ -17,6 +16,7 @@ from threading import Lock
 from types import MappingProxyType, ModuleType
 
 from grader import resources
+from grader.assignment.own_check import naming_place
 from grader.checks.catalogue import CATALOGUE, gather
 from grader.checks.check import Check
 
@@ -44,11 +44,7 @@ def lesson_checks(assignment: Path) -> Mapping[str, Check]:
 
 
 def _modules(package: str, folder: Path, files: list[Path]) -> list[ModuleType]:
-    """Import the modules of a package that stands in no ``sys.path``.
-
-    Raises:
-        ValueError: One of them fails.
-    """
+    """Import the modules of a package that stands in no ``sys.path``."""
     if package not in sys.modules:
         module = ModuleType(package)
         module.__path__ = [str(folder)]
@@ -56,18 +52,9 @@ def _modules(package: str, folder: Path, files: list[Path]) -> list[ModuleType]:
     # Bytecode goes to the cache, so that the assignment's folder and its hash stay as they are.
     before, sys.pycache_prefix = sys.pycache_prefix, str(resources.cache_folder() / "bytecode")
     try:
-        return [import_module(f"{package}.{one.stem}") for one in files if one.stem != "__init__"]
-    except SyntaxError as error:
-        place = Path(error.filename or folder).name
-        raise ValueError(f"{FOLDER}/{place}:{error.lineno}: {error.msg}") from error
-    except (Exception, SystemExit) as error:
-        inside = [
-            frame
-            for frame in traceback.extract_tb(error.__traceback__)
-            if Path(frame.filename).parent == folder
-        ]
-        place = f"{Path(inside[-1].filename).name}:{inside[-1].lineno}" if inside else ""
-        raise ValueError(f"{FOLDER}/{place}: {type(error).__name__}: {error}") from error
+        with naming_place(folder, f"{FOLDER}/"):
+            names = [one.stem for one in files if one.stem != "__init__"]
+            return [import_module(f"{package}.{name}") for name in names]
     finally:
         sys.pycache_prefix = before
 

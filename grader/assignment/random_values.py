@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import random
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from grader.assignment.model import Scenario
 from grader.errors import UsageError
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.unit import parse_any
+
+if TYPE_CHECKING:
+    from grader.assignment.model import Scenario
 
 _DECIMALS = 3
 
@@ -29,11 +31,7 @@ def world_values(scenario: Scenario, values: dict[str, float]) -> dict[str, str]
 
 
 def fill_in(value: Any, values: dict[str, float]) -> Any:
-    """A launch parameter with ``$name`` and quantities replaced by numbers in SI units.
-
-    Raises:
-        UsageError: There is no random value of that name.
-    """
+    """A launch parameter with ``$name`` and quantities replaced by numbers in SI units."""
     if isinstance(value, list):
         return [fill_in(item, values) for item in value]
     if not isinstance(value, str):

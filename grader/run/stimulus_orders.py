@@ -27,7 +27,7 @@ def stimulus_orders(
     Raises:
         GraderFault: A message of a stimulus cannot be made.
     """
-    from grader.assignment.stimuli.stimulus_messages import StimulusError
+    from grader.assignment.stimuli.message import StimulusError
     from grader.assignment.stimuli.stimulus_model import Making
 
     find = definition_finder(Path(prefix) for prefix in prefixes)

@@ -340,7 +340,7 @@ def test_limits_of_the_build_and_libraries_are_told_with_their_line(mistakes: Mi
     begin = GOOD.index("scenarios:")
     line = GOOD[:begin].count("\n") + 1
     written = "build_limits: {memory: 3 s, wall_tme: 9 s}\nlibraries: [numpy, scipy==1.2]\n"
-    unit, key, library = mistakes(GOOD[:begin] + written + GOOD[begin:])
+    key, unit, library = mistakes(GOOD[:begin] + written + GOOD[begin:])
     assert unit.startswith(f"{line}: build_limits.memory: ")
     assert "a size is needed here" in unit
     assert key.startswith(f"{line}: build_limits.wall_tme: unknown key 'wall_tme'")

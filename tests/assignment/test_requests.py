@@ -10,7 +10,7 @@ import pytest
 
 from grader.assignment.load import load_assignment
 from grader.assignment.stimuli.kinds.request import CallService, SetParameters
-from grader.assignment.stimuli.request_values import requests_of, values_of
+from grader.assignment.stimuli.stimulus_model import Making
 from grader.errors import AssignmentError
 
 HEAD = """\
@@ -34,6 +34,7 @@ DEFINITIONS = {
     "x/srv/Go": "geometry_msgs/Vector3 to\n---\n",
     "geometry_msgs/msg/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
 }
+MAKING = Making(Path(), DEFINITIONS.__getitem__, 0, {"speed": 1.5}, [])
 
 
 @pytest.fixture
@@ -122,13 +123,13 @@ def test_requests_have_values_in_si_units_and_drawn_ones() -> None:
             "count": 2,
         }
     )
-    first, second = requests_of(call, DEFINITIONS.__getitem__, {"speed": 1.5})
+    first, second = call.order(MAKING)["requests"]
     assert first == second == {"to": {"x": 1.5, "y": pytest.approx(3.14159265)}}
 
 
 def test_the_type_of_a_parameter_is_that_of_the_yaml() -> None:
     given = {"a": 1, "b": 1.0, "c": "2 m", "d": True, "e": "text", "f": [1, 2.5], "g": "$speed"}
     item = SetParameters.model_validate({"set_parameters": given, "node": "bot"})
-    found = values_of(item, {"speed": 1.5})
+    found = item.order(MAKING)["values"]
     assert found == {"a": 1, "b": 1.0, "c": 2.0, "d": True, "e": "text", "f": [1, 2.5], "g": 1.5}
     assert [type(found[name]) for name in "abcd"] == [int, float, float, bool]

@@ -11,7 +11,7 @@ from mcap_ros2.writer import Writer
 
 from grader.assignment.load import load_assignment
 from grader.assignment.stimuli.kinds.publish import Publish
-from grader.assignment.stimuli.stimulus_messages import messages_of
+from grader.assignment.stimuli.stimulus_model import Making
 from grader.errors import AssignmentError
 
 HEAD = """\
@@ -133,8 +133,16 @@ FIT = [
 VALUES = [
     ("message: {date: a}", "std_msgs/msg/String", r"has no field 'date'\. Did you mean 'data'"),
     ("message: {data: 1}", "std_msgs/msg/String", "data: expected text, not 1"),
-    ("message: {data: 256}", "std_msgs/msg/UInt8", "256 is no uint8, a whole number from 0 to"),
-    ("message: {data: 1.5}", "std_msgs/msg/UInt8", "1.5 is no uint8"),
+    (
+        "message: {data: 256}",
+        "std_msgs/msg/UInt8",
+        r"expected a whole number from 0 to 255 \(uint8\), not 256",
+    ),
+    (
+        "message: {data: 1.5}",
+        "std_msgs/msg/UInt8",
+        r"whole number from 0 to 255 \(uint8\), not 1.5",
+    ),
     ("message: {data: true}", "std_msgs/msg/UInt8", "expected a number, not True"),
     ("message: {data: 1}", "std_msgs/msg/Bool", "expected true or false, not 1"),
     (
@@ -152,9 +160,13 @@ VALUES = [
     ("message: {data: [1, a]}", "std_msgs/msg/Float64MultiArray", r"data\[1\]: expected a number"),
     ("message: {values: [1, 2]}", "bot_msgs/msg/Three", "values: expected 3 values, not 2"),
     ("message: {few: [1, 2, 3]}", "bot_msgs/msg/Three", "few: expected at most 2 values, not 3"),
-    ("message: {name: hello}", "bot_msgs/msg/Three", "name: longer than 4 characters"),
+    (
+        "message: {name: hello}",
+        "bot_msgs/msg/Three",
+        "name: expected at most 4 characters, not 'hello'",
+    ),
     ("message: {ONE: 1}", "bot_msgs/msg/Three", "has no field 'ONE'"),
-    ("message: {'data[1]': 1}", "std_msgs/msg/Float64MultiArray", r"data\[0\] is missing before"),
+    ("message: {'data[1]': 1}", "std_msgs/msg/Float64MultiArray", r"data\[0\] is missing: items"),
     ("message: {'da ta': 1}", "std_msgs/msg/UInt8", "'da ta' is no field"),
 ]
 
@@ -183,8 +195,7 @@ def read(folder: Path, **keys: object) -> list[tuple[dict[str, object], float]]:
     model = Publish.model_validate(
         {"publish": "/goal", "type": "geometry_msgs/msg/Vector3", **keys}
     )
-    due = messages_of(model, folder, DEFINITIONS.__getitem__, 7, {"goal": 1.5})
-    return [(one.value, one.time_s) for one in due]
+    return list(model.due(Making(folder, DEFINITIONS.__getitem__, 7, {"goal": 1.5}, [])))
 
 
 def test_a_csv_file_has_a_message_in_each_row(folder: Path) -> None:
@@ -213,7 +224,7 @@ FILES = [
     ("from: none.csv\nevery: 1 s", "cannot read none.csv: No such file"),
     ("from: ../other.csv\nevery: 1 s", r"\.\./other.csv is not in the assignment's folder"),
     ("from: empty.csv\nevery: 1 s", "empty.csv has no message"),
-    ("from: wrong.csv\nevery: 1 s", r"wrong.csv:1: the message .* has no field 'q'. It has: data"),
+    ("from: wrong.csv\nevery: 1 s", r"wrong.csv:2: the message .* has no field 'q'. It has: data"),
     ("from: long.csv\nevery: 1 s", "long.csv:2: more values than the first row names"),
     ("from: latin.csv\nevery: 1 s", "latin.csv is not a CSV file: 'utf-8' codec can't decode"),
     ("from: bag.mcap", "bag.mcap: no MCAP file that can be read"),
@@ -222,7 +233,7 @@ FILES = [
     ("from: none.mcap", "cannot read none.mcap: No such file"),
     ("from: other.mcap", "other.mcap has no messages on /chatter. Its topics: /talk"),
     ("from: type.mcap", "type.mcap has /chatter as std_msgs/msg/UInt8, not std_msgs/msg/String"),
-    ("python: cases.py:none\nevery: 1 s", "has no 'none'. Its functions: raises, text"),
+    ("python: cases.py:none\nevery: 1 s", "has no function 'none'. Its functions: raises, text"),
     ("python: cases.py:raises\nevery: 1 s", "cases.py:2: ZeroDivisionError: division by zero"),
     ("python: cases.py:text\nevery: 1 s", "must return a list of messages"),
 ]
@@ -261,10 +272,10 @@ def test_a_file_that_is_wrong_is_named(
 @pytest.mark.parametrize(
     ("type", "rows", "words"),
     [
-        ("std_msgs/msg/UInt8", "data\n1\n256\n", r"n.csv:3: data: .*256.* is no uint8, a whole"),
+        ("std_msgs/msg/UInt8", "data\n1\n256\n", r"n.csv:3: data: expected a whole number .*256"),
         ("std_msgs/msg/UInt8", "data\n\n1\nfive\n", r"n.csv:4: data: expected a number.*five"),
-        ("geometry_msgs/msg/Twist", "linear.x,linear.w\n1,2\n", r"n.csv:1: linear .* no field 'w'"),
-        ("std_msgs/msg/Float64MultiArray", "data[1]\n1\n", r"data\[0\] is missing before data"),
+        ("geometry_msgs/msg/Twist", "linear.x,linear.w\n1,2\n", r"n.csv:2: linear .* no field 'w'"),
+        ("std_msgs/msg/Float64MultiArray", "data[1]\n1\n", r"data\[0\] is missing: items"),
     ],
 )  # fmt: skip
 def test_a_cell_of_a_csv_file_that_does_not_fit_is_named_with_its_line(

@@ -1,19 +1,18 @@
-"""The messages of a ``publish`` stimulus: from the YAML, a CSV or MCAP file, or a function."""
+"""Messages of a ``publish`` stimulus that stand in a CSV or MCAP file, or come from a function."""
 
 from __future__ import annotations
 
 import csv
-import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from grader.assignment.own_check import load_function
-from grader.assignment.stimuli.kinds.publish import MCAP_SUFFIX, MOST_MESSAGES, Publish
-from grader.assignment.stimuli.message import Find, MessageError, UnknownField, read_message
+from grader.assignment.own_check import load_function, naming_place
+from grader.assignment.stimuli.message import StimulusError
 from grader.spec.document import Place
 
+MCAP_SUFFIX = ".mcap"
 _NS = 1e-9
 
 
@@ -22,163 +21,87 @@ class Given:
     """A message as it was given.
 
     Attributes:
+        place: In the YAML, below the stimulus.
         label: Where else, such as ``cases.csv:3``; empty for the YAML itself.
+        time_s: When it was recorded, from the first on; None where no time is given.
     """
 
     value: Mapping[str, Any]
     place: Place
     label: str = ""
-    heading: str = ""
     time_s: float | None = None
 
 
-@dataclass(frozen=True)
-class Due:
-    """A message that is to be published."""
-
-    value: dict[str, Any]
-    time_s: float
-
-
-class StimulusError(ValueError):
-    """Something about the messages of a stimulus is wrong."""
-
-    def __init__(self, text: str, place: Place) -> None:
-        """Keep where it is."""
-        self.place = place
-        super().__init__(text)
-
-
-def messages_of(
-    publish: Publish, folder: Path, find: Find, seed: int, drawn: Mapping[str, float]
-) -> tuple[Due, ...]:
-    """Read the messages of a stimulus; one that is repeated without end is there once.
-
-    Raises:
-        StimulusError: A file or function is wrong, or a value does not fit the message.
-        KeyError: The definition of a message is missing.
-    """
-    found = []
-    for number, given in enumerate(_given(publish, folder, seed)):
-        try:
-            value = read_message(given.value, publish.type, find, drawn)
-        except MessageError as error:
-            if not given.label:
-                raise StimulusError(str(error), (*given.place, *error.place)) from None
-            is_name = isinstance(error, UnknownField) and given.heading
-            label = given.heading if is_name else given.label
-            raise StimulusError(f"{label}: {error}", given.place) from None
-        paced_s = number * (publish.every or 0.0)
-        recorded_s = given.time_s if publish.every is None else None
-        found.append(Due(value, paced_s if recorded_s is None else recorded_s))
-    return tuple(found)
-
-
-def _given(publish: Publish, folder: Path, seed: int) -> Sequence[Given]:
-    if publish.message is not None:
-        return [Given(publish.message, ("message",))] * (publish.count or 1)
-    if publish.messages:
-        return [Given(value, ("messages", index)) for index, value in enumerate(publish.messages)]
-    if publish.python is not None:
-        return _from_function(publish.python, folder, seed)
-    assert publish.from_ is not None
-    file = folder / publish.from_
-    if not file.resolve().is_relative_to(folder.resolve()):
-        raise StimulusError(f"{publish.from_} is not in the assignment's folder", ("from",))
-    read = _from_mcap if file.suffix == MCAP_SUFFIX else _from_csv
-    try:
-        found = read(file, publish)
-    except OSError as error:
-        text = f"cannot read {publish.from_}: {error.strerror or error}"
-        raise StimulusError(text, ("from",)) from error
-    return _some(found, publish.from_, "from")
-
-
-def _some(found: list[Given], name: str, key: str) -> list[Given]:
-    if not found:
-        raise StimulusError(f"{name} has no message", (key,))
-    if len(found) > MOST_MESSAGES:
-        text = f"{name} has {len(found)} messages: at most {MOST_MESSAGES} are published"
-        raise StimulusError(text, (key,))
-    return found
-
-
-def _from_function(name: str, folder: Path, seed: int) -> list[Given]:
+def from_function(name: str, folder: Path, seed: int) -> Iterator[Given]:
+    """Call the author's function ``file.py:function``."""
     place: Place = ("python",)
     try:
         function = load_function(name, folder)
+        with naming_place(folder):
+            found = function(seed)
     except ValueError as error:
         raise StimulusError(str(error), place) from error
-    try:
-        found = function(seed)
-    except Exception as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        file = name.partition(":")[0]
-        line = next((f.lineno for f in reversed(frames) if Path(f.filename).name == file), None)
-        at = f"{file}:{line}" if line else name
-        raise StimulusError(f"{at}: {type(error).__name__}: {error}", place) from error
     if not isinstance(found, list | tuple) or not all(isinstance(item, Mapping) for item in found):
         text = f"{name} must return a list of messages, each a dict of its fields"
         raise StimulusError(text, place)
-    return _some(
-        [Given(_plain(item), place, f"{name}: message {n}") for n, item in enumerate(found)],
-        name,
-        "python",
-    )
+    for number, item in enumerate(found):
+        yield Given(_plain(item), place, f"{name}: message {number}")
 
 
 def _plain(value: Any) -> Any:
     """Lists and numbers of Python from what NumPy gives."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):
-        return value.tolist()
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
-    return value
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
-def _from_csv(file: Path, publish: Publish) -> list[Given]:
-    found = []
+def from_file(name: str, folder: Path, topic: str, interface: str) -> Iterator[Given]:
+    """Read a CSV or MCAP file beside the assignment."""
+    file = folder / name
+    if not file.resolve().is_relative_to(folder.resolve()):
+        raise StimulusError(f"{name} is not in the assignment's folder", ("from",))
+    try:
+        if file.suffix == MCAP_SUFFIX:
+            yield from _from_mcap(file, topic, interface)
+        else:
+            yield from _from_csv(file)
+    except OSError as error:
+        text = f"cannot read {name}: {error.strerror or error}"
+        raise StimulusError(text, ("from",)) from error
+
+
+def _from_csv(file: Path) -> Iterator[Given]:
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:
             reader = csv.DictReader(stream, strict=True)
-            names = reader.fieldnames or []
             for row in reader:
-                label = f"{publish.from_}:{reader.line_num}"
+                label = f"{file.name}:{reader.line_num}"
                 if None in row:
-                    text = f"{label}: more values than the first row names fields ({len(names)})"
+                    text = f"{label}: more values than the first row names fields"
                     raise StimulusError(text, ("from",))
                 # An empty cell leaves its field out, so that rows may have arrays of any length.
                 value = {name.strip(): cell.strip() for name, cell in row.items() if cell}
-                found.append(Given(value, ("from",), label, f"{publish.from_}:1"))
+                yield Given(value, ("from",), label)
     except (csv.Error, UnicodeDecodeError) as error:
-        raise StimulusError(f"{publish.from_} is not a CSV file: {error}", ("from",)) from error
-    return found
+        raise StimulusError(f"{file.name} is not a CSV file: {error}", ("from",)) from error
 
 
-def _from_mcap(file: Path, publish: Publish) -> list[Given]:
+def _from_mcap(file: Path, topic: str, interface: str) -> Iterator[Given]:
     from grader.recording.mcap_reader import read_topic
 
     try:
-        messages, topics = read_topic(file, publish.publish)
+        messages, topics = read_topic(file, topic)
     except ValueError as error:
-        raise StimulusError(f"{publish.from_}: {error}", ("from",)) from error
+        raise StimulusError(f"{file.name}: {error}", ("from",)) from error
     if not messages:
         listed = ", ".join(topics) or "none"
-        text = f"{publish.from_} has no messages on {publish.publish}. Its topics: {listed}."
+        text = f"{file.name} has no messages on {topic}. Its topics: {listed}."
         raise StimulusError(text, ("from",))
-    wrong = next((one for one in messages if one.type != publish.type), None)
-    if wrong is not None:
-        text = f"{publish.from_} has {publish.publish} as {wrong.type}, not {publish.type}"
-        raise StimulusError(text, ("from",))
-    begin_ns = messages[0].received_ns
-    return [
-        Given(
-            one.value,
-            ("from",),
-            f"{publish.from_}: message {number}",
-            time_s=(one.received_ns - begin_ns) * _NS,
-        )
-        for number, one in enumerate(messages)
-    ]
+    for number, message in enumerate(messages):
+        if message.type != interface:
+            text = f"{file.name} has {topic} as {message.type}, not {interface}"
+            raise StimulusError(text, ("from",))
+        time_s = (message.received_ns - messages[0].received_ns) * _NS
+        yield Given(message.value, ("from",), f"{file.name}: message {number}", time_s)

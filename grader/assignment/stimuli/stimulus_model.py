@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
-from grader.assignment.stimuli.message import Find
-from grader.errors import GraderFault
+from grader.assignment.stimuli.message import Find, StimulusError
+from grader.spec.document import Place
+from grader.spec.nearest_name import did_you_mean
 from grader.spec.source import Model
+
+if TYPE_CHECKING:
+    from grader.assignment.model import Scenario
 
 S = TypeVar("S", bound="StimulusModel")
 
@@ -31,17 +35,27 @@ class Making:
     drawn: Mapping[str, float]
     processes: Sequence[str]
 
-    def process(self, executable: str, package: str | None) -> str:
+    def process(self, key: str, executable: str, package: str | None) -> str:
         """The launched process of an executable, of any package by default.
 
-        Raises:
-            GraderFault: It is not launched.
+        Args:
+            key: Of the stimulus, for errors.
         """
-        for process in self.processes:
-            its_package, _, its_executable = process.partition("/")
-            if its_executable == executable and package in (None, its_package):
-                return process
-        raise GraderFault(f"a stimulus names {executable!r}, which the scenario does not launch")
+        launched = [process.partition("/") for process in self.processes]
+        fitting = [
+            f"{its_package}/{name}"
+            for its_package, _, name in launched
+            if name == executable and package in (None, its_package)
+        ]
+        if len(fitting) > 1:
+            text = f"{executable!r} is launched {len(fitting)} times: only one can be meant"
+            raise StimulusError(text, (key,))
+        if not fitting:
+            names = [name for _, _, name in launched]
+            advice = did_you_mean(executable, names) or f" It has: {', '.join(names)}."
+            text = f"the scenario does not launch {executable!r}.{advice}"
+            raise StimulusError(text, (key,))
+        return fitting[0]
 
 
 class StimulusModel(Model):
@@ -75,6 +89,16 @@ class StimulusModel(Model):
             KeyError: The definition of a message is missing.
         """
         raise NotImplementedError
+
+    def mistakes(self, making: Making, scenario: Scenario) -> Iterator[tuple[Place, str]]:
+        """What does not fit, as far as it shows without a run: its order cannot be made."""
+        try:
+            self.order(making)
+        except StimulusError as error:
+            yield error.place, str(error)
+        except KeyError:
+            # The definition is of a package that is not installed here.
+            return
 
 
 KINDS: list[type[StimulusModel]] = []

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
 from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.spec.document import Place
 from grader.spec.name import Durability, Id, InterfaceName, Reliability, TopicName
 from grader.spec.quantity import DurationOrZero
+
+if TYPE_CHECKING:
+    from grader.assignment.model import Scenario
 
 
 @kind
@@ -41,3 +46,13 @@ class Join(StimulusModel):
             "depth": self.depth,
             "after_s": self.after,
         }
+
+    def mistakes(self, making: Making, scenario: Scenario) -> Iterator[tuple[Place, str]]:
+        """Its name is another's, or it would hear the probe itself."""
+        alike = [one for one in scenario.stimuli if isinstance(one, Join) and one.name == self.name]
+        if alike[0] is not self:
+            yield ("name",), f"{self.name!r} stands twice"
+        published = [one.exchanged for one in scenario.stimuli if one.key == "publish"]
+        if any(found and found[0] == self.join for found in published):
+            text = f"the probe publishes on {self.join!r} itself: a late joiner would hear that"
+            yield ("join",), text

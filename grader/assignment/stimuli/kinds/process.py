@@ -26,13 +26,9 @@ class Kill(StimulusModel):
 
     def order(self, making: Making) -> dict[str, Any]:
         """The signal."""
-        process = making.process(self.kill, self.package)
-        return {
-            "kind": "KillOrder",
-            "process": process,
-            "signal": self.signal,
-            "after_s": self.after,
-        }
+        process = making.process(self.key, self.kill, self.package)
+        signal, after_s = self.signal, self.after
+        return {"kind": "KillOrder", "process": process, "signal": signal, "after_s": after_s}
 
 
 @kind
@@ -47,5 +43,5 @@ class Restart(StimulusModel):
 
     def order(self, making: Making) -> dict[str, Any]:
         """The process."""
-        process = making.process(self.restart, self.package)
+        process = making.process(self.key, self.restart, self.package)
         return {"kind": "RestartOrder", "process": process, "after_s": self.after}

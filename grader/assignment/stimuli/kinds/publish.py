@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field, model_validator
 
+from grader.assignment.stimuli.message import StimulusError, read_message
+from grader.assignment.stimuli.stimulus_messages import (
+    MCAP_SUFFIX,
+    Given,
+    from_file,
+    from_function,
+)
 from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.spec.document import Place
 from grader.spec.name import Durability, InterfaceName, Reliability, TopicName
+from grader.spec.nearest_name import did_you_mean
 from grader.spec.quantity import Duration, DurationOrZero
 
-MCAP_SUFFIX = ".mcap"
+if TYPE_CHECKING:
+    from grader.assignment.model import Scenario
+
 MOST_MESSAGES = 10_000
 
 
@@ -87,14 +99,14 @@ class Publish(StimulusModel):
         if self.count is not None:
             if self.message is None:
                 raise ValueError("'count' says how often one 'message' is published")
-            if self.count > max(1, self.before_launch) and not self.paced:
+            if self.count > max(1, self.before_launch) and not self._is_paced:
                 raise ValueError("'count' needs a pace: give 'every' or 'answer'")
         if self.before_launch and self.durability == "volatile":
             raise ValueError(
                 "what is published 'before_launch' is lost for later subscriptions unless the "
                 "durability is transient_local"
             )
-        if self._is_several and not self.paced:
+        if self._is_several and not self._is_paced:
             raise ValueError("several messages need a pace: give 'every' or 'answer'")
         return self
 
@@ -107,7 +119,7 @@ class Publish(StimulusModel):
         return len(self.messages) > self.before_launch + 1
 
     @property
-    def paced(self) -> bool:
+    def _is_paced(self) -> bool:
         """Whether it is said when the next message follows."""
         return self.every is not None or self.answer is not None
 
@@ -123,9 +135,7 @@ class Publish(StimulusModel):
 
     def order(self, making: Making) -> dict[str, Any]:
         """The messages with their times."""
-        from grader.assignment.stimuli.stimulus_messages import messages_of
-
-        due = messages_of(self, making.folder, making.find, making.seed, making.drawn)
+        due = list(self.due(making))
         return {
             "kind": "PublishOrder",
             "topic": self.publish,
@@ -133,11 +143,53 @@ class Publish(StimulusModel):
             "reliability": self.reliability,
             "durability": self.durability,
             "depth": self.depth,
-            "messages": [one.value for one in due],
-            "times_s": [one.time_s for one in due],
+            "messages": [value for value, _ in due],
+            "times_s": [time_s for _, time_s in due],
             "before_launch": self.before_launch,
             "after_s": self.after,
             "repeat_s": None if self.has_end else self.every,
             "answer": self.answer,
             "within_s": self.within,
         }
+
+    def due(self, making: Making) -> Iterator[tuple[dict[str, Any], float]]:
+        """Each message with its time in seconds; one that is repeated without end is there once."""
+        given = list(self._given(making))
+        key = "from" if self.from_ is not None else "python"
+        if not given:
+            raise StimulusError(f"{self.from_ or self.python} has no message", (key,))
+        if len(given) > MOST_MESSAGES:
+            text = f"{len(given)} messages: at most {MOST_MESSAGES} are published"
+            raise StimulusError(text, (key,))
+        if self.before_launch > len(given):
+            raise StimulusError(f"there are only {len(given)} messages", ("before_launch",))
+        for number, one in enumerate(given):
+            try:
+                value = read_message(one.value, self.type, making.find, making.drawn, one.place)
+            except StimulusError as error:
+                if one.label:
+                    raise StimulusError(f"{one.label}: {error}", one.place) from None
+                raise
+            is_paced = self.every is not None or one.time_s is None
+            yield value, number * (self.every or 0.0) if is_paced else one.time_s or 0.0
+
+    def _given(self, making: Making) -> Iterable[Given]:
+        if self.message is not None:
+            return [Given(self.message, ("message",))] * (self.count or 1)
+        if self.from_ is not None:
+            return from_file(self.from_, making.folder, self.publish, self.type)
+        if self.python is not None:
+            return from_function(self.python, making.folder, making.seed)
+        return [Given(value, ("messages", index)) for index, value in enumerate(self.messages)]
+
+    def mistakes(self, making: Making, scenario: Scenario) -> Iterator[tuple[Place, str]]:
+        """Its topic or its messages do not fit."""
+        recorded = scenario.recorded_types
+        if self.publish in recorded:
+            text = f"{self.publish!r} is recorded: only the student may publish there"
+            yield ("publish",), text
+        if self.answer is not None and self.answer not in recorded:
+            listed = f" It records: {', '.join(recorded) or 'nothing'}."
+            advice = did_you_mean(self.answer, recorded) or listed
+            yield ("answer",), f"the scenario does not record {self.answer!r}.{advice}"
+        yield from super().mistakes(making, scenario)

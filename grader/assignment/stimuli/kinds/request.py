@@ -7,7 +7,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from grader.assignment.random_values import fill_in
+from grader.assignment.stimuli.message import StimulusError, part_of, read_message
 from grader.assignment.stimuli.stimulus_model import Making, StimulusModel, kind
+from grader.errors import UsageError
+from grader.spec.document import Place
 from grader.spec.name import InterfaceName, QualifiedNodeName, TopicName
 from grader.spec.quantity import Duration, DurationOrZero
 
@@ -115,13 +119,15 @@ class CallService(StimulusModel):
 
     def order(self, making: Making) -> dict[str, Any]:
         """The requests."""
-        from grader.assignment.stimuli.request_values import requests_of
-
+        requests = [
+            _fields(value, self, making, ("requests", index) if self.requests else ("request",))
+            for index, value in enumerate(self.sequence)
+        ]
         return {
             "kind": "CallOrder",
             "service": self.call,
             "type": self.type,
-            "requests": list(requests_of(self, making.find, making.drawn)),
+            "requests": requests,
             "at_once": self.at_once,
             "after_s": self.after,
             "every_s": self.every,
@@ -166,9 +172,26 @@ class SetParameters(StimulusModel):
 
     def order(self, making: Making) -> dict[str, Any]:
         """The node, and what is set."""
-        from grader.assignment.stimuli.request_values import values_of
+        drawn = dict(making.drawn)
+        values = {name: _value(name, it, drawn) for name, it in self.set_parameters.items()}
+        return _of_parameters(self.node, values, self.after, self.within)
 
-        return _of_parameters(self.node, values_of(self, making.drawn), self.after, self.within)
+
+def _value(name: str, value: Any, drawn: dict[str, float]) -> Any:
+    """The value that a parameter is set to, of a type that parameters have."""
+    place: Place = ("set_parameters", name)
+    try:
+        found = fill_in(value, drawn)
+    except UsageError as error:
+        raise StimulusError(str(error), place) from None
+    items = found if isinstance(found, list) else [found]
+    types = {type(item) for item in items}
+    if not items:
+        raise StimulusError(f"{name}: an empty list has no type", place)
+    if not types <= {bool, int, float, str} or (len(types) > 1 and types != {int, float}):
+        text = f"{name}: expected a truth, a number, a text, or a list of one kind of these"
+        raise StimulusError(text, place)
+    return found
 
 
 def _of_parameters(
@@ -214,13 +237,11 @@ class SendGoal(StimulusModel):
 
     def order(self, making: Making) -> dict[str, Any]:
         """The goal."""
-        from grader.assignment.stimuli.request_values import goal_of
-
         return {
             "kind": "GoalOrder",
             "action": self.send_goal,
             "type": self.type,
-            "goal": goal_of(self, making.find, making.drawn),
+            "goal": _fields(self.goal, self, making, ("goal",)),
             "after_s": self.after,
             "cancel_after_s": self.cancel_after,
             "preempt": self.preempt,
@@ -228,4 +249,13 @@ class SendGoal(StimulusModel):
         }
 
 
-Request = CallService | ReadParameters | SetParameters | SendGoal
+def _fields(
+    value: Mapping[str, Any], item: CallService | SendGoal, making: Making, place: Place
+) -> dict[str, Any]:
+    """The fields of a request or a goal."""
+    folder = "srv" if isinstance(item, CallService) else "action"
+    if f"/{folder}/" not in item.type:
+        text = f"expected an interface in {folder}, such as package/{folder}/Name"
+        raise StimulusError(text, ("type",))
+    find = part_of(making.find, item.type, 0)
+    return read_message(value, item.type, find, making.drawn, place)
