@@ -54,7 +54,6 @@ CLASS = 100
 ROBOT_ASSIGNMENTS = ("bot_controller", "p_controller")
 SUBMISSIONS = 500
 _RENDERED = 50
-SEGMENTS = (10, 100, 1000)
 _FEW = 3
 _TOLD_EACH = 20
 _SERIAL = 10
@@ -259,15 +258,12 @@ def _grade_into(grading: Grading, prepared: Prepared, folder: Path, number: int)
 
 
 def _simulator(samples: Samples, _folder: Path, _: int) -> None:
-    """What a step and a scan cost, and the share of a core at real time."""
-    from sim.benchmark import scan_s, share_of_core, step_s
+    """What share of a core the simulator takes in real time."""
+    from sim.benchmark import share_of_core
 
     for _ in range(_FEW):
-        for segments in SEGMENTS:
-            samples.add(f"simulator: a step, {segments} segments", step_s(segments))
-            samples.add(f"simulator: a scan of 360 beams, {segments} segments", scan_s(segments))
         with lock_domain() as domain:
-            share = share_of_core(100, domain_id=domain.domain_id)
+            share = share_of_core(domain_id=domain.domain_id)
         samples.add("simulator: share of a core at real time, 100 segments", share)
 
 

@@ -41,23 +41,17 @@ class Contact:
     label: str | None
 
 
-FREE = Contact(1.0, None)
 _Near = tuple[tuple[Capsule, str], ...]
 
 
 class ContactFinder:
     """Finds contacts of one robot in one world.
 
-    It remembers what is near and how far the robot may travel before anything can touch it, so
-    that a step in free space costs nothing. What it remembers never changes a result.
+    It remembers which walls are near, so that a step in free space costs nothing.
     """
 
     def __init__(self, world: World, radius_m: float) -> None:
-        """Prepare the world for a robot.
-
-        Args:
-            radius_m: Radius of the robot's footprint.
-        """
+        """Prepare the world for a robot with a circular footprint."""
         self._radius_m = radius_m
         self._all: _Near = tuple(
             (capsule, shape.label) for shape in world.shapes for capsule in shape.capsules
@@ -66,7 +60,6 @@ class ContactFinder:
         self._near: _Near = ()
         self._anchor = (math.inf, math.inf)
         self._sight_m = 0.0
-        self._free_m = -1.0
 
     def find(
         self, pose: Pose, linear_m_s: float, angular_rad_s: float, dt_s: float, end_ns: int
@@ -77,29 +70,27 @@ class ContactFinder:
             end_ns: Simulated time at its end; moving obstacles are already there.
         """
         travel_m = abs(linear_m_s) * dt_s
-        moving = self._moving_near(pose, travel_m, end_ns) if self._moving else ()
-        if not moving and travel_m + TOUCH_M < self._free_m:
-            self._free_m -= travel_m
-            return FREE
-        near = self._walls_near(pose, travel_m) + moving
+        near = self._walls_near(pose, travel_m) + self._moving_near(pose, travel_m, end_ns)
+        if not near:
+            return Contact(1.0, None)
         share, hit = 1.0, None
         if travel_m > 0.0:
             share, hit = self._advance(pose, linear_m_s, angular_rad_s, dt_s, near)
-        end = integrate(pose, linear_m_s, angular_rad_s, dt_s * share) if share > 0.0 else pose
-        touched = self._touched(end, near)
-        return Contact(share, hit or touched)
+        end = integrate(pose, linear_m_s, angular_rad_s, dt_s * share)
+        clearance_m, label = min((self._clearance_m(end, item), label) for item, label in near)
+        return Contact(share, hit or (label if clearance_m <= TOUCH_M else None))
+
+    def _clearance_m(self, pose: Pose, capsule: Capsule) -> float:
+        return point_clearance_m(pose.x_m, pose.y_m, capsule) - self._radius_m
 
     def _walls_near(self, pose: Pose, travel_m: float) -> _Near:
         """Walls that this step could reach, with some to spare for the next steps."""
-        ax, ay = self._anchor
-        if math.hypot(pose.x_m - ax, pose.y_m - ay) + travel_m + TOUCH_M >= self._sight_m:
+        way_m = math.dist(self._anchor, (pose.x_m, pose.y_m))
+        if way_m + travel_m + TOUCH_M >= self._sight_m:
             self._anchor = (pose.x_m, pose.y_m)
             self._sight_m = max(_SIGHT_M, 4.0 * travel_m)
-            reach_m = self._radius_m + self._sight_m
             self._near = tuple(
-                item
-                for item in self._all
-                if point_clearance_m(pose.x_m, pose.y_m, item[0]) < reach_m
+                item for item in self._all if self._clearance_m(pose, item[0]) < self._sight_m
             )
         return self._near
 
@@ -117,27 +108,13 @@ class ContactFinder:
                     found.append(((pose.x_m, pose.y_m, pose.x_m, pose.y_m, 0.0), obstacle.label))
         return tuple(found)
 
-    def _touched(self, pose: Pose, near: _Near) -> str | None:
-        """What is touched at a pose; remembers how far the rest is away."""
-        ax, ay = self._anchor
-        free_m = self._sight_m - math.hypot(pose.x_m - ax, pose.y_m - ay)
-        touched = None
-        for capsule, label in near:
-            clearance_m = point_clearance_m(pose.x_m, pose.y_m, capsule) - self._radius_m
-            if clearance_m < free_m:
-                free_m = clearance_m
-                if clearance_m <= TOUCH_M:
-                    touched = label
-        self._free_m = free_m
-        return touched
-
     def _advance(
         self, pose: Pose, linear_m_s: float, angular_rad_s: float, dt_s: float, near: _Near
     ) -> tuple[float, str | None]:
         travel_m = abs(linear_m_s) * dt_s
         allowed: list[tuple[Capsule, str, float]] = []
         for capsule, label in near:
-            clearance_m = point_clearance_m(pose.x_m, pose.y_m, capsule) - self._radius_m
+            clearance_m = self._clearance_m(pose, capsule)
             if clearance_m <= travel_m + TOUCH_M:
                 # A robot that something moved onto may leave, but not go deeper.
                 deepest_m = min(-RESOLUTION_M, clearance_m - _ROUNDING_M)

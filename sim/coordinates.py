@@ -1,14 +1,16 @@
 """Coordinates in YAML: lists such as ``[1.5, 20 cm, 90 deg]``.
 
 In a list of coordinates a bare number is metres (REP-103); an entry with a unit is
-converted. An angle always needs its unit, for nobody can tell whether 1.5 meant radians.
+converted. An angle always needs its unit, for 1.5 may mean radians or degrees.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -21,43 +23,40 @@ from sim.motion import Pose
 MAX_COORDINATE_M = 10_000.0
 """Beyond it double precision no longer resolves a contact to a nanometre."""
 
-
 MIN_SIZE_M = 1e-6
 """What is smaller is a mistake, and its direction cannot be computed."""
 
 
-def metres(value: Any) -> float:
+def metres(value: Any, *, positive: bool = False) -> float:
     """Read a length: a bare number is metres.
 
+    Args:
+        positive: Whether it must be at least :data:`MIN_SIZE_M`.
+
     Raises:
-        ValueError: It is not a length, not finite or absurdly large.
+        ValueError: It is not a length, not finite, absurdly large or too small.
     """
-    number: float
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        number = float(value)
-        if not math.isfinite(number):
+    number = math.nan
+    if isinstance(value, int | float | str) and not isinstance(value, bool):
+        with suppress(ValueError):  # YAML 1.1 reads 1e3 as a string
+            number = float(value)
+    if not math.isfinite(number):
+        if isinstance(value, float):
             raise ValueError(f"{value!r} is not finite")
-    else:
-        try:  # YAML 1.1 reads 1e3 as a string
-            number = float(value) if isinstance(value, str) else math.nan
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            number = parse_quantity(value, Dimension.LENGTH)
+        number = parse_quantity(value, Dimension.LENGTH)
     if abs(number) > MAX_COORDINATE_M:
         raise ValueError(
             f"{value!r} is too far away: at most {MAX_COORDINATE_M / 1000:g} km are simulated"
         )
+    if positive and number < MIN_SIZE_M:
+        least = "more than 0" if number <= 0.0 else f"at least {MIN_SIZE_M:g} m"
+        raise ValueError(f"{value!r} is too small: it must be {least}")
     return number
 
 
 @dataclass(frozen=True)
 class Metres:
-    """Pydantic annotation: a length in metres, a bare number is allowed.
-
-    Attributes:
-        positive: Whether it must be more than zero.
-    """
+    """Pydantic annotation: a length in metres, a bare number is allowed."""
 
     positive: bool = False
 
@@ -65,17 +64,9 @@ class Metres:
         self, source: type[Any], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Validate by :func:`metres`."""
-
-        def read(value: Any) -> float:
-            try:
-                number = metres(value)
-            except ValueError as error:
-                raise refusal(str(error)) from None
-            if self.positive and number < MIN_SIZE_M:
-                raise refusal(_too_small(value, number))
-            return number
-
-        return core_schema.no_info_plain_validator_function(read)
+        return core_schema.no_info_plain_validator_function(
+            lambda value: _refused(partial(metres, positive=self.positive), value)
+        )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -107,7 +98,7 @@ class Entries:
         self, source: type[Any], handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         """Validate entry by entry; written as it is read."""
-        return written_as_read(self._read, self._write)
+        return written_as_read(self._read, _write)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -133,29 +124,29 @@ class Entries:
         if not least <= len(value) <= len(self.names):
             needed = f"{least} to {len(self.names)}" if self.optional else f"{least}"
             raise refusal(f"expected {self._form}: {needed} entries, not {len(value)}")
-        numbers = [self._entry(name, item) for name, item in zip(self.names, value, strict=False)]
+        readers = [
+            _angle if name == "yaw" else partial(metres, positive=self.positive)
+            for name in self.names
+        ]
+        numbers = [
+            _refused(reader, item, f"{name}: ")
+            for name, reader, item in zip(self.names, readers, value, strict=False)
+        ]
         return self.make(*numbers, *[0.0] * (len(self.names) - len(numbers)))
 
-    def _write(self, value: Any) -> list[float | str]:
-        if isinstance(value, Pose):
-            return [value.x_m, value.y_m, f"{value.yaw_rad!r} rad"]
-        return list(value)
 
-    def _entry(self, name: str, item: Any) -> float:
-        try:
-            if name == "yaw":
-                return _angle(item)
-            number = metres(item)
-        except ValueError as error:
-            raise refusal(f"{name}: {error}") from None
-        if self.positive and number < MIN_SIZE_M:
-            raise refusal(f"{name}: {_too_small(item, number)}")
-        return number
+def _refused(read: Callable[[Any], float], value: Any, place: str = "") -> float:
+    """Read a number; a mistake becomes the message for the author of the YAML."""
+    try:
+        return read(value)
+    except ValueError as error:
+        raise refusal(f"{place}{error}") from None
 
 
-def _too_small(item: Any, number: float) -> str:
-    least = "more than 0" if number <= 0.0 else f"at least {MIN_SIZE_M:g} m"
-    return f"{item!r} is too small: it must be {least}"
+def _write(value: Any) -> list[float | str]:
+    if isinstance(value, Pose):
+        return [value.x_m, value.y_m, f"{value.yaw_rad!r} rad"]
+    return list(value)
 
 
 def _angle(item: Any) -> float:
@@ -168,6 +159,18 @@ def _tuple(*numbers: float) -> tuple[float, ...]:
     return numbers
 
 
+def _ends(x1: float, y1: float, x2: float, y2: float) -> tuple[float, ...]:
+    if math.hypot(x2 - x1, y2 - y1) < MIN_SIZE_M:
+        raise refusal("both ends are the same point")
+    return x1, y1, x2, y2
+
+
+def _rectangle(x_min: float, y_min: float, x_max: float, y_max: float) -> tuple[float, ...]:
+    if x_min >= x_max or y_min >= y_max:
+        raise refusal("expected [x_min, y_min, x_max, y_max]: each min must be less than its max")
+    return x_min, y_min, x_max, y_max
+
+
 def _pose(x_m: float, y_m: float, yaw_rad: float) -> Pose:
     return Pose(x_m, y_m, math.remainder(yaw_rad, math.tau))
 
@@ -175,9 +178,9 @@ def _pose(x_m: float, y_m: float, yaw_rad: float) -> Pose:
 PositiveMetres = Annotated[float, Metres(positive=True)]
 Point = Annotated[tuple[float, float], Entries(("x", "y"), _tuple)]
 Size = Annotated[tuple[float, float], Entries(("length", "width"), _tuple, positive=True)]
-Ends = Annotated[tuple[float, float, float, float], Entries(("x1", "y1", "x2", "y2"), _tuple)]
+Ends = Annotated[tuple[float, float, float, float], Entries(("x1", "y1", "x2", "y2"), _ends)]
 Rectangle = Annotated[
-    tuple[float, float, float, float], Entries(("x_min", "y_min", "x_max", "y_max"), _tuple)
+    tuple[float, float, float, float], Entries(("x_min", "y_min", "x_max", "y_max"), _rectangle)
 ]
 PoseInPlane = Annotated[Pose, Entries(("x", "y", "yaw"), _pose)]
 PoseOrPoint = Annotated[Pose, Entries(("x", "y", "yaw"), _pose, optional=1)]

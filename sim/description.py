@@ -74,7 +74,7 @@ class OdometryOrigin(str, Enum):
 
 
 class Drive(Model):
-    """A velocity command that the robot gets without anybody publishing it.
+    """A velocity command that the robot gets without a message on its topic.
 
     For scenarios in which the student's node only listens to a robot that moves.
     """
@@ -89,7 +89,7 @@ class Drive(Model):
 class Push(Model):
     """A push that moves the robot besides its wheels; odometry tells of it like of any motion.
 
-    For scenarios that tell a node which looks where the robot is from one that only counts.
+    For scenarios that distinguish a node that reads where the robot is from one that only counts.
     """
 
     after: PositiveMetres = Field(description="Way along its path after which it begins.")
@@ -171,11 +171,6 @@ class DriftOptions(Model):
         description="Standard deviation of a wheel's way after one metre; it grows with the "
         "square root of the way.",
     )
-
-    @property
-    def is_off(self) -> bool:
-        """Whether odometry is exact."""
-        return not (self.radius or self.separation or self.slip)
 
 
 class CovarianceOptions(Model):
@@ -280,10 +275,5 @@ class SimulatorOptions(Model):
 
 
 def read_options(file: Path) -> SimulatorOptions:
-    """Read simulator options from a file of their own.
-
-    Raises:
-        UsageError: The file cannot be read.
-        AssignmentError: It says something that it must not; with file and line.
-    """
+    """Read simulator options from a file of their own."""
     return read_source(file).read(SimulatorOptions)

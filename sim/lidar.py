@@ -60,17 +60,13 @@ class Lidar:
         self.angle_min_rad = 0.0 if options.layout is Layout.FROM_ZERO else -math.pi
         self.angle_increment_rad = math.tau / options.beams
         self.angle_max_rad = self.angle_min_rad + (options.beams - 1) * self.angle_increment_rad
-        self.scan_time_s = 1.0 / options.rate
         self._world = world
-        self._walls = _Outlines.of([item for shape in world.shapes for item in shape.capsules])
-        angles = self.angle_min_rad + np.arange(options.beams) * self.angle_increment_rad
-        self._cos, self._sin = np.cos(angles), np.sin(angles)
+        self._walls = _outlines([item for shape in world.shapes for item in shape.capsules])
+        self.angles_rad = self.angle_min_rad + np.arange(options.beams) * self.angle_increment_rad
+        self._cos, self._sin = np.cos(self.angles_rad), np.sin(self.angles_rad)
 
     def cast(self, pose: Pose, time_ns: int) -> Floats:
-        """True distances.
-
-        Args:
-            pose: Of the robot, in the world's frame.
+        """True distances from a robot at a pose in the world's frame.
 
         Returns:
             Shape (beams,), metres, in the order of the beams; inf where nothing is within
@@ -80,7 +76,7 @@ class Lidar:
         ranges = np.full(self.options.beams, np.inf)
         self._see(self._walls, sensor, ranges)
         if self._world.moving:
-            self._see(_Outlines.of(obstacles_at(self._world.moving, time_ns)), sensor, ranges)
+            self._see(_outlines(obstacles_at(self._world.moving, time_ns)), sensor, ranges)
         ranges[ranges > self.options.range_max] = np.inf
         return ranges
 
@@ -88,9 +84,8 @@ class Lidar:
         """Take a scan.
 
         Args:
-            pose: Of the robot, in the world's frame.
-            noise: Where noise is drawn from: one number for each beam, whatever is seen, so
-                that a scan does not change the noise of the next; none without noise.
+            noise: One number is drawn for each beam, whatever is seen, so that a scan does not
+                change the noise of the next; none without noise.
         """
         options = self.options
         ranges = self.cast(pose, time_ns)
@@ -101,11 +96,12 @@ class Lidar:
         ranges[ranges < options.range_min] = 0.0 if is_zero else -np.inf
         return Scan(time_ns, ranges.astype(np.float32))
 
-    def _see(self, outlines: _Outlines, sensor: Pose, ranges: Floats) -> None:
-        if outlines.segments.shape[1]:
-            self._see_segments(outlines.segments, sensor, ranges)
-        if outlines.circles.shape[1]:
-            self._see_circles(outlines.circles, sensor, ranges)
+    def _see(self, outlines: tuple[Floats, Floats], sensor: Pose, ranges: Floats) -> None:
+        segments, circles = outlines
+        if segments.size:
+            self._see_segments(segments, sensor, ranges)
+        if circles.size:
+            self._see_circles(circles, sensor, ranges)
 
     def _see_segments(self, segments: Floats, sensor: Pose, ranges: Floats) -> None:
         ax, ay = _into_frame(segments[0], segments[1], sensor)
@@ -150,14 +146,11 @@ class Lidar:
         np.minimum.at(ranges, beam, np.maximum(distance, 0.0))
 
     def _pairs(self, begin_rad: Floats, sweep_rad: Floats) -> tuple[Ints, Ints]:
-        """All pairs of a wall and a beam that meets it.
+        """All pairs of a wall and a beam that meets it, as indices of shape (pairs,) each.
 
         Args:
             begin_rad: Shape (walls,), clockwise end of each wall as a direction.
             sweep_rad: Shape (walls,), how far it reaches counter-clockwise from there.
-
-        Returns:
-            Index of the wall and index of the beam, each of shape (pairs,).
         """
         begin = (begin_rad - self.angle_min_rad) / self.angle_increment_rad
         end = begin + sweep_rad / self.angle_increment_rad
@@ -170,26 +163,14 @@ class Lidar:
         return wall, np.remainder(beam, self.options.beams)
 
 
-@dataclass(frozen=True)
-class _Outlines:
-    """Outlines as arrays.
-
-    Attributes:
-        segments: Shape (4, n): x1, y1, x2, y2.
-        circles: Shape (3, m): x, y, radius.
-    """
-
-    segments: Floats
-    circles: Floats
-
-    @classmethod
-    def of(cls, capsules: list[Capsule]) -> _Outlines:
-        segments = [item[:4] for item in capsules if item[4] == 0.0]
-        circles = [(item[0], item[1], item[4]) for item in capsules if item[4] > 0.0]
-        return cls(
-            np.array(segments, dtype=float).reshape(-1, 4).T.copy(),
-            np.array(circles, dtype=float).reshape(-1, 3).T.copy(),
-        )
+def _outlines(capsules: list[Capsule]) -> tuple[Floats, Floats]:
+    """Segments, shape (4, n): x1, y1, x2, y2; and circles, shape (3, m): x, y, radius."""
+    segments = [item[:4] for item in capsules if item[4] == 0.0]
+    circles = [(item[0], item[1], item[4]) for item in capsules if item[4] > 0.0]
+    return (
+        np.array(segments, dtype=float).reshape(-1, 4).T.copy(),
+        np.array(circles, dtype=float).reshape(-1, 3).T.copy(),
+    )
 
 
 def _into_frame(x: Floats, y: Floats, sensor: Pose) -> tuple[Floats, Floats]:

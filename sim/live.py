@@ -5,14 +5,17 @@ from __future__ import annotations
 import signal
 import sys
 import time
+from collections.abc import Iterable
+from contextlib import nullcontext, suppress
 from pathlib import Path
-from types import FrameType, TracebackType
-from typing import Any, TextIO
+from typing import Any
 
 import rclpy
 from pydantic import TypeAdapter, ValidationError
 from rclpy.context import Context
 from rclpy.signals import SignalHandlerOptions
+from rich.console import Console
+from rich.live import Live
 
 from grader.errors import UsageError
 from grader.spec.nearest_name import did_you_mean
@@ -23,36 +26,38 @@ from sim.node import RosSimulator, make_node
 from sim.robot import MODELS
 from sim.screen import Screen
 from sim.simulation import make_simulation
-from sim.world import Values, read_world
+from sim.world import read_world
+
+_REFRESH_NS = NS // 10
+_LINE_NS = NS
 
 
 def run(
-    world_file: Path,
+    world: Path,
     *,
-    options_file: Path | None = None,
+    options: Path | None = None,
     robot: str | None = None,
     pose: str | None = None,
     seed: int = 0,
     domain_id: int | None = None,
-    values: Values | None = None,
-    duration_s: float | None = None,
-    output: TextIO | None = None,
+    values: Iterable[str] | None = None,
+    duration: float | None = None,
 ) -> None:
-    """Simulate in real time until Ctrl-C.
+    """Simulate in real time until Ctrl-C, with a view on a terminal, else a line in a second.
 
     Args:
-        options_file: Robot, sensors and topics; if left out, the defaults.
+        options: File with robot, sensors and topics; if left out, the defaults.
         domain_id: ROS domain; if left out, ROS_DOMAIN_ID.
-        duration_s: End after so much simulated time, or None.
-        output: Where to write; if it is no terminal, one line in a second.
+        values: Of the world, each as ``NAME=VALUE``.
+        duration: End after so many simulated seconds, or None.
 
     Raises:
         UsageError: A file cannot be read, or there is no such robot or pose.
         AssignmentError: A file says something that it must not.
     """
-    world = read_world(world_file, values)
-    options = _options(options_file, robot, pose)
-    simulation = make_simulation(world, options, seed)
+    read = read_world(world, _read_values(values or ()))
+    chosen = _options(options, robot, pose)
+    simulation = make_simulation(read, chosen, seed)
     context = Context()
     # Ctrl-C is ours: rclpy's handler would shut the context down within a step.
     rclpy.init(
@@ -61,62 +66,49 @@ def run(
         domain_id=domain_id,
         signal_handler_options=SignalHandlerOptions.NO,
     )
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         node: Any = make_node("rosgrade_sim", context)
-        screen = Screen(world, simulation, options)
-        simulator = RosSimulator(node, simulation, options, screen)
-        screen.simulator = simulator
-        with _Interrupts() as interrupts:
-            _loop(simulator, screen, interrupts, duration_s, output or sys.stdout)
+        screen = Screen(simulation)
+        screen.simulator = RosSimulator(node, simulation, screen)
+        with suppress(KeyboardInterrupt):
+            _loop(screen.simulator, screen, None if duration is None else round(duration * NS))
         node.destroy_node()
     finally:
+        signal.signal(signal.SIGTERM, before)
         context.try_shutdown()
 
 
-def _loop(
-    simulator: RosSimulator,
-    screen: Screen,
-    interrupts: _Interrupts,
-    duration_s: float | None,
-    output: TextIO,
-) -> None:
-    end_ns = None if duration_s is None else round(duration_s * NS)
-    with screen.shown(output) as show:
+def _loop(simulator: RosSimulator, screen: Screen, end_ns: int | None) -> None:
+    console = Console()
+    # We refresh it ourselves between two steps; a thread of rich's would disturb them.
+    live = Live(console=console, screen=True, auto_refresh=False, redirect_stdout=False)
+    is_terminal = sys.stdout.isatty()
+    every_ns = _REFRESH_NS if is_terminal else _LINE_NS
+    next_ns = every_ns
+    with live if is_terminal else nullcontext():
         deadline_ns = simulator.start()
-        while not interrupts.came and (end_ns is None or screen.time_ns < end_ns):
+        while end_ns is None or screen.time_ns < end_ns:
             time.sleep(max(0.0, (deadline_ns - time.monotonic_ns()) / NS))
             deadline_ns = simulator.catch_up()
-            if deadline_ns > time.monotonic_ns():  # never draw while steps wait
-                show()
+            # Never draw while steps wait.
+            if screen.time_ns < next_ns or deadline_ns <= time.monotonic_ns():
+                continue
+            next_ns = (screen.time_ns // every_ns + 1) * every_ns
+            if is_terminal:
+                live.update(screen.picture(*console.size), refresh=True)
+            else:
+                print(screen.line(), flush=True)
 
 
-class _Interrupts:
-    """Notices SIGINT and SIGTERM while its block runs.
-
-    A plain flag: a handler that sets a threading.Event may run while its own thread holds the
-    lock of that event.
-    """
-
-    def __init__(self) -> None:
-        self.came = False
-        self._before: dict[signal.Signals, Any] = {}
-
-    def __enter__(self) -> _Interrupts:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            self._before[number] = signal.signal(number, self._notice)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def _notice(self, number: int, frame: FrameType | None) -> None:
-        self.came = True
+def _read_values(texts: Iterable[str]) -> dict[str, str]:
+    values = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise UsageError(f"--set {text}: write NAME=VALUE")
+        values[name] = value
+    return values
 
 
 def _options(file: Path | None, robot: str | None, pose: str | None) -> SimulatorOptions:
@@ -133,11 +125,7 @@ def _options(file: Path | None, robot: str | None, pose: str | None) -> Simulato
 
 
 def parse_pose(text: str) -> Pose:
-    """Read a pose from a command line, such as ``"1, 0.5, 90 deg"``.
-
-    Raises:
-        UsageError: It is not one.
-    """
+    """Read a pose from a command line, such as ``"1, 0.5, 90 deg"``."""
     entries = [part.strip() for part in text.strip().strip("[]").split(",")]
     try:
         return TypeAdapter(PoseInPlane).validate_python(entries)

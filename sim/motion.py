@@ -15,12 +15,10 @@ NS = 1_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where something is, in a parent frame.
+    """A position and a heading in a parent frame.
 
     Attributes:
-        x_m: Metres along the parent's x axis.
-        y_m: Metres along the parent's y axis.
-        yaw_rad: Heading in [-pi, pi], counter-clockwise from the parent's x axis.
+        yaw_rad: In [-pi, pi], counter-clockwise from the parent's x axis.
     """
 
     x_m: float
@@ -30,17 +28,13 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """A velocity in the robot's own frame; also what a command asks for.
-
-    Attributes:
-        angular_rad_s: Counter-clockwise is positive.
-    """
+    """A velocity in the robot's own frame, or a command for it; counter-clockwise is positive."""
 
     linear_m_s: float
     angular_rad_s: float
 
     def __add__(self, other: Twist) -> Twist:
-        """Both velocities together."""
+        """The sum of two velocities."""
         return Twist(self.linear_m_s + other.linear_m_s, self.angular_rad_s + other.angular_rad_s)
 
     @property

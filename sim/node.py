@@ -1,14 +1,11 @@
 """The simulator on ROS topics: a thin layer that only converts messages and keeps time.
 
-It needs no executor, so that it can live in a node that somebody else spins, or in one that
-nobody does: it takes commands from their subscription by itself. And it wakes up only when
+It needs no executor: it takes commands from their subscription by itself, and wakes up only when
 there is something to publish. Steps between two messages are invisible, so they are done
-together with the next visible one; commands are put into the step at which they arrived, by
-the time at which the middleware received them. The result is that of doing every step at its
-time, for a third of the CPU time (a process that wakes up finds its caches cold, and that
-costs more than the physics). So a moment in which this loop is held up delays messages, which
-is reported, but does not change where the robot is. A command acts from the first step that
-begins after it arrived.
+together with the next visible one; a command acts from the first step that begins after the
+middleware had received it. The result is that of doing every step at its time, for a third of
+the CPU time. So a moment in which this loop is held up delays messages, which is reported, but
+does not change where the robot is.
 """
 
 from __future__ import annotations
@@ -27,7 +24,6 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from sim.description import SimulatorOptions
 from sim.motion import NS, Twist
 from sim.pacing import Lateness, Pacer
 from sim.publishers import (
@@ -42,10 +38,10 @@ from sim.simulation import Simulation, Step
 
 
 class Sink(Protocol):
-    """Who wants to know the truth, such as a recording.
+    """Receiver of the truth, such as a recording.
 
-    Both are called from the loop and must be quick. Steps come in their order, but several at
-    a time (see the module).
+    Both methods are called from the loop and must be quick. Steps come in their order, but
+    several at a time (see the module).
     """
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
@@ -71,40 +67,31 @@ class PolledGroup(CallbackGroup):
 
 
 class RosSimulator:
-    """A simulation whose robot listens and whose sensors speak.
+    """A simulation whose robot listens and whose sensors publish.
 
-    Whoever owns the loop calls :meth:`start` once and then :meth:`catch_up` again and again,
-    each time at or after the deadline that the last call returned; :meth:`run` does so until
-    an event is set and suits a thread of its own.
+    Its loop calls :meth:`start` once and then :meth:`catch_up` again and again, each time at or
+    after the deadline that the last call returned; :meth:`run` does so until an event is set
+    and suits a thread of its own.
     """
 
     def __init__(
         self,
         node: Node,
         simulation: Simulation,
-        options: SimulatorOptions,
         sink: Sink | None = None,
         steady_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Create publishers and the subscription in a node; nothing is sent yet.
-
-        Args:
-            node: Where; stays the caller's.
-            options: Topics and frames; the rest of it is already in the simulation.
-        """
+        """Create publishers and the subscription in a node of the caller; nothing is sent yet."""
         self._node, self._simulation, self._sink = node, simulation, sink
         self._steady_ns = steady_ns
+        options, lidar = simulation.options, simulation.lidar
         topics = options.topics
-        lidar, odometry = simulation.lidar, simulation.sensors.odometry
-        self.odometry = OdometryPublisher(node, topics.odometry, odometry)
+        self.odometry = OdometryPublisher(node, topics.odometry, options.odometry)
         self.scan = ScanPublisher(node, topics.scan, lidar)
         self.clock = ClockPublisher(node, topics.clock) if topics.clock.enabled else None
         tf = transform_type() if topics.tf.enabled else None
-        self.transforms = (
-            TransformPublisher(node, topics.tf, odometry, lidar, tf) if tf is not None else None
-        )
+        self.transforms = tf and TransformPublisher(node, topics.tf, options.odometry, lidar, tf)
         package, _, name = topics.command.type.split("/")
-        self._is_stamped = name == "TwistStamped"
         self.command: Any = node.create_subscription(
             getattr(importlib.import_module(f"{package}.msg"), name),
             topics.command.topic,
@@ -113,14 +100,11 @@ class RosSimulator:
             callback_group=PolledGroup(),
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
-        self._command_topic, self._command_type = topics.command.topic, topics.command.type
-        self._most_commands = topics.command.depth
+        self._command = topics.command
         self._pacer: Pacer | None = None
         self._pending: deque[tuple[int, Twist]] = deque()
         self._stamp_ns = 0
         self.commands = 0
-        self.unreadable = 0
-        self.step: Step | None = None
 
     def start(self) -> int:
         """Let simulated time begin now."""
@@ -149,11 +133,10 @@ class RosSimulator:
         self._take_commands(now_ns - pacer.begin_ns)
         for _ in range(due):
             step = self._simulation.advance(self._command_by(self._simulation.time_ns))
-            pacer.done()
-            self._tell(step)
-        # Whoever wants a clock wants to see every step.
-        visible_ns = 0 if self.clock is not None else self._simulation.next_output_ns
-        return pacer.plan(visible_ns)
+            pacer.done += 1
+            self._publish(step)
+        # With a clock every step is visible.
+        return pacer.plan(0 if self.clock is not None else self._simulation.next_output_ns)
 
     def run(self, stop: threading.Event) -> None:
         """Keep time until ``stop`` is set or the node's context is shut down."""
@@ -171,38 +154,28 @@ class RosSimulator:
 
     @property
     def unheard(self) -> tuple[str, ...]:
-        """Other types that somebody publishes on the topic of the commands."""
-        found = self._node.get_publishers_info_by_topic(self._command_topic)
-        return tuple(sorted({item.topic_type for item in found} - {self._command_type}))
-
-    def destroy(self) -> None:
-        """Take the publishers and the subscription out of the node."""
-        for part in (self.odometry, self.scan, self.clock, self.transforms):
-            if part is not None:
-                self._node.destroy_publisher(part.publisher)
-        if self.transforms is not None:
-            self._node.destroy_publisher(self.transforms.static_publisher)
-        self._node.destroy_subscription(self.command)
+        """Other types that are published on the topic of the commands."""
+        found = self._node.get_publishers_info_by_topic(self._command.topic)
+        return tuple(sorted({item.topic_type for item in found} - {self._command.type}))
 
     def _take_commands(self, now_ns: int) -> None:
         """Take what the queue holds, with the simulated time at which it arrived."""
         # Bounded, for a student may publish faster than we take.
-        for _ in range(self._most_commands):
+        for _ in range(self._command.depth):
             try:
                 with self.command.handle:
                     taken = self.command.handle.take_message(self.command.msg_type, False)
             except RuntimeError:  # a payload that is no such message
                 if not self._node.context.ok():
                     raise
-                self.unreadable += 1
                 continue
             if taken is None:
                 return
             self.commands += 1
             message, info = taken
-            # Arrived by now, whatever somebody did to the system's clock meanwhile.
+            # Arrived by now, even if the system's clock has jumped meanwhile.
             arrived_ns = min(info["received_timestamp"] - self._stamp_ns, now_ns)
-            twist = message.twist if self._is_stamped else message
+            twist = getattr(message, "twist", message)
             self._pending.append((arrived_ns, Twist(twist.linear.x, twist.angular.z)))
 
     def _command_by(self, time_ns: int) -> Twist | None:
@@ -212,9 +185,8 @@ class RosSimulator:
             newest = self._pending.popleft()[1]
         return newest
 
-    def _tell(self, step: Step) -> None:
+    def _publish(self, step: Step) -> None:
         stamp_ns = self._stamp_ns + step.time_ns
-        self.step = step
         if self._sink is not None:
             self._sink.on_step(step, stamp_ns)
         if self.clock is not None:

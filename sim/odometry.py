@@ -44,28 +44,22 @@ class WheelOdometry:
         """Begin at rest.
 
         Args:
-            options: Its errors and where the frame ``odom`` is.
             start: True pose of the robot at the beginning, in the world's frame.
         """
+        drift = options.drift
         self._origin = ORIGIN if options.origin is OdometryOrigin.WORLD else start
-        self._is_exact = options.drift.is_off
+        self._is_exact = not (drift.radius or drift.separation or drift.slip)
         self._belief = relative(self._origin, start)
         self._separation_m = wheel_separation_m
-        self._slip_m = options.drift.slip
+        self._slip_m = drift.slip
         self._random = random
-        errors = random.standard_normal(3)
-        self._left = 1.0 + options.drift.radius * float(errors[0])
-        self._right = 1.0 + options.drift.radius * float(errors[1])
-        self._believed_separation_m = wheel_separation_m * (
-            1.0 + options.drift.separation * float(errors[2])
-        )
+        left, right, separation = random.standard_normal(3).tolist()
+        self._left = 1.0 + drift.radius * left
+        self._right = 1.0 + drift.radius * right
+        self._believed_separation_m = wheel_separation_m * (1.0 + drift.separation * separation)
 
     def move(self, way_m: float, turn_rad: float) -> None:
-        """Take a step of the true motion into account.
-
-        Args:
-            turn_rad: Change of heading, counter-clockwise.
-        """
+        """Take a step of the true motion into account, counter-clockwise turns positive."""
         if self._is_exact or (way_m == 0.0 and turn_rad == 0.0):
             return
         left_m = self._measured(way_m - 0.5 * turn_rad * self._separation_m, self._left)
@@ -80,15 +74,11 @@ class WheelOdometry:
             pose: The true pose in the world's frame, which exact odometry reports.
         """
         if not self._is_exact:
-            return OdometrySample(time_ns, self._belief, twist)
-        if self._origin is not ORIGIN:
+            pose = self._belief
+        elif self._origin is not ORIGIN:
             pose = relative(self._origin, pose)
         return OdometrySample(time_ns, pose, twist)
 
     def _measured(self, way_m: float, factor: float) -> float:
-        measured_m = way_m * factor
-        if self._slip_m:
-            measured_m += (
-                self._slip_m * math.sqrt(abs(way_m)) * float(self._random.standard_normal())
-            )
-        return measured_m
+        slip_m = self._slip_m and self._slip_m * self._random.standard_normal()
+        return way_m * factor + slip_m * math.sqrt(abs(way_m))

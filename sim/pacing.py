@@ -10,10 +10,10 @@ LATE_NS = 5_000_000
 """Being more than half a step behind is reported."""
 
 MAX_BATCH = 100
-"""So many steps are caught up at once at most, so that whoever owns the loop can end it."""
+"""Most steps that are caught up at once, so that the loop can be ended in between."""
 
 MAX_AHEAD = 5
-"""So many steps are done together at most where nobody could see a difference."""
+"""Most steps that are done together where no difference can be seen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +33,9 @@ class Pacer:
     """
 
     def __init__(self, begin_ns: int) -> None:
-        """Begin."""
+        """Begin at a time of the steady clock."""
         self.begin_ns = begin_ns
-        self._done = 0
+        self.done = 0
         self._planned = 1
 
     @property
@@ -45,30 +45,26 @@ class Pacer:
 
     def due(self, now_ns: int) -> int:
         """How many steps are over and not yet done, at most :data:`MAX_BATCH`."""
-        return max(0, min((now_ns - self.begin_ns) // STEP_NS - self._done, MAX_BATCH))
+        return max(0, min((now_ns - self.begin_ns) // STEP_NS - self.done, MAX_BATCH))
 
-    def lateness(self, now_ns: int, late_ns: int = LATE_NS) -> Lateness | None:
+    def lateness(self, now_ns: int) -> Lateness | None:
         """What is to be reported before the steps that are due are done, if anything."""
         behind_ns = now_ns - self.deadline_ns
-        if behind_ns <= late_ns:
+        if behind_ns <= LATE_NS:
             return None
-        return Lateness(self._done + 1, self.due(now_ns), behind_ns)
-
-    def done(self) -> None:
-        """Count a step."""
-        self._done += 1
+        return Lateness(self.done + 1, self.due(now_ns), behind_ns)
 
     def plan(self, output_ns: int | None) -> int:
         """Choose when to look again.
 
         Args:
-            output_ns: Simulated time of the next step that somebody will see, or None.
+            output_ns: Simulated time of the next step that is published, or None.
 
         Returns:
             The new :attr:`deadline_ns`: that of this step, but at most :data:`MAX_AHEAD`
             steps from here.
         """
-        most = self._done + MAX_AHEAD
+        most = self.done + MAX_AHEAD
         wanted = most if output_ns is None else min(output_ns // STEP_NS, most)
-        self._planned = max(self._done + 1, wanted)
+        self._planned = max(self.done + 1, wanted)
         return self.deadline_ns

@@ -1,4 +1,4 @@
-"""What the simulator says on its topics: one class for each topic, with messages reused.
+"""What the simulator publishes: one class for each topic, with messages reused.
 
 Only what changes from one message to the next is written again.
 """
@@ -25,7 +25,7 @@ from sim.motion import NS, Pose
 from sim.odometry import OdometrySample
 
 UNKNOWN_VARIANCE = 1e12
-"""Variance of what wheels cannot tell (z, roll, pitch), as Gazebo Classic's diff drive reports."""
+"""Variance of what wheels cannot measure (z, roll, pitch), as Gazebo Classic's diff drive."""
 
 
 def qos_profile(options: TopicOptions) -> QoSProfile:
@@ -55,7 +55,7 @@ class OdometryPublisher:
         for index, variance in enumerate(diagonal):
             self._message.pose.covariance[7 * index] = variance
             self._message.twist.covariance[7 * index] = variance
-        self.publisher = _publisher(node, Odometry, topic.topic, qos_profile(topic))
+        self.publisher = _publisher(node, Odometry, topic.topic, topic)
 
     def publish(self, sample: OdometrySample, stamp_ns: int) -> None:
         """Publish a sample."""
@@ -79,17 +79,17 @@ class ScanPublisher:
 
     def __init__(self, node: Node, topic: TopicOptions, lidar: Lidar) -> None:
         """Create the publisher."""
-        self._message = LaserScan()
         self._has_intensities = lidar.options.intensities
+        self._message = LaserScan(
+            angle_min=lidar.angle_min_rad,
+            angle_max=lidar.angle_max_rad,
+            angle_increment=lidar.angle_increment_rad,
+            scan_time=1.0 / lidar.options.rate,
+            range_min=lidar.options.range_min,
+            range_max=lidar.options.range_max,
+        )
         self._message.header.frame_id = lidar.options.frame
-        self._message.angle_min = lidar.angle_min_rad
-        self._message.angle_max = lidar.angle_max_rad
-        self._message.angle_increment = lidar.angle_increment_rad
-        self._message.time_increment = 0.0
-        self._message.scan_time = lidar.scan_time_s
-        self._message.range_min = lidar.options.range_min
-        self._message.range_max = lidar.options.range_max
-        self.publisher = _publisher(node, LaserScan, topic.topic, qos_profile(topic))
+        self.publisher = _publisher(node, LaserScan, topic.topic, topic)
 
     def publish(self, scan: Scan, stamp_ns: int) -> None:
         """Publish a scan."""
@@ -107,7 +107,7 @@ class ClockPublisher:
     def __init__(self, node: Node, topic: TopicOptions) -> None:
         """Create the publisher."""
         self._message = Clock()
-        self.publisher = _publisher(node, Clock, topic.topic, qos_profile(topic))
+        self.publisher = _publisher(node, Clock, topic.topic, topic)
 
     def publish(self, stamp_ns: int) -> None:
         """Publish a ROS time."""
@@ -125,19 +125,18 @@ class TransformPublisher:
 
         Args:
             topic: Names and QoS; the static transform is always transient-local.
+            tf: The type tf2_msgs/msg/TFMessage.
         """
-        self._moving = TransformStamped()
+        self._moving, self._fixed = TransformStamped(), TransformStamped()
         self._moving.header.frame_id = odometry.frame
-        self._moving.child_frame_id = odometry.child_frame
-        self._fixed = TransformStamped()
-        self._fixed.header.frame_id = odometry.child_frame
+        self._moving.child_frame_id = self._fixed.header.frame_id = odometry.child_frame
         self._fixed.child_frame_id = lidar.options.frame
         self._lidar_pose = lidar.options.pose
         self._type = tf
         self._message = tf(transforms=[self._moving])
-        self.publisher = _publisher(node, tf, topic.topic, qos_profile(topic))
+        self.publisher = _publisher(node, tf, topic.topic, topic)
         latched = topic.model_copy(update={"durability": "transient_local", "depth": 1})
-        self.static_publisher = _publisher(node, tf, topic.static_topic, qos_profile(latched))
+        self.static_publisher = _publisher(node, tf, topic.static_topic, latched)
 
     def publish_static(self, stamp_ns: int) -> None:
         """Publish where the LiDAR sits; late joiners get it too."""
@@ -158,10 +157,12 @@ def transform_type() -> Any | None:
         return None
 
 
-def _publisher(node: Node, message_type: Any, topic: str, qos: QoSProfile) -> Any:
+def _publisher(node: Node, message_type: Any, name: str, options: TopicOptions) -> Any:
     # Without event callbacks the publisher needs no executor.
     callbacks = PublisherEventCallbacks(use_default_callbacks=False)
-    return node.create_publisher(message_type, topic, qos, event_callbacks=callbacks)
+    return node.create_publisher(
+        message_type, name, qos_profile(options), event_callbacks=callbacks
+    )
 
 
 def _set_transform(transform: TransformStamped, pose: Pose, stamp_ns: int) -> None:

@@ -1,7 +1,5 @@
 """The robot: a differential drive with limits of speed and acceleration.
 
-Pure functions of a state; no clock, no random numbers, no walls (see :mod:`sim.contact`).
-
 Sources of the figures:
 
 - Speeds, wheel separation: ROBOTIS e-Manual, TurtleBot3, "Features", Hardware Specifications
@@ -21,8 +19,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from sim.description import Push, RobotOptions
-from sim.motion import NS, REST, Pose, Twist, integrate
+from sim.description import RobotOptions
+from sim.motion import Twist
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,43 +53,25 @@ WAFFLE = RobotModel("waffle", RobotLimits(0.26, 1.82, 1.0, 3.2), 0.22, 0.287)
 MODELS = {model.name: model for model in (BURGER, WAFFLE)}
 
 
-@dataclass(frozen=True, slots=True)
-class Robot:
-    """A robot and where it starts.
-
-    Attributes:
-        start: Where it starts, at rest, in the world's frame.
-        command_timeout_ns: It stops when no command came for so long, or None.
-        drives: Commands that it gets by itself, with the simulated time of each, in order.
-        pushes: Pushes that it gets, in order of the way.
-    """
-
-    model: RobotModel
-    start: Pose
-    command_timeout_ns: int | None = None
-    drives: tuple[tuple[int, Twist], ...] = ()
-    pushes: tuple[Push, ...] = ()
+def robot_model(options: RobotOptions) -> RobotModel:
+    """The robot that the YAML describes."""
+    model = MODELS[options.model]
+    limits = RobotLimits(
+        options.max_speed or model.limits.speed_m_s,
+        options.max_angular_speed or model.limits.angular_speed_rad_s,
+        options.max_acceleration or model.limits.acceleration_m_s2,
+        options.max_angular_acceleration or model.limits.angular_acceleration_rad_s2,
+    )
+    return replace(model, limits=limits, radius_m=options.radius or model.radius_m)
 
 
-@dataclass(frozen=True, slots=True)
-class State:
-    """A robot at a moment.
-
-    Attributes:
-        pose: In the world's frame.
-    """
-
-    pose: Pose
-    twist: Twist = REST
-
-
-def velocity(twist: Twist, command: Twist, dt_s: float, limits: RobotLimits) -> Twist:
+def next_velocity(twist: Twist, command: Twist, dt_s: float, limits: RobotLimits) -> Twist:
     """The velocity during the next step: as near to the command as the limits allow.
+
+    Linear and angular velocity are limited one by one, as by Gazebo's DiffDrive.
 
     Args:
         command: What is asked for; must be finite.
-        limits: What the drive can do; linear and angular are limited one by one, as
-            Gazebo's DiffDrive does.
     """
     return Twist(
         _approach(
@@ -106,45 +86,6 @@ def velocity(twist: Twist, command: Twist, dt_s: float, limits: RobotLimits) -> 
             limits.angular_speed_rad_s,
             limits.angular_acceleration_rad_s2 * dt_s,
         ),
-    )
-
-
-def step(state: State, command: Twist, dt_s: float, limits: RobotLimits) -> State:
-    """Move for one step in free space.
-
-    The velocity changes at the beginning of the step and is constant in it, so that the path
-    is an exact arc.
-
-    Args:
-        command: What is asked for; must be finite.
-
-    Returns:
-        The state after it. A robot at rest that is asked for nothing is returned as it is.
-    """
-    twist = velocity(state.twist, command, dt_s, limits)
-    if twist == REST and state.twist == REST:
-        return state
-    return State(integrate(state.pose, twist.linear_m_s, twist.angular_rad_s, dt_s), twist)
-
-
-def make_robot(options: RobotOptions, start: Pose) -> Robot:
-    """The robot that the YAML describes, at a start pose."""
-    model = MODELS[options.model]
-    limits = RobotLimits(
-        options.max_speed or model.limits.speed_m_s,
-        options.max_angular_speed or model.limits.angular_speed_rad_s,
-        options.max_acceleration or model.limits.acceleration_m_s2,
-        options.max_angular_acceleration or model.limits.angular_acceleration_rad_s2,
-    )
-    model = replace(model, limits=limits, radius_m=options.radius or model.radius_m)
-    timeout_s = options.command_timeout
-    drives = ((round(one.at * NS), Twist(one.linear, one.angular)) for one in options.drives)
-    return Robot(
-        model,
-        start,
-        None if timeout_s is None else round(timeout_s * NS),
-        tuple(sorted(drives, key=lambda drive: drive[0])),
-        tuple(sorted(options.pushes, key=lambda push: push.after)),
     )
 
 

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-from rich.live import Live
+import numpy as np
 from rich.text import Text
 
-from sim.description import SimulatorOptions
 from sim.lidar import Scan
 from sim.motion import NS, Pose, Twist
 from sim.pacing import Lateness
 from sim.simulation import EventKind, Simulation, Step
-from sim.view import Drawing, Layer, hit_points, range_towards
-from sim.world import World
+from sim.view import Layer, draw, hit_points, range_towards
 
 if TYPE_CHECKING:
     from sim.node import RosSimulator
@@ -30,24 +25,21 @@ _STYLES = {
     Layer.FOOTPRINT: "green",
     Layer.ROBOT: "bold green",
 }
-_REFRESH_NS = 100_000_000
-_LINE_NS = NS
 _SUMMARY_LINES = 9
 
 
 class Screen:
-    """What is shown; takes the truth from the simulator as its sink."""
+    """What is shown; receives the truth from the simulator as its sink."""
 
-    def __init__(self, world: World, simulation: Simulation, options: SimulatorOptions) -> None:
+    def __init__(self, simulation: Simulation) -> None:
         """Begin with nothing to show."""
         self.simulator: RosSimulator | None = None
-        self._world, self._simulation, self._options = world, simulation, options
-        self._drawing = Drawing(world, simulation.robot.model.radius_m)
+        self._simulation = simulation
         self._step: Step | None = None
         self._scan: tuple[Scan, Pose] | None = None
         self._late_steps = 0
         self._worst_late_ns = 0
-        self.rejected = 0
+        self._rejected = 0
 
     @property
     def time_ns(self) -> int:
@@ -57,7 +49,7 @@ class Screen:
     def on_step(self, step: Step, stamp_ns: int) -> None:
         """Keep the newest step and the newest scan."""
         self._step = step
-        self.rejected += sum(event.kind is EventKind.COMMAND_REJECTED for event in step.events)
+        self._rejected += sum(event.kind is EventKind.COMMAND_REJECTED for event in step.events)
         if step.scan is not None:
             self._scan = (step.scan, step.pose)
 
@@ -66,70 +58,47 @@ class Screen:
         self._late_steps += lateness.steps
         self._worst_late_ns = max(self._worst_late_ns, lateness.late_ns)
 
-    @contextmanager
-    def shown(self, output: TextIO) -> Iterator[_Show]:
-        """Show it while the block runs: a live view on a terminal, else a line in a second."""
-        if not output.isatty():
-            yield _Show(self, _LINE_NS, lambda: print(self.line(), file=output, flush=True))
-            return
-        console = Console(file=output)
-        # We refresh it ourselves between two steps; a thread of rich's would disturb them.
-        with Live(console=console, screen=True, auto_refresh=False, redirect_stdout=False) as live:
-            yield _Show(self, _REFRESH_NS, lambda: live.update(self.picture(console), refresh=True))
-
     def line(self) -> str:
         """Everything that matters in one line."""
         step = self._step
         if step is None:
             return "starting"
-        text = (
-            f"{step.time_ns / NS:8.2f} s  x {step.pose.x_m:+.3f} m  y {step.pose.y_m:+.3f} m  "
-            f"yaw {math.degrees(step.pose.yaw_rad):+.1f} deg  "
-            f"v {step.twist.linear_m_s:+.3f} m/s  w {step.twist.angular_rad_s:+.3f} rad/s  "
-            f"ahead {self._range(0.0)}"
-        )
+        parts = [f"{step.time_ns / NS:8.2f} s", *_place(step.pose), *_speeds(step.twist)]
+        parts.append(f"ahead {self._range(0.0)}")
         if step.contact:
-            text += f"  CONTACT with {step.contact}"
+            parts.append(f"CONTACT with {step.contact}")
         if self._late_steps:
-            text += f"  {self._late_steps} steps late"
-        return "  ".join([text, *self._complaints()])
+            parts.append(f"{self._late_steps} steps late")
+        return "  ".join([*parts, *self._complaints()])
 
-    def picture(self, console: Console) -> Text:
-        """The live view."""
-        columns, lines = console.size
+    def picture(self, columns: int, lines: int) -> Text:
+        """The live view, for a terminal of so many columns and lines."""
+        simulation, text = self._simulation, Text(no_wrap=True, overflow="crop")
+        hits = hit_points(simulation.lidar, *self._scan) if self._scan else np.empty((0, 2))
         rows = max(4, lines - _SUMMARY_LINES - 1)
-        pose = self._simulation.pose
-        scan, at = self._scan or (None, pose)
-        hits = hit_points(self._simulation.lidar, scan, at) if scan else []
-        text = Text(no_wrap=True, overflow="crop")
-        for line in self._drawing.lines(pose, self.time_ns, columns, rows, hits):
-            for run in line:
-                text.append(run.text, _STYLES[run.layer])
+        radius_m = simulation.model.radius_m
+        for line in draw(
+            simulation.world, simulation.pose, radius_m, self.time_ns, hits, columns, rows
+        ):
+            for characters, layer in line:
+                text.append(characters, _STYLES[layer])
             text.append("\n")
-        return text.append_text(self._summary())
+        for label, *parts in self._summary(self._step) if self._step else ():
+            style = "bold red" if label == "contact" and parts != ["none"] else ""
+            text.append(f"{label:<10}{'  '.join(parts)}\n", style)
+        return text
 
-    def _summary(self) -> Text:
-        step, text = self._step, Text()
-        if step is None:
-            return text
-        name = f"{self._world.file.name}, {self._simulation.robot.model.name}"
-        pose = step.pose
+    def _summary(self, step: Step) -> list[tuple[str, ...]]:
+        name = f"{self._simulation.world.file.name}, {self._simulation.model.name}"
+        directions = {"ahead": 0.0, "left": 0.5, "behind": 1.0, "right": -0.5}
         rows = [
             ("", name, f"{step.time_ns / NS:.1f} s", "Ctrl-C ends"),
-            (
-                "pose",
-                f"x {pose.x_m:+.3f} m",
-                f"y {pose.y_m:+.3f} m",
-                f"yaw {math.degrees(pose.yaw_rad):+.1f} deg",
-            ),
+            ("pose", *_place(step.pose)),
             ("velocity", *_speeds(step.twist)),
             ("command", *_speeds(step.command)),
             (
                 "scan",
-                f"ahead {self._range(0.0)}",
-                f"left {self._range(math.pi / 2)}",
-                f"behind {self._range(math.pi)}",
-                f"right {self._range(-math.pi / 2)}",
+                *(f"{side} {self._range(turn * math.pi)}" for side, turn in directions.items()),
             ),
             ("contact", f"with {step.contact}" if step.contact else "none"),
             *self._topics(),
@@ -137,13 +106,10 @@ class Screen:
         if self._late_steps:
             worst = f"at most {self._worst_late_ns / 1e6:.0f} ms"
             rows.append(("late", f"{self._late_steps} steps", worst))
-        for label, *parts in rows:
-            style = "bold red" if label == "contact" and step.contact else ""
-            text.append(f"{label:<10}{'  '.join(parts)}\n", style)
-        return text
+        return rows
 
     def _topics(self) -> list[tuple[str, ...]]:
-        simulator, topics = self.simulator, self._options.topics
+        simulator, topics = self.simulator, self._simulation.options.topics
         if simulator is None:
             return []
         publishers = simulator.command.get_publisher_count()
@@ -162,11 +128,11 @@ class Screen:
     def _complaints(self) -> list[str]:
         """What is wrong with the commands."""
         found = []
-        if self.rejected:
-            found.append(f"{self.rejected} commands not finite: the robot stops instead")
+        if self._rejected:
+            found.append(f"{self._rejected} commands not finite: the robot stops instead")
         unheard = self.simulator.unheard if self.simulator is not None else ()
         if unheard:
-            wanted = self._options.topics.command.type
+            wanted = self._simulation.options.topics.command.type
             found.append(f"{', '.join(unheard)} is not heard: the robot takes {wanted}")
         return found
 
@@ -176,19 +142,10 @@ class Screen:
         return f"{range_towards(self._simulation.lidar, self._scan[0], direction_rad):.2f} m"
 
 
-class _Show:
-    """Calls a function whenever so much simulated time has passed."""
-
-    def __init__(self, screen: Screen, every_ns: int, show: Callable[[], object]) -> None:
-        self._screen, self._every_ns, self._show = screen, every_ns, show
-        self._next_ns = every_ns
-
-    def __call__(self) -> None:
-        time_ns = self._screen.time_ns
-        if time_ns >= self._next_ns:
-            self._next_ns = (time_ns // self._every_ns + 1) * self._every_ns
-            self._show()
+def _place(pose: Pose) -> tuple[str, str, str]:
+    yaw_deg = math.degrees(pose.yaw_rad)
+    return f"x {pose.x_m:+.3f} m", f"y {pose.y_m:+.3f} m", f"yaw {yaw_deg:+.1f} deg"
 
 
 def _speeds(twist: Twist) -> tuple[str, str]:
-    return f"{twist.linear_m_s:+.3f} m/s", f"{twist.angular_rad_s:+.3f} rad/s"
+    return f"v {twist.linear_m_s:+.3f} m/s", f"w {twist.angular_rad_s:+.3f} rad/s"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from sim.motion import Pose, wrap_angle
 from sim.shapes import Shape, box, circle
@@ -15,11 +16,7 @@ MAX_SPEED_M_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """A place on the way.
-
-    Attributes:
-        pose: In the world's frame.
-    """
+    """A pose in the world's frame at a simulated time."""
 
     at_ns: int
     pose: Pose
@@ -31,10 +28,10 @@ class MovingObstacle:
 
     Attributes:
         label: Where it is in the YAML, such as ``moving[0]``.
-        radius_m: Radius of a circle, or None.
-        size_m: Length and width of a box, or None.
         path: At least one waypoint, times increasing. Before the first it stands there, after
             the last it stays (or starts over, if ``repeat``).
+        radius_m: Of a circle, or None.
+        size_m: Length and width of a box, or None.
         disappears_ns: It is gone from this time on, or None.
     """
 
@@ -69,22 +66,17 @@ class MovingObstacle:
             return first.pose
         if time_ns >= last.at_ns:
             return last.pose
-        index = next(i for i, point in enumerate(path) if time_ns < point.at_ns)
-        return _between(path[index - 1], path[index], time_ns)
+        before, after = next(pair for pair in pairwise(path) if time_ns < pair[1].at_ns)
+        share = (time_ns - before.at_ns) / (after.at_ns - before.at_ns)
+        a, b = before.pose, after.pose
+        return Pose(
+            a.x_m + share * (b.x_m - a.x_m),
+            a.y_m + share * (b.y_m - a.y_m),
+            wrap_angle(a.yaw_rad + share * wrap_angle(b.yaw_rad - a.yaw_rad)),
+        )
 
     def shape_at(self, pose: Pose) -> Shape:
         """Its outline when it is at a pose."""
         if self.radius_m is not None:
             return circle(self.label, pose.x_m, pose.y_m, self.radius_m, self.line)
         return box(self.label, pose, self.size_m or (0.0, 0.0), self.line)
-
-
-def _between(before: Waypoint, after: Waypoint, time_ns: int) -> Pose:
-    share = (time_ns - before.at_ns) / (after.at_ns - before.at_ns)
-    a, b = before.pose, after.pose
-    turn_rad = wrap_angle(b.yaw_rad - a.yaw_rad)
-    return Pose(
-        a.x_m + share * (b.x_m - a.x_m),
-        a.y_m + share * (b.y_m - a.y_m),
-        wrap_angle(a.yaw_rad + share * turn_rad),
-    )

@@ -1,4 +1,4 @@
-"""Shapes that stand in a world, reduced to what the rest computes with.
+"""Shapes that stand in a world.
 
 Everything is made of *capsules*: all points within ``radius`` of a line segment. A wall is a
 capsule of radius zero, a circle is a capsule whose segment is a point. So one distance
@@ -66,12 +66,7 @@ def polygon(label: str, corners: tuple[tuple[float, float], ...], line: int | No
 
 
 def box(label: str, pose: Pose, size_m: tuple[float, float], line: int | None = None) -> Shape:
-    """A filled rectangle.
-
-    Args:
-        label: See :class:`Shape`.
-        line: See :class:`Shape`.
-    """
+    """A filled rectangle."""
     half_x, half_y = 0.5 * size_m[0], 0.5 * size_m[1]
     cos, sin = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     corners = tuple(

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
+from fractions import Fraction
 
 import numpy as np
 
@@ -17,8 +18,7 @@ from sim.description import LidarOptions, OdometryOptions, SimulatorOptions
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, REST, Pose, Twist, integrate
 from sim.odometry import OdometrySample, WheelOdometry
-from sim.robot import Robot, State, make_robot, velocity
-from sim.schedule import Schedule
+from sim.robot import next_velocity, robot_model
 from sim.world import World
 
 STEP_NS = 10_000_000
@@ -73,43 +73,68 @@ class Step:
     odometry: OdometrySample | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Sensors:
-    """The sensors of a simulation."""
+class Schedule:
+    """When the data of a sensor are due.
 
-    lidar: LidarOptions = field(default_factory=LidarOptions)
-    odometry: OdometryOptions = field(default_factory=OdometryOptions)
+    The k-th time (from 1) is ``k / rate`` exactly, as a fraction: 30 Hz on steps of 10 ms comes
+    after 40, 30, 30, 40, ... ms, 300 times in every 10 s.
+    """
+
+    def __init__(self, options: LidarOptions | OdometryOptions) -> None:
+        """Begin at simulated time 0."""
+        self._rate = Fraction(options.rate).limit_denominator(1_000_000)
+        self._starts_ns = round(options.starts * NS)
+        self._stops_ns = math.inf if options.stops is None else round(options.stops * NS)
+        self._next = 1
+
+    def next_ns(self) -> int:
+        """End of the step at which it will be due."""
+        return STEP_NS * math.ceil(self._next * NS / (self._rate * STEP_NS))
+
+    def is_due(self, time_ns: int) -> bool:
+        """Whether it is due at a time; times must increase."""
+        count = math.floor(time_ns * self._rate / NS)
+        if count < self._next:
+            return False
+        self._next = count + 1
+        return self._starts_ns <= time_ns < self._stops_ns
 
 
 class Simulation:
-    """The stepping core."""
+    """The stepping core.
 
-    def __init__(self, world: World, robot: Robot, sensors: Sensors, seed: int = 0) -> None:
+    Attributes:
+        pose: True pose now.
+    """
+
+    def __init__(self, world: World, options: SimulatorOptions, seed: int = 0) -> None:
         """Begin at simulated time 0, at rest.
 
         Args:
             seed: Of the noise of the LiDAR and the drift of odometry, which are drawn
                 independently of each other.
         """
-        self.world, self.robot, self.sensors, self.seed = world, robot, sensors, seed
-        self.lidar = Lidar(world, sensors.lidar)
+        self.world, self.options = world, options
+        self.model = robot_model(options.robot)
+        self.lidar = Lidar(world, options.lidar)
+        self.pose = options.start(world.start)
         lidar_seed, odometry_seed = np.random.SeedSequence(seed).spawn(2)
         self._noise = np.random.default_rng(lidar_seed)
         self._odometry = WheelOdometry(
-            sensors.odometry,
-            robot.start,
-            robot.model.wheel_separation_m,
+            options.odometry,
+            self.pose,
+            self.model.wheel_separation_m,
             np.random.default_rng(odometry_seed),
         )
-        self._contacts = ContactFinder(world, robot.model.radius_m)
-        self._scans = _schedule(sensors.lidar)
-        self._samples = _schedule(sensors.odometry)
-        self._drives = deque(robot.drives)
-        self._pushes = deque(robot.pushes)
+        self._contacts = ContactFinder(world, self.model.radius_m)
+        self._scans = Schedule(options.lidar) if options.lidar.enabled else None
+        self._samples = Schedule(options.odometry) if options.odometry.enabled else None
+        self._drives = deque(sorted(options.robot.drives, key=lambda drive: drive.at))
+        self._pushes = deque(sorted(options.robot.pushes, key=lambda push: push.after))
         self._pushed: tuple[int, Twist] = (0, REST)
         self._way_m = 0.0
         self._index = 0
-        self._state = State(robot.start)
+        self._wheels = REST
         self._motion = REST
         self._command = REST
         self._commanded_ns: int | None = None
@@ -121,15 +146,9 @@ class Simulation:
         return self._index * STEP_NS
 
     @property
-    def pose(self) -> Pose:
-        """True pose now."""
-        return self._state.pose
-
-    @property
     def next_output_ns(self) -> int | None:
         """Simulated time of the next step that brings data of a sensor, or None without one."""
-        times = [schedule.next_ns(STEP_NS) for schedule in (self._scans, self._samples) if schedule]
-        return min(times, default=None)
+        return min((one.next_ns() for one in (self._scans, self._samples) if one), default=None)
 
     def advance(self, command: Twist | None = None) -> Step:
         """Simulate one step of 10 ms.
@@ -144,13 +163,12 @@ class Simulation:
                 next, unless the robot has a command timeout.
         """
         events: list[Event] = []
-        if self._drives and self._drives[0][0] <= self.time_ns:
-            command = command or self._drives[0][1]
-            self._drives.popleft()
-        if command is not None or self._command is not REST:
-            self._obey(command, events)
+        if self._drives and round(self._drives[0].at * NS) <= self.time_ns:
+            drive = self._drives.popleft()
+            command = command or Twist(drive.linear, drive.angular)
+        self._obey(command, events)
         self._index += 1
-        time_ns = self._index * STEP_NS
+        time_ns = self.time_ns
         contact = self._move(time_ns, self._push(time_ns, events))
         if contact != self._contact:
             if self._contact is not None:
@@ -158,16 +176,15 @@ class Simulation:
             if contact is not None:
                 events.append(Event(EventKind.CONTACT_BEGAN, contact))
             self._contact = contact
-        state = self._state
         scan = sample = None
         if self._scans is not None and self._scans.is_due(time_ns):
-            scan = self.lidar.scan(state.pose, time_ns, self._noise)
+            scan = self.lidar.scan(self.pose, time_ns, self._noise)
         if self._samples is not None and self._samples.is_due(time_ns):
-            sample = self._odometry.sample(time_ns, state.pose, self._motion)
+            sample = self._odometry.sample(time_ns, self.pose, self._motion)
         return Step(
             self._index,
             time_ns,
-            state.pose,
+            self.pose,
             self._motion,
             self._command,
             contact,
@@ -177,25 +194,20 @@ class Simulation:
         )
 
     def _obey(self, command: Twist | None, events: list[Event]) -> None:
-        now_ns = self._index * STEP_NS
-        if command is not None:
-            self._commanded_ns = now_ns
-            if command.is_finite:
-                self._command = command
-            else:
-                self._command = REST
-                text = f"linear {command.linear_m_s}, angular {command.angular_rad_s}"
-                events.append(Event(EventKind.COMMAND_REJECTED, text))
-            return
-        timeout_ns = self.robot.command_timeout_ns
-        if (
-            timeout_ns is not None
+        timeout_s = self.options.robot.command_timeout
+        if command is not None and command.is_finite:
+            self._command, self._commanded_ns = command, self.time_ns
+        elif command is not None:
+            self._command, self._commanded_ns = REST, None
+            text = f"linear {command.linear_m_s}, angular {command.angular_rad_s}"
+            events.append(Event(EventKind.COMMAND_REJECTED, text))
+        elif (
+            timeout_s is not None
             and self._commanded_ns is not None
-            and now_ns - self._commanded_ns >= timeout_ns
+            and self.time_ns - self._commanded_ns >= round(timeout_s * NS)
         ):
-            self._commanded_ns = None
-            self._command = REST
-            events.append(Event(EventKind.COMMAND_TIMEOUT, f"none for {timeout_ns / NS:g} s"))
+            self._command, self._commanded_ns = REST, None
+            events.append(Event(EventKind.COMMAND_TIMEOUT, f"none for {timeout_s:g} s"))
 
     def _push(self, time_ns: int, events: list[Event]) -> Twist:
         """The velocity that a push adds in the step that ends at a time."""
@@ -209,31 +221,23 @@ class Simulation:
         return twist if time_ns < until_ns else REST
 
     def _move(self, time_ns: int, push: Twist) -> str | None:
-        state = self._state
-        wheels = velocity(state.twist, self._command, STEP_S, self.robot.model.limits)
-        twist = wheels + push
-        linear_m_s, angular_rad_s = twist.linear_m_s, twist.angular_rad_s
-        pose = state.pose
-        contact = self._contacts.find(pose, linear_m_s, angular_rad_s, STEP_S, time_ns)
-        self._motion = twist
-        if twist == REST:
-            if state.twist != wheels:
-                self._state = State(pose, wheels)
+        """Move along an exact arc: the velocity is constant within a step."""
+        self._wheels = next_velocity(self._wheels, self._command, STEP_S, self.model.limits)
+        self._motion = self._wheels + push
+        pose, linear, angular = self.pose, self._motion.linear_m_s, self._motion.angular_rad_s
+        contact = self._contacts.find(pose, linear, angular, STEP_S, time_ns)
+        if self._motion == REST:
             return contact.label
+        self.pose = integrate(pose, linear, angular, STEP_S)
         if contact.share < 1.0:
             # Turning goes on: a circle can turn where it touches.
-            wheels = Twist(0.0, wheels.angular_rad_s)
-            self._motion = Twist(0.0, angular_rad_s)
-            reached = pose
-            if contact.share > 0.0:
-                reached = integrate(pose, linear_m_s, angular_rad_s, STEP_S * contact.share)
-            turned = integrate(pose, 0.0, angular_rad_s, STEP_S)
-            self._state = State(Pose(reached.x_m, reached.y_m, turned.yaw_rad), wheels)
-        else:
-            self._state = State(integrate(pose, linear_m_s, angular_rad_s, STEP_S), wheels)
-        way_m = linear_m_s * STEP_S * contact.share
+            self._wheels = Twist(0.0, self._wheels.angular_rad_s)
+            self._motion = Twist(0.0, angular)
+            reached = integrate(pose, linear, angular, STEP_S * contact.share)
+            self.pose = Pose(reached.x_m, reached.y_m, self.pose.yaw_rad)
+        way_m = linear * STEP_S * contact.share
         self._way_m += abs(way_m)
-        self._odometry.move(way_m, angular_rad_s * STEP_S)
+        self._odometry.move(way_m, angular * STEP_S)
         return contact.label
 
 
@@ -243,13 +247,6 @@ def make_simulation(world: World, options: SimulatorOptions, seed: int = 0) -> S
     Raises:
         AssignmentError: The robot would start inside a wall.
     """
-    robot = make_robot(options.robot, options.start(world.start))
-    world.check_start(robot.start, robot.model.radius_m)
-    return Simulation(world, robot, Sensors(options.lidar, options.odometry), seed)
-
-
-def _schedule(options: LidarOptions | OdometryOptions) -> Schedule | None:
-    if not options.enabled:
-        return None
-    stops_ns = None if options.stops is None else round(options.stops * NS)
-    return Schedule(options.rate, round(options.starts * NS), stops_ns)
+    simulation = Simulation(world, options, seed)
+    world.check_start(simulation.pose, simulation.model.radius_m)
+    return simulation

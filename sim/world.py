@@ -3,7 +3,7 @@
 The frame is fixed, x and y in metres, yaw counter-clockwise (REP-103). A world looks like::
 
     bounds: [-2, -2, 2, 2]                     # a wall all around: x_min, y_min, x_max, y_max
-    start: [0, 0, 90 deg]                      # where the robot starts if nobody says else
+    start: [0, 0, 90 deg]                      # where the robot starts by default
     values: {wall_x: 1.5}                      # the value of $wall_x by default
     segments:
       - [$wall_x, -1, $wall_x, 1]              # x1, y1, x2, y2
@@ -23,7 +23,6 @@ The frame is fixed, x and y in metres, yaw counter-clockwise (REP-103). A world 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,10 +32,9 @@ from grader.errors import AssignmentError, Problem
 from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.source import Source, parse_source, read_source
-from sim.coordinates import MIN_SIZE_M
 from sim.motion import ORIGIN, Pose
 from sim.script import MovingObstacle
-from sim.shapes import Shape, box, circle, polygon, wall
+from sim.shapes import Shape, polygon, wall
 from sim.world_model import WorldModel
 
 MAX_SEGMENTS = 3_000
@@ -76,27 +74,18 @@ class World:
             return (0.0, 0.0, 0.0, 0.0)
         return (min(xs), min(ys), max(xs), max(ys))
 
-    def obstruction(self, pose: Pose, radius_m: float, time_ns: int = 0) -> Problem | None:
-        """What keeps a robot from standing at a pose.
+    def obstruction(self, pose: Pose, radius_m: float) -> Problem | None:
+        """The shape that keeps a robot with a circular footprint from a pose, or None.
 
-        Args:
-            radius_m: Radius of its circular footprint.
-
-        Returns:
-            A problem with the line of the shape that is in the way, or None if it fits.
+        What moves is where it is at simulated time 0.
         """
         place = f"a robot with radius {radius_m:g} m cannot be at ({pose.x_m:g}, {pose.y_m:g})"
-        if self.bounds is not None:
-            x_min, y_min, x_max, y_max = self.bounds
-            if not (x_min < pose.x_m < x_max and y_min < pose.y_m < y_max):
-                line = next((shape.line for shape in self.shapes if shape.label == "bounds"), None)
-                return Problem(f"{place}: that is outside the bounds", line, "bounds")
-        shapes = list(self.shapes)
-        for obstacle in self.moving:
-            at = obstacle.pose_at(time_ns)
-            if at is not None:
-                shapes.append(obstacle.shape_at(at))
-        for shape in shapes:
+        starts = [(obstacle, obstacle.pose_at(0)) for obstacle in self.moving]
+        for shape in (*self.shapes, *(one.shape_at(at) for one, at in starts if at is not None)):
+            if shape.label == "bounds" and self.bounds is not None:
+                x_min, y_min, x_max, y_max = self.bounds
+                if not (x_min < pose.x_m < x_max and y_min < pose.y_m < y_max):
+                    return Problem(f"{place}: that is outside the bounds", shape.line, "bounds")
             clearance_m = shape.clearance_m(pose.x_m, pose.y_m)
             if clearance_m <= radius_m:
                 way = "this is there" if clearance_m <= 0.0 else f"this is {clearance_m:.3g} m away"
@@ -115,39 +104,26 @@ class World:
 
 
 def read_world(file: Path, values: Values | None = None) -> World:
-    """Read a world file.
-
-    Raises:
-        UsageError: The file cannot be read.
-        AssignmentError: It says something that it must not; with file and line.
-    """
+    """Read a world file."""
     return _world(read_source(file), values or {})
 
 
 def parse_world(text: str, file: Path = Path("world.yaml"), values: Values | None = None) -> World:
-    """Read a world from text; ``file`` is only named in errors.
-
-    Raises:
-        AssignmentError: As :func:`read_world`.
-    """
+    """Read a world from text; ``file`` is only named in errors."""
     return _world(parse_source(text, file), values or {})
 
 
 def _world(source: Source, values: Values) -> World:
     source = _with_values(source, values)
     model = source.read(WorldModel)
-    segments = len(model.segments) + 4 * len(model.boxes) + len(model.circles)
-    segments += sum(len(item.points) for item in model.polygons) + 4 * bool(model.bounds)
+    shapes = _shapes(model, source)
+    walls = sum(len(shape.capsules) for shape in shapes)
     problems: list[Problem] = []
-    if segments > MAX_SEGMENTS:
-        text = f"{segments} walls and circles: at most {MAX_SEGMENTS} are simulated"
-        problems.append(Problem(text))
+    if walls > MAX_SEGMENTS:
+        problems.append(Problem(f"{walls} walls and circles: at most {MAX_SEGMENTS} are simulated"))
     if len(model.moving) > MAX_MOVING:
         text = f"{len(model.moving)} moving obstacles: at most {MAX_MOVING} are simulated"
         problems.append(source.problem(("moving",), text))
-    if problems:
-        raise AssignmentError(source.file, problems)
-    shapes = _shapes(model, source, problems)
     if problems:
         raise AssignmentError(source.file, problems)
     moving = tuple(
@@ -157,35 +133,19 @@ def _world(source: Source, values: Values) -> World:
     return World(shapes, moving, model.bounds, model.start, source.file)
 
 
-def _shapes(model: WorldModel, source: Source, problems: list[Problem]) -> tuple[Shape, ...]:
+def _shapes(model: WorldModel, source: Source) -> tuple[Shape, ...]:
     found: list[Shape] = []
     if model.bounds is not None:
         x_min, y_min, x_max, y_max = model.bounds
-        if x_min >= x_max or y_min >= y_max:
-            text = "expected [x_min, y_min, x_max, y_max]: each min must be less than its max"
-            problems.append(source.problem(("bounds",), text))
         corners = ((x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max))
         # Unlike a polygon it is filled outside, so that it has no corners of its own.
         outline = polygon("bounds", corners, source.line(("bounds",)))
         found.append(replace(outline, corners=()))
-    for i, (x1, y1, x2, y2) in enumerate(model.segments):
-        if math.hypot(x2 - x1, y2 - y1) < MIN_SIZE_M:
-            problems.append(source.problem(("segments", i), "both ends are the same point"))
-        found.append(wall(f"segments[{i}]", x1, y1, x2, y2, source.line(("segments", i))))
-    for i, item in enumerate(model.boxes):
-        pose = Pose(*item.centre, item.yaw)
-        found.append(box(f"boxes[{i}]", pose, item.size, source.line(("boxes", i))))
-    for i, pillar in enumerate(model.circles):
-        line = source.line(("circles", i))
-        found.append(circle(f"circles[{i}]", *pillar.centre, pillar.radius, line))
-    for i, area in enumerate(model.polygons):
-        for j, (a, b) in enumerate(
-            zip(area.points, area.points[1:] + area.points[:1], strict=True)
-        ):
-            if math.dist(a, b) < MIN_SIZE_M:
-                text = "this corner is the same point as the next"
-                problems.append(source.problem(("polygons", i, "points", j), text))
-        found.append(polygon(f"polygons[{i}]", area.points, source.line(("polygons", i))))
+    for i, ends in enumerate(model.segments):
+        found.append(wall(f"segments[{i}]", *ends, source.line(("segments", i))))
+    for key in ("boxes", "circles", "polygons"):
+        for i, item in enumerate(getattr(model, key)):
+            found.append(item.shape(f"{key}[{i}]", source.line((key, i))))
     return tuple(found)
 
 

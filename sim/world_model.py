@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from pydantic import Field, model_validator
 
 from grader.spec.quantity import Angle, DurationOrZero
 from grader.spec.source import Model
-from sim.coordinates import Ends, Point, PoseInPlane, PoseOrPoint, PositiveMetres, Rectangle, Size
-from sim.motion import NS, ORIGIN, wrap_angle
+from sim.coordinates import (
+    MIN_SIZE_M,
+    Ends,
+    Point,
+    PoseInPlane,
+    PoseOrPoint,
+    PositiveMetres,
+    Rectangle,
+    Size,
+)
+from sim.motion import NS, ORIGIN, Pose, relative
 from sim.script import MAX_SPEED_M_S, MovingObstacle, Waypoint
+from sim.shapes import Shape, box, circle, polygon
 
 
 class BoxModel(Model):
@@ -20,12 +31,20 @@ class BoxModel(Model):
     size: Size = Field(description="Length (along x at yaw 0) and width.")
     yaw: Angle = Field(0.0, description="Counter-clockwise turn.")
 
+    def shape(self, label: str, line: int | None) -> Shape:
+        """What the simulation computes with."""
+        return box(label, Pose(*self.centre, self.yaw), self.size, line)
+
 
 class CircleModel(Model):
     """A round pillar."""
 
     centre: Point = Field(description="Where its middle is.")
     radius: PositiveMetres = Field(description="Its radius.")
+
+    def shape(self, label: str, line: int | None) -> Shape:
+        """What the simulation computes with."""
+        return circle(label, *self.centre, self.radius, line)
 
 
 class PolygonModel(Model):
@@ -34,6 +53,17 @@ class PolygonModel(Model):
     points: tuple[Point, ...] = Field(
         min_length=3, description="Corners in order; the last is joined to the first."
     )
+
+    @model_validator(mode="after")
+    def _has_edges(self) -> PolygonModel:
+        for i, point in enumerate(self.points):
+            if math.dist(self.points[i - 1], point) < MIN_SIZE_M:
+                raise ValueError(f"points[{i}] is the same point as the one before")
+        return self
+
+    def shape(self, label: str, line: int | None) -> Shape:
+        """What the simulation computes with."""
+        return polygon(label, self.points, line)
 
 
 class RoundModel(Model):
@@ -71,22 +101,19 @@ class MovingModel(Model):
             raise ValueError("give either 'circle' or 'box'")
         if self.disappears is not None and self.disappears <= self.appears:
             raise ValueError("it disappears before it appears")
-        obstacle = self.obstacle("")
-        for index, (before, after) in enumerate(
-            zip(obstacle.path, obstacle.path[1:], strict=False)
-        ):
-            duration_s = (after.at_ns - before.at_ns) / NS
-            if duration_s <= 0.0:
+        reach_m = self.obstacle("").reach_m
+        for index, (before, after) in enumerate(pairwise(self.path)):
+            duration_s = after.at - before.at
+            if _ns(duration_s) <= 0:
                 raise ValueError(f"path[{index + 1}] is not later than path[{index}]")
-            a, b = before.pose, after.pose
-            way_m = math.hypot(b.x_m - a.x_m, b.y_m - a.y_m)
-            way_m += abs(wrap_angle(b.yaw_rad - a.yaw_rad)) * obstacle.reach_m
+            way = relative(before.pose, after.pose)
+            way_m = math.hypot(way.x_m, way.y_m) + abs(way.yaw_rad) * reach_m
             if way_m > MAX_SPEED_M_S * duration_s:
                 raise ValueError(
                     f"from path[{index}] to path[{index + 1}] it moves at "
                     f"{way_m / duration_s:.3g} m/s: at most {MAX_SPEED_M_S:g} m/s are simulated"
                 )
-        if self.repeat and obstacle.path[0].pose != obstacle.path[-1].pose:
+        if self.repeat and self.path[0].pose != self.path[-1].pose:
             raise ValueError("to repeat, the last waypoint must be where the first one is")
         return self
 

@@ -30,16 +30,15 @@ def sim(
 
     In real time. It listens to /cmd_vel and speaks on /odom and /scan, like a TurtleBot3 in Gazebo.
     """
-    from sim.__main__ import read_values
     from sim.live import run
 
     run(
         world,
-        options_file=options,
+        options=options,
         robot=robot,
         pose=pose,
         seed=seed,
         domain_id=domain_id,
-        values=read_values(values or []),
-        duration_s=duration,
+        values=values,
+        duration=duration,
     )

@@ -13,8 +13,8 @@ from grader.assignment.model import Scenario
 from grader.assignment.random_values import draw_values, world_values
 from grader.assignment.simulation import read_scenario_world
 from grader.checks.messages.following import Follows
-from sim.robot import make_robot
-from sim.simulation import STEP_S, Sensors, Simulation
+from sim.description import SimulatorOptions
+from sim.simulation import STEP_S, Simulation
 
 SEEDS = range(200)
 WRONG = 0.2
@@ -28,9 +28,11 @@ def _odometry(scenario: Scenario, seed: int) -> Row:
     """Odometry of a run: rows of x, y, yaw, linear and angular velocity, z and w."""
     file = _CUSTOM_INTERFACE.folder / str(scenario.world)
     world = read_scenario_world(file, world_values(scenario, draw_values(scenario, seed)))
-    robot = make_robot(scenario.robot, world.start)
     assert scenario.odometry.continuous
-    simulation = Simulation(world, robot, Sensors(scenario.lidar, scenario.odometry), seed)
+    options = SimulatorOptions(
+        robot=scenario.robot, lidar=scenario.lidar, odometry=scenario.odometry
+    )
+    simulation = Simulation(world, options, seed)
     samples = []
     for _ in range(round((scenario.until.elapsed or 0.0) / STEP_S)):
         sample = simulation.advance().odometry

@@ -536,7 +536,7 @@ def simulated(truth: Sequence[Truth], scene: Scene, **changes: Any) -> Recording
 
 def scene_of(simulation: Simulation) -> Scene:
     """World and robot as a cell records them."""
-    model = simulation.robot.model
+    model = simulation.model
     return Scene(
         radius_m=model.radius_m,
         max_linear_m_s=model.limits.speed_m_s,

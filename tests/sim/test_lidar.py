@@ -160,7 +160,6 @@ def test_angles_agree_with_each_other() -> None:
         assert sensor.angle_min_rad == first
         assert sensor.angle_increment_rad == pytest.approx(math.radians(1.0))
         assert sensor.angle_max_rad == pytest.approx(first + 359 * sensor.angle_increment_rad)
-        assert sensor.scan_time_s == 0.2
 
 
 def test_the_other_layout_is_the_same_scan_rolled_by_half_a_turn() -> None:

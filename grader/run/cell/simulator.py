@@ -39,7 +39,7 @@ class SimulatedRobot:
         options = self._options = SimulatorOptions.model_validate_json(order.options)
         self._world = read_scenario_world(Path(order.world), order.values)
         self._simulation: Simulation = make_simulation(self._world, options, order.seed)
-        self._ros = RosSimulator(node, self._simulation, options, self)
+        self._ros = RosSimulator(node, self._simulation, self)
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
         self._start = self._simulation.pose
@@ -90,7 +90,7 @@ class SimulatedRobot:
 
     def scene(self) -> Scene:
         """World and robot."""
-        robot = self._simulation.robot.model
+        robot = self._simulation.model
         return Scene(
             radius_m=robot.radius_m,
             max_linear_m_s=robot.limits.speed_m_s,
