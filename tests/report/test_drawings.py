@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from grader.checks.finding import Moment, Plot
 from grader.recording.model import Call, Declaration, Ending, Message, Process
+from grader.report.drawing.axes import Scale, ticks
 from grader.report.drawing.flags import Flag, place
 from grader.report.drawing.plot import draw_plot
-from grader.report.drawing.svg import NARROW, WIDE, Scale, fitted, ticks
+from grader.report.drawing.svg import NARROW, WIDE, fitted
 from grader.report.drawing.timeline import draw_timeline
 from tests.report.sample import PROCESS, at, make_run
 

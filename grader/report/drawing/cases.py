@@ -10,24 +10,21 @@ from markupsafe import Markup
 
 from grader.checks.finding import Case, Cases
 from grader.checks.wording import counted
+from grader.report.drawing.axes import RIGHT, Scale, unit_of, value_axis
 from grader.report.drawing.svg import (
     LETTER,
-    NARROW,
-    WIDE,
     Figure,
     Point,
-    Scale,
     crosses,
     dots,
-    drawing,
     element,
+    figure,
     label,
     line,
-    unit_of,
 )
 from grader.safe_text import one_line
 
-HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 250, 62, 12, 26, 42
+HEIGHT, LEFT, TOP, BOTTOM = 250, 62, 26, 42
 FLOOR = 1e-9
 """Smaller errors are drawn here: noise of the arithmetic."""
 CEILING = 1e9
@@ -39,41 +36,31 @@ def draw_cases(cases: Cases, name: str) -> Figure:
     Args:
         name: Unique in the document; letters, digits and hyphens.
     """
-    caption = _caption(cases)
-    return Figure(
-        caption,
-        _draw(cases, caption, f"{name}-wide", WIDE),
-        _draw(cases, caption, f"{name}-narrow", NARROW),
-    )
-
-
-def _draw(cases: Cases, caption: str, name: str, width: float) -> Markup:
-    errors = [_clipped(case.error) for case in cases.cases if case.error is not None]
-    limit = _clipped(cases.limit)
-    low = math.floor(math.log10(min([*errors, limit])))
-    high = math.ceil(math.log10(max([*errors, limit])) + 1e-9)
+    errors = [_power_of(case.error) for case in cases.cases if case.error is not None]
+    limit = _power_of(cases.limit)
+    low = math.floor(min([*errors, limit]))
+    high = math.ceil(max([*errors, limit]) + 1e-9)
     y = Scale(low, high + (low == high), HEIGHT - BOTTOM, TOP)
-    x = Scale(0.5, max(1, len(cases.cases)) + 0.5, LEFT, width - RIGHT)
-    limit_y = y(math.log10(limit))
-    content = [
-        label(cases.label, 0, 12),
-        label("case", x.end, HEIGHT - 4, anchor="end"),
-        element(
-            "rect", x=LEFT, y=limit_y, width=x.end - LEFT, height=y.begin - limit_y, class_="band"
-        ),
-    ]
     every = max(1, math.ceil((y.high - y.low) / 6))
-    for power in range(int(y.low), int(y.high) + 1, every):
-        content.append(line(LEFT, y(power), x.end, y(power), "grid"))
-        content.append(label(_power(power), LEFT - 8, y(power) + 4, anchor="end"))
-    content += _groups(cases.cases, x, y)
-    content.append(line(LEFT, limit_y, x.end, limit_y, "band-edge"))
-    content.append(line(LEFT, y.begin, x.end, y.begin, "axis"))
-    content += _marks(cases, x, y)
-    content.append(
-        label(f"limit {cases.limit:g}{unit_of(cases.label)}", x.end, limit_y - 5, anchor="end")
-    )
-    return drawing(name, cases.title, caption, (width, HEIGHT), content)
+    powers = [(power, _power(power)) for power in range(low, int(y.high) + 1, every)]
+    of_limit = f"{cases.limit:g}{unit_of(cases.label)}"
+
+    def draw(width: float) -> tuple[float, list[Markup]]:
+        x = Scale(0.5, max(1, len(cases.cases)) + 0.5, LEFT, width - RIGHT)
+        at, span = y(limit), {"x": LEFT, "width": x.end - LEFT}
+        return HEIGHT, [
+            label(cases.label, 0, 12),
+            label("case", x.end, HEIGHT - 4, anchor="end"),
+            element("rect", y=at, height=y.begin - at, class_="band", **span),
+            *value_axis(y, LEFT, x.end, powers),
+            *_groups(cases.cases, x, y),
+            line(LEFT, at, x.end, at, "band-edge"),
+            line(LEFT, y.begin, x.end, y.begin, "axis"),
+            *_marks(cases, x, y),
+            label(f"limit {of_limit}", x.end, at - 5, anchor="end"),
+        ]
+
+    return figure(name, cases.title, _caption(cases, of_limit), draw)
 
 
 def _marks(cases: Cases, x: Scale, y: Scale) -> list[Markup]:
@@ -84,7 +71,7 @@ def _marks(cases: Cases, x: Scale, y: Scale) -> list[Markup]:
         if case.error is None:
             drawn.append(label("?", x(index), TOP + 9, "missing", "middle"))
             continue
-        point = x(index), y.clipped(math.log10(_clipped(case.error)))
+        point = x(index), y.clipped(_power_of(case.error))
         (bad if _is_wrong(case, cases.limit) else good).append(point)
     if good:
         drawn.append(dots(good, "dots"))
@@ -112,28 +99,26 @@ def _is_wrong(case: Case, limit: float) -> bool:
     return case.error is None or not case.error <= limit
 
 
-def _clipped(error: float) -> float:
-    return CEILING if math.isnan(error) else min(max(abs(error), FLOOR), CEILING)
+def _power_of(error: float) -> float:
+    return math.log10(CEILING if math.isnan(error) else min(max(abs(error), FLOOR), CEILING))
 
 
 def _power(power: int) -> str:
     return f"{10.0**power:g}".replace("e-0", "e-").replace("e+0", "e+")
 
 
-def _caption(cases: Cases) -> str:
-    limit = f"{cases.limit:g}{unit_of(cases.label)}"
-    missing = sum(case.error is None for case in cases.cases)
-    wrong = sum(_is_wrong(case, cases.limit) for case in cases.cases) - missing
+def _caption(cases: Cases, limit: str) -> str:
+    found = [case for case in cases.cases if _is_wrong(case, cases.limit)]
+    missing = sum(case.error is None for case in found)
+    wrong = len(found) - missing
     parts = [f"{one_line(cases.title)}: {counted(len(cases.cases), 'case')}"]
     if wrong:
         parts.append(f"{wrong} beyond the limit of {limit} (marked ×)")
     if missing:
         parts.append(f"{missing} without an answer (marked ?)")
-    if not wrong and not missing:
+    if found:
+        kinds = dict.fromkeys(one_line(case.group) for case in found)
+        parts.append(f"of the kind {', '.join(kinds)}")
+    else:
         parts.append(f"all within the limit of {limit} (shaded)")
-    groups = dict.fromkeys(
-        one_line(case.group) for case in cases.cases if _is_wrong(case, cases.limit)
-    )
-    if groups:
-        parts.append(f"of the kind {', '.join(groups)}")
     return f"{', '.join(parts)}. The scale is logarithmic."

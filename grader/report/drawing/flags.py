@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from grader.report.drawing.svg import LETTER, Scale, label, line
+from grader.report.drawing.axes import Scale
+from grader.report.drawing.svg import LETTER, label, line
 
 ROW = 17
 GAP = 6
@@ -15,14 +16,15 @@ GAP = 6
 
 @dataclass(frozen=True)
 class Flag:
-    """A labelled time.
-
-    Attributes:
-        time_s: Seconds since launch.
-    """
+    """A labelled time, in seconds since launch."""
 
     time_s: float
     text: str
+
+    @property
+    def length(self) -> float:
+        """Pixels that its text takes."""
+        return len(self.text) * LETTER + GAP
 
 
 @dataclass(frozen=True)
@@ -42,11 +44,11 @@ class PlacedFlag:
     @property
     def extent(self) -> tuple[float, float]:
         """First and last pixel of its text."""
-        length = len(self.flag.text) * LETTER + GAP
-        return (self.x - length, self.x) if self.left else (self.x, self.x + length)
+        begin = self.x - self.flag.length if self.left else self.x
+        return begin, begin + self.flag.length
 
 
-def place(flags: Sequence[Flag], scale: Scale) -> tuple[PlacedFlag, ...]:
+def place(flags: Sequence[Flag], scale: Scale) -> list[PlacedFlag]:
     """Give every flag a row, so that no text meets another.
 
     Texts to the right of their leaders go down from row to row as long as they would meet an
@@ -55,29 +57,33 @@ def place(flags: Sequence[Flag], scale: Scale) -> tuple[PlacedFlag, ...]:
     and only there a leader passes behind a text.
 
     Args:
+        flags: By time.
         scale: Seconds to pixels.
     """
-    rights: list[PlacedFlag] = []
-    lefts: list[PlacedFlag] = []
-    for flag in flags:
-        x = scale.clipped(flag.time_s)
-        if x + len(flag.text) * LETTER + GAP <= scale.end:
-            rights.append(PlacedFlag(flag, x, _free_row(rights, x), left=False))
-    for flag in reversed(flags):
-        x = scale.clipped(flag.time_s)
-        if x + len(flag.text) * LETTER + GAP > scale.end:
-            mirrored = [PlacedFlag(item.flag, -item.x, item.row, left=False) for item in lefts]
-            lefts.append(PlacedFlag(flag, x, _free_row(mirrored, -x), left=True))
-    reach = max((item.extent[1] for item in rights), default=float("-inf"))
-    begin = min((item.extent[0] for item in lefts), default=float("inf"))
-    offset = 1 + max(item.row for item in lefts) if lefts and begin < reach + GAP else 0
-    moved = [PlacedFlag(item.flag, item.x, item.row + offset, item.left) for item in rights]
-    return tuple(sorted(moved + lefts, key=lambda item: (item.flag.time_s, item.x)))
+    at = [(scale.clipped(flag.time_s), flag) for flag in flags]
+    fit = [(x, flag) for x, flag in at if x + flag.length <= scale.end]
+    others = [(x, flag) for x, flag in reversed(at) if x + flag.length > scale.end]
+    rights = _rows((x, flag.length) for x, flag in fit)
+    lefts = _rows((-x, flag.length) for x, flag in others)
+    reach = max((x + flag.length for x, flag in fit), default=float("-inf"))
+    begin = min((x - flag.length for x, flag in others), default=float("inf"))
+    offset = 1 + max(lefts) if lefts and begin < reach + GAP else 0
+    placed = [
+        PlacedFlag(flag, x, row + offset, False) for (x, flag), row in zip(fit, rights, strict=True)
+    ]
+    placed += [PlacedFlag(flag, x, row, True) for (x, flag), row in zip(others, lefts, strict=True)]
+    return sorted(placed, key=lambda item: (item.flag.time_s, item.x))
 
 
-def _free_row(placed: Sequence[PlacedFlag], x: float) -> int:
-    """The first row from which on nothing reaches a leader at ``x``."""
-    return 1 + max((item.row for item in placed if item.extent[1] > x - 1), default=-1)
+def _rows(texts: Iterable[tuple[float, float]]) -> list[int]:
+    """A row for each text, given by begin and length: below all earlier ones that reach it."""
+    rows: list[int] = []
+    ends: list[float] = []
+    for begin, length in texts:
+        met = [row for row, end in zip(rows, ends, strict=True) if end > begin - 1]
+        rows.append(1 + max(met, default=-1))
+        ends.append(begin + length)
+    return rows
 
 
 def draw_flags(flags: Sequence[Flag], scale: Scale, below: float) -> tuple[list[Markup], float]:

@@ -136,11 +136,6 @@ def track(points: Sequence[Point], class_: str) -> Markup:
     return element("path", d=path, class_=class_, vector_effect=PX)
 
 
-def in_metres(content: Iterable[str], view: View) -> Markup:
-    """Put content that is drawn in metres into its place."""
-    return element("g", *content, transform=view.matrix)
-
-
 def scale_bar(view: View) -> list[Markup]:
     """Say how long a grid square is."""
     length_m = _square_m(view)

@@ -16,8 +16,8 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from grader.checks.finding import Status
+from grader.report.drawing.distribution import draw_distribution
 from grader.report.drawing.svg import element
-from grader.report.html.distribution import draw_distribution
 from grader.report.html.policy import content_security_policy
 from grader.report.html.report import asset, environment
 from grader.report.model.class_row import ClassRow, RowStatus

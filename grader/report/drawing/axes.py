@@ -1,0 +1,109 @@
+"""Scales, ticks and axes that the drawings share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from grader.report.drawing.svg import NARROW, label, line
+from grader.safe_text import one_line
+
+LEFT, RIGHT = 54, 12
+"""Pixels beside a drawing with a vertical axis."""
+TIME_AXIS = 40
+"""Pixels that the labels of a time axis take below its line."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A linear map from values to pixels.
+
+    Attributes:
+        low: Value at ``begin``.
+        high: Value at ``end``, more than ``low``.
+        begin: Pixel.
+        end: Pixel.
+    """
+
+    low: float
+    high: float
+    begin: float
+    end: float
+
+    def __call__(self, value: float) -> float:
+        """The pixel of a value, which may lie outside."""
+        share = (value - self.low) / (self.high - self.low)
+        return self.begin + share * (self.end - self.begin)
+
+    def clipped(self, value: float) -> float:
+        """The pixel of a value, moved to the nearest end if it lies outside."""
+        return self(min(max(value, self.low), self.high))
+
+    def all_clipped(self, values: Iterable[float]) -> list[float]:
+        """:meth:`clipped` of many values, in a fraction of the time."""
+        low, high, begin = self.low, self.high, self.begin
+        span, width = high - low, self.end - begin
+        return [
+            begin + ((low if value < low else high if value > high else value) - low) / span * width
+            for value in values
+        ]
+
+
+def ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
+    """Round values within [low, high], about ``count`` of them, with their labels."""
+    rough = (high - low) / max(1, count)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough * 0.999)
+    digits = max(0, -math.floor(math.log10(step) + 1e-9))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    values = [number * step for number in range(first, last + 1)]
+    return [(value, _number(value, digits)) for value in values]
+
+
+def _number(value: float, digits: int) -> str:
+    if abs(value) >= 1e6 or digits > 4:
+        return f"{value:.3g}"
+    return f"{value + 0.0:.{digits}f}"
+
+
+def value_axis(
+    y: Scale, left: float, end: float, marks: Sequence[tuple[float, str]] = ()
+) -> list[Markup]:
+    """Draw a grid line for each value, with its label to the left.
+
+    Args:
+        left: First pixel of the lines.
+        end: Last pixel of the lines.
+        marks: Values and labels; by default round ones.
+    """
+    drawn = []
+    for value, text in marks or ticks(y.low, y.high, 4):
+        drawn.append(line(left, y(value), end, y(value), "grid"))
+        drawn.append(label(text, left - 8, y(value) + 4, anchor="end"))
+    return drawn
+
+
+def time_axis(scale: Scale, y: float, width: float) -> list[Markup]:
+    """Draw seconds since launch along the bottom.
+
+    Args:
+        scale: Seconds to pixels.
+        y: Pixel of the line.
+    """
+    drawn = [line(scale.begin, y, scale.end, y, "axis")]
+    for value, text in ticks(scale.low, scale.high, 10 if width > NARROW else 5):
+        x = scale(value)
+        anchor = "start" if x < 20 else "end" if x > width - 20 else "middle"
+        drawn.append(line(x, y, x, y + 5, "axis"))
+        drawn.append(label(text, x, y + 18, anchor=anchor))
+    drawn.append(label("time since launch (s)", scale.end, y + 34, anchor="end"))
+    return drawn
+
+
+def unit_of(text: str) -> str:
+    """The unit in a label such as ``period (ms)``, with a space before it; nothing without."""
+    unit = one_line(text).rpartition("(")[2].rpartition(")")[0]
+    return f" {unit}" if unit else ""
