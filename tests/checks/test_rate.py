@@ -38,13 +38,6 @@ def test_too_slow():
     assert "seconds: the reciprocal of the rate" in found
 
 
-def test_too_slow_without_a_timer():
-    run = at_rate(0.2, declarations=declarations(timer_s=None))
-    found = failing("timing.rate", run, topic="/cmd_vel", at_least="9 Hz")
-    assert "a counter or a condition that leaves calls out" in found
-    assert "create_timer" not in found
-
-
 def test_too_fast():
     found = failing("timing.rate", at_rate(0.05), topic="/cmd_vel", at_most="11 Hz")
     assert "20 Hz" in found

@@ -8,23 +8,19 @@ from hypothesis import strategies as st
 
 from grader.checks.finding import Status
 from grader.recording.event import Disturbance
-from grader.recording.model import NS, Ending, Kind
+from grader.recording.model import NS, Ending
 from tests.checks.builder import (
     PERIOD_S,
     after,
     at,
-    call,
     declarations,
-    declared,
     died,
-    endpoint,
     every,
     failing,
     judge,
     message,
     messages,
     output,
-    reader,
     recording,
     silent,
     taken,
@@ -112,7 +108,7 @@ class TestEnds:
             messages=messages(every(0.3, 9)), stop_s=5.4, disturbance=taken(3.2, 5.3, 2.0)
         )
         assert (period(run).status, period(run).disturbed) == (Status.ERROR, True)
-        assert "the machine took 2 s of them" in period(run).observed
+        assert "but the machine took the time" in period(run).observed
 
     def test_a_death_is_the_deeper_cause(self):
         run = recording(
@@ -253,123 +249,11 @@ class TestDisturbance:
         assert "lost on their way to the probe" in finding.observed
 
 
-class TestMistakes:
-    def test_three_milliseconds(self):
-        found = wrong([0.003] * 500, declarations=declarations(timer_s=0.003))
-        assert "median 3 ms" in found
-        assert "1/100 of the expected period" in found
-        assert "declared a timer of 3 ms" in found
-        assert "create_timer takes its period in seconds: 300 ms is 0.3." in found
-
-    def test_microseconds_that_no_callback_keeps_up_with(self):
-        found = wrong([0.0006] * 500, declarations=declarations(timer_s=300e-6))
-        assert "a timer of 300 us, 1/1000 of the expected period" in found
-        assert "create_timer takes its period in seconds: 300 ms is 0.3." in found
-
-    def test_thirty_milliseconds(self):
-        assert "1/10 of the expected period" in wrong([0.03] * 50)
-
-    def test_three_seconds_though_few_messages_came(self):
-        found = wrong([3.0, 3.0], declarations=declarations(timer_s=3.0))
-        assert "median 3 s" in found
-        assert "10 times the expected period" in found
-
-    def test_three_hundred_seconds(self):
+class TestFailures:
+    def test_a_timer_of_300_seconds_is_why_nothing_comes(self):
         run = silent(declarations=declarations(timer_s=300.0))
         found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
         assert "the process declared a timer of 5 min" in found
-
-    def test_seconds_instead_of_milliseconds_the_other_way_round(self):
-        run = recording(messages=messages(every(0.003, 30)), declarations=())
-        found = failing("timing.period", run, topic="/cmd_vel", period="3 s")
-        assert "1/1000 of the expected period" in found
-        assert "3 s is 3." in found
-
-    def test_two_timers(self):
-        twice = (*declarations(), *declarations()[4:6])
-        found = wrong([0.05, 0.25] * 10, declarations=twice)
-        assert "messages come twice as often as expected" in found
-        assert "declared 2 timers" in found
-
-    def test_two_publishers(self):
-        found = wrong([0.15] * 20, endpoints=(endpoint(), endpoint(appeared_s=0.5, node="/twin")))
-        assert "twice as often as expected, from 2 publishers on the topic" in found
-
-    def test_one_callback_that_publishes_three_times(self):
-        found = wrong([0.0001, 0.0001, 0.2998] * 7)
-        assert "three times as often" in found
-        assert "publish once in its callback" in found
-
-    @pytest.mark.parametrize("count", range(5, 24))
-    def test_a_callback_that_publishes_twice_however_many_messages_came(self, count):
-        found = wrong(([0.0003, 0.2997] * 12)[:count])
-        assert "messages come twice as often as expected" in found
-
-    def test_half_of_the_period(self):
-        found = wrong([0.15] * 20, declarations=declarations(timer_s=0.15))
-        assert "twice as often as expected: the process declared a timer of 150 ms" in found
-
-    def test_a_declared_timer_of_another_period(self):
-        found = wrong([0.5] * 8, declarations=declarations(timer_s=0.5))
-        assert "the process declared a timer of 500 ms" in found
-
-    def test_sleeping_instead_of_a_timer(self):
-        found = wrong([0.405] * 10, declarations=declarations(timer_s=None))
-        assert "median 405 ms" in found
-        assert "the process declared no timer" in found
-        assert "it looks like 300 ms of sleeping plus 105 ms of work" in found
-        assert "self.create_timer(0.3, self.callback) keeps its period" in found
-
-    def test_without_a_tracer_a_timer_is_not_missed(self):
-        found = wrong([0.405] * 10, declarations=())
-        assert "declared" not in found
-        assert "300 ms of sleeping plus 105 ms of work" in found
-
-    @pytest.mark.parametrize(
-        ("interval_s", "call"), [(0.4, "every 4th call"), (0.2, "every second call")]
-    )
-    def test_a_fast_timer_whose_callback_compares_times(self, interval_s, call):
-        found = wrong([interval_s] * 10, declarations=declarations(timer_s=0.1))
-        assert f"the process declared a timer of 100 ms, and only {call} of it published" in found
-        assert "Publish in every call of a timer of 300 ms" in found
-        assert "sleeping" not in found
-
-    def test_a_callback_that_publishes_every_second_time(self):
-        found = wrong([0.6] * 8)
-        assert "a timer of 300 ms, and only every second call of it published" in found
-        assert "compares times" not in found
-
-    def test_a_callback_that_takes_twice_the_period(self):
-        waiting = tuple(call(0.8 + 0.5 * n, 0.4) for n in range(6))
-        found = wrong([0.6] * 8, calls=waiting)
-        assert "the executor does not call it in time" in found
-
-    def test_a_callback_that_takes_longer_than_the_period(self):
-        found = wrong([0.42] * 10, calls=tuple(call(0.8 + 0.5 * n, 0.4) for n in range(6)))
-        assert "120 ms too long: the process declared a timer of 300 ms" in found
-        assert "Keep callbacks short" in found
-
-    def test_a_timer_that_is_reset_in_its_callback(self):
-        found = wrong([0.32] * 10)
-        assert "20 ms too long, although the executor is not blocked" in found
-        assert "timer.reset()" in found and "Keep callbacks short" not in found
-
-    def test_a_timer_made_anew_in_each_callback(self):
-        anew = (*declarations(), *(declarations()[4:5] * 9))
-        found = wrong([0.35] * 10, declarations=anew)
-        assert "50 ms too long: the process declared 10 timers of 300 ms" in found
-        assert "Create one timer in the constructor" in found
-
-    def test_left_out_messages(self):
-        found = wrong([0.3, 0.3, 0.6] * 5)
-        assert "5 intervals of 15 differ" in found
-        assert "messages are left out" in found
-
-    def test_a_pause_counts_for_every_message_that_is_missing_in_it(self):
-        found = wrong([0.3] * 5 + [1.2] + [0.3] * 5)
-        assert "1 interval of 11 differs from the median by more than 30 ms" in found
-        assert "messages are left out" in found
-        assert "let no callback work or sleep for longer than the period" in found
 
     def test_a_pause_that_the_host_made_costs_nothing(self):
         times = after([0.3] * 5 + [1.2] + [0.3] * 5)
@@ -378,38 +262,7 @@ class TestMistakes:
         )
         assert period(run).status is Status.ERROR
 
-    def test_an_irregular_stream(self):
-        found = wrong([0.3, 0.21, 0.39, 0.3, 0.25, 0.42, 0.3, 0.2, 0.37])
-        assert "differ from the median by more than 30 ms" in found
-        assert "let no callback work or sleep for long" in found
-        assert "Let a timer call" not in found
-
-    def test_an_irregular_stream_without_a_timer(self):
-        irregular = [0.3, 0.21, 0.39, 0.3, 0.25, 0.42, 0.3, 0.2, 0.37]
-        assert "Let a timer call the callback" in wrong(irregular, declarations=())
-
-    def test_a_burst_at_the_start(self):
-        found = wrong([0.0002, 0.0001, *[0.3] * 12])
-        assert "3 messages come at once at the start" in found
-        assert "not in the constructor" in found
-
-    def test_a_feedback_loop(self):
-        own = (endpoint(), endpoint(kind=Kind.SUBSCRIPTION), reader())
-        assert "may answer itself" in wrong([0.0002] * 900, endpoints=own)
-
-    def test_too_often_for_no_reason_that_can_be_seen(self):
-        assert "messages come too often" in wrong([0.2] * 20, declarations=())
-
-    def test_a_timer_of_zero(self):
-        declarations = (declared("timer", period_s=0.0),)
-        found = wrong([0.0001] * 50, declarations=declarations)
-        assert "the process declared a timer of 0 s" in found
-        assert "300 // 1000" in found
-
-    def test_many_times_the_period(self):
-        assert "median 900 ms" in wrong([0.9] * 6, declarations=())
-
-    def test_a_death_after_three_messages(self):
+    def test_a_death_after_three_messages_is_the_deeper_cause(self):
         run = recording(
             messages=messages(every(0.3, 3)),
             processes=(died(1, 1.4),),
@@ -421,13 +274,21 @@ class TestMistakes:
 
     def test_the_worst_interval_is_a_moment(self):
         times = after([0.3] * 6 + [0.9, 0.7] + [0.3] * 3)
-        run = recording(messages=messages(times), stop_s=6)
-        moment = period(run).evidence.moments[0]
+        moment = period(recording(messages=messages(times), stop_s=6)).evidence.moments[0]
         assert moment.label == "worst interval: 900 ms"
         assert moment.time_s == pytest.approx(times[7], abs=1e-6)
 
     def test_the_spread_of_a_bimodal_stream_is_not_hidden_by_its_median(self):
         assert "differ from the median" in wrong([0.3, 0.3, 0.3, 0.15, 0.45] * 3)
+
+
+def arriving(waits_s, sequence=None, **changes):
+    """A message every 300 ms, each of which needs so long to arrive."""
+    stream = tuple(
+        message(0.7 + 0.3 * n, sequence=sequence or n + 1, received_s=0.701 + 0.3 * n + wait_s)
+        for n, wait_s in enumerate(waits_s)
+    )
+    return recording(messages={"/cmd_vel": stream}, **changes)
 
 
 class TestForgery:
@@ -483,39 +344,26 @@ class TestForgery:
     )
     def test_jitter_that_only_the_arrivals_show(self, waits_s):
         """As with a clock that a library puts on a grid."""
-        stream = tuple(
-            message(0.7 + 0.3 * n, sequence=n + 1, received_s=0.701 + 0.3 * n + wait_s)
-            for n, wait_s in enumerate(waits_s)
-        )
-        run = recording(messages={"/cmd_vel": stream}, stop_s=5)
+        run = arriving(waits_s, stop_s=5)
         found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
         assert "the timestamps are not the times of publishing" in found
         # Where the machine was busy, messages may wait, and nothing is held against a right node.
         noise = tuple(Disturbance(at(0.5 + 0.5 * n), int(0.3 * NS), 0) for n in range(10))
         assert period(replace(run, disturbance=noise)).status in (Status.PASSED, Status.ERROR)
 
-    def test_one_message_that_was_sent_again_is_no_proof(self):
-        waits_s = [0.0] * 4 + [0.25, 0.01] + [0.0] * 6
-        stream = tuple(
-            message(0.7 + 0.3 * n, sequence=n + 1, received_s=0.701 + 0.3 * n + wait_s)
-            for n, wait_s in enumerate(waits_s)
-        )
-        assert period(recording(messages={"/cmd_vel": stream})).status is Status.PASSED
-
-    def test_a_new_publisher_for_each_message_delays_it_until_the_match(self):
-        waits_s = [0.0, 0.0, 0.08] * 4
-        stream = tuple(
-            message(0.7 + 0.3 * n, sequence=1, received_s=0.701 + 0.3 * n + wait_s)
-            for n, wait_s in enumerate(waits_s)
-        )
-        assert period(recording(messages={"/cmd_vel": stream})).status is Status.PASSED
-
-    def test_a_few_late_arrivals_do_not_matter(self):
-        stream = tuple(
-            message(t, sequence=n, received_s=t + (0.2 if n in (3, 7, 8) else 0.001))
-            for n, t in enumerate(every(0.3), 1)
-        )
-        assert period(recording(messages={"/cmd_vel": stream})).status is Status.PASSED
+    @pytest.mark.parametrize(
+        ("waits_s", "sequence"),
+        [
+            # One message was sent again, and one waited behind it.
+            ([0.0] * 4 + [0.25, 0.01] + [0.0] * 6, None),
+            # Each message has a new publisher, and waits for its match.
+            ([0.0, 0.0, 0.08] * 4, 1),
+            # A few late arrivals do not matter.
+            ([0.0, 0.0, 0.2, 0.0, 0.0, 0.0, 0.2, 0.2] + [0.0] * 4, None),
+        ],
+    )
+    def test_a_few_late_arrivals_are_no_proof(self, waits_s, sequence):
+        assert period(arriving(waits_s, sequence)).status is Status.PASSED
 
 
 class TestParameters:

@@ -13,7 +13,7 @@ from grader.measure import declarations
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.need import Published, Recorded
-from grader.checks.timing.period import Interval, PeriodLimits, forgiven, judge
+from grader.measure.period import Interval, PeriodLimits, forgiven, judge
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.delivery import why_not_sent

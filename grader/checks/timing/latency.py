@@ -16,6 +16,7 @@ from grader.checks.wording import code, counted
 from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.process.blocked_executor import left_s
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
@@ -26,21 +27,14 @@ _MS = 1e3
 
 @dataclass(frozen=True)
 class Reaction:
-    """A message that the probe sent, and what came of it.
-
-    Attributes:
-        answer: The first message that may answer it, or None.
-    """
+    """A message that the probe sent, and the first message that may answer it, or None."""
 
     sent: Message
     answer: Message | None
 
-    @property
-    def seconds(self) -> float | None:
-        """From sending to the source timestamp of the answer; None without an answer."""
-        if self.answer is None:
-            return None
-        return (self.answer.stamp_ns - self.sent.stamp_ns) / NS
+    def end_ns(self, within_s: float) -> int:
+        """When the answer was published, or was due at the latest."""
+        return self.answer.stamp_ns if self.answer else self.sent.stamp_ns + round(within_s * NS)
 
 
 def reactions(
@@ -56,11 +50,9 @@ def reactions(
     free = 0
     for message in sent:
         first = max(free, bisect_left(stamps, message.stamp_ns))
-        if first < len(stamps) and stamps[first] <= message.stamp_ns + within_ns:
-            found.append(Reaction(message, answers[first]))
-            free = first + 1
-        else:
-            found.append(Reaction(message, None))
+        in_time = first < len(stamps) and stamps[first] <= message.stamp_ns + within_ns
+        found.append(Reaction(message, answers[first] if in_time else None))
+        free = first + 1 if in_time else free
     return tuple(found)
 
 
@@ -115,46 +107,52 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     if not sent:
         return why_not_sent(recording, parameters.stimulus).finding(expected)
     found = reactions(sent, answers, round(parameters.within * NS))
-    times = [item.seconds for item in found if item.seconds is not None]
+    answered = [item for item in found if item.answer is not None]
     missing = [item for item in found if item.answer is None]
-    wrong = _too_slow(times, parameters)
-    if not wrong and len(missing) <= parameters.unanswered:
-        return Finding.passed(expected, _figures(times), _evidence(recording, found, parameters))
+    waits = [(item.sent.stamp_ns, item.end_ns(parameters.within)) for item in answered]
+    times = [(end_ns - begin_ns) / NS for begin_ns, end_ns in waits]
+    figures = _figures(times)
+    evidence = _evidence(recording, parameters, answered, times, missing)
+    is_missing = len(missing) > parameters.unanswered
+    if not is_missing and not _too_slow(times, parameters):
+        return Finding.passed(expected, figures, evidence)
     observed = (
         f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
         f"had no answer within {format_duration(parameters.within)}"
     )
-    if len(missing) > parameters.unanswered:
+    if is_missing:
         last_ns = missing[-1 - parameters.unanswered].sent.stamp_ns
         destroyed = why_unsubscribed(recording, parameters.stimulus, observed, last_ns)
         if destroyed is not None:
             return destroyed.finding(expected)
-    forgiven = [
-        max(0.0, item.seconds - _stolen_s(recording, item))
-        for item in found
-        if item.seconds is not None
+    own_s = [max(0.0, left_s(recording, *wait)) for wait in waits]
+    unexcused = [
+        item
+        for item in missing
+        if recording.stolen_s(item.sent.stamp_ns, item.end_ns(parameters.within)) <= 0.0
     ]
-    excusable = [item for item in missing if _stolen_s(recording, item, parameters.within) > 0.0]
-    if not _too_slow(forgiven, parameters) and (
-        len(missing) - len(excusable) <= parameters.unanswered
-    ):
+    if len(unexcused) <= parameters.unanswered and not _too_slow(own_s, parameters):
         stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
         return Finding.to_repeat(
             expected,
-            f"{_figures(times)}; the machine took up to {format_duration(stolen_s)} from the "
-            "process meanwhile, which may explain it",
+            f"{figures}; the machine took up to {format_duration(stolen_s)} from the process "
+            "meanwhile, which may explain it",
         )
-    evidence = _evidence(recording, found, parameters)
-    if len(missing) > parameters.unanswered:
+    if is_missing:
         return Finding.failed(
             expected,
-            observed + (f"; of the others {_figures(times)}" if times else ""),
+            observed + (f"; of the others {figures}" if times else ""),
             "Publish one answer in every call of the subscription's callback, with no condition "
             "that leaves one out.",
             evidence,
         )
-    words, hint = _explanation(found)
-    return Finding.failed(expected, f"{_figures(times)}{words}", hint, evidence)
+    return Finding.failed(
+        expected,
+        figures,
+        "Publish the answer in the subscription's callback itself, not from a timer. Let the "
+        "callback return soon: no time.sleep(), no wait, no loop over what is there already.",
+        evidence,
+    )
 
 
 def _too_slow(times: Sequence[float], parameters: Latency) -> bool:
@@ -162,11 +160,6 @@ def _too_slow(times: Sequence[float], parameters: Latency) -> bool:
         return False
     over_median = parameters.median is not None and median(times) > parameters.median
     return over_median or (parameters.most is not None and max(times) > parameters.most)
-
-
-def _stolen_s(recording: Recording, item: Reaction, within_s: float = 0.0) -> float:
-    end_ns = item.answer.stamp_ns if item.answer else item.sent.stamp_ns + round(within_s * NS)
-    return recording.stolen_s(item.sent.stamp_ns, end_ns)
 
 
 def _figures(times: Sequence[float]) -> str:
@@ -178,52 +171,29 @@ def _figures(times: Sequence[float]) -> str:
     )
 
 
-def _explanation(found: Sequence[Reaction]) -> tuple[str, str]:
-    times = [item.seconds for item in found if item.seconds is not None]
-    third = len(times) // 3
-    if third and min(times[-third:]) > 2.0 * max(times[:third]):
-        return (
-            ": the answers come later and later, so the callback takes longer than the time "
-            "between two messages",
-            "Do less in the callback: no sleep, no wait, no loop over what is there already.",
-        )
-    return (
-        "",
-        "Publish the answer in the subscription's callback itself: not from a timer, and not "
-        "after time.sleep().",
+def _evidence(
+    recording: Recording,
+    parameters: Latency,
+    answered: Sequence[Reaction],
+    times: Sequence[float],
+    missing: Sequence[Reaction],
+) -> Evidence:
+    label = f"sent on {parameters.stimulus}, not answered"
+    moments = [Moment(label, recording.since_launch_s(item.sent.stamp_ns)) for item in missing[:10]]
+    if not times:
+        return Evidence(moments=tuple(moments))
+    sent_s = [recording.since_launch_s(item.sent.stamp_ns) for item in answered]
+    worst_s = max(times)
+    moments.append(
+        Moment(f"slowest answer: after {format_duration(worst_s)}", sent_s[times.index(worst_s)])
     )
-
-
-def _evidence(recording: Recording, found: Sequence[Reaction], parameters: Latency) -> Evidence:
-    answered = [(item, item.seconds) for item in found if item.seconds is not None]
-    moments = tuple(
-        Moment(
-            f"sent on {parameters.stimulus}, not answered",
-            recording.since_launch_s(item.sent.stamp_ns),
-        )
-        for item in found
-        if item.answer is None
-    )[:10]
-    if not answered:
-        return Evidence(moments=moments)
-    worst, seconds = max(answered, key=lambda pair: pair[1])
-    limit = parameters.most or parameters.median or 0.0
-    return Evidence(
-        moments=(
-            *moments,
-            Moment(
-                f"slowest answer: after {format_duration(seconds)}",
-                recording.since_launch_s(worst.sent.stamp_ns),
-            ),
-        ),
-        plots=(
-            Plot(
-                title=f"From a message on {parameters.stimulus} to its answer",
-                x_label="time since launch (s)",
-                y_label="latency (ms)",
-                x=tuple(recording.since_launch_s(item.sent.stamp_ns) for item, _ in answered),
-                y=tuple(value * _MS for _, value in answered),
-                band=(0.0, limit * _MS),
-            ),
-        ),
+    limit_s = parameters.most or parameters.median or 0.0
+    plot = Plot(
+        title=f"From a message on {parameters.stimulus} to its answer",
+        x_label="time since launch (s)",
+        y_label="latency (ms)",
+        x=tuple(sent_s),
+        y=tuple(value * _MS for value in times),
+        band=(0.0, limit_s * _MS),
     )
+    return Evidence(moments=tuple(moments), plots=(plot,))

@@ -12,15 +12,14 @@ from grader.checks.first_seen import first_seen
 from grader.checks.need import Recorded
 from grader.checks.timing.stamps import why_not_believed
 from grader.checks.wording import code, counted
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.few_messages import why_few
-from grader.diagnosis.process.process_exit import why_ended
-from grader.measure import declarations
+from grader.diagnosis.wrong_rhythm import why_paused
+from grader.measure.numbering import is_numbered, lost
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration, Frequency
 from grader.spec.unit import format_duration
-
-_SEQUENCE_LIMIT = 2**62
 
 
 class Rate(Parameters):
@@ -86,7 +85,8 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
             "Publish from the callback of a timer.",
             Evidence(moments=first_seen(recording, messages)),
         )
-    number = _steps(messages)
+    # Messages after the first, with those that were lost on their way.
+    number = last.sequence - first.sequence if is_numbered(messages) else len(messages) - 1
     found_hz = number / span_s
     observed = f"{found_hz:.4g} Hz: {counted(number + 1, 'message')} in {format_duration(span_s)}"
     evidence = Evidence(
@@ -105,7 +105,9 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         return Finding.failed(
             expected,
             observed,
-            _slow_hint(recording),
+            "Publish in every call of the callback, without a counter, a condition or a "
+            "time.sleep() that leaves calls out. A timer takes its period in seconds: the "
+            "reciprocal of the rate.",
             evidence,
         )
     if high is not None and found_hz > high:
@@ -116,67 +118,30 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
             "second timer, and for a publish() in a loop or in a callback that is called often.",
             evidence,
         )
-    return _too_long_without(recording, parameters, messages) or Finding.passed(
-        expected, observed, evidence
-    )
+    paused = _why_paused(recording, parameters, messages)
+    return paused.finding(expected) if paused else Finding.passed(expected, observed, evidence)
 
 
-def _slow_hint(recording: Recording) -> str:
-    if declarations.traced(recording) and not declarations.said(recording, "timer"):
-        return (
-            "Publish in every call of the callback: look for a counter or a condition that leaves "
-            "calls out, and for a time.sleep()."
-        )
-    return (
-        "create_timer takes its period in seconds: the reciprocal of the rate. A callback that "
-        "sleeps or works longer than the period slows the timer down."
-    )
-
-
-def _too_long_without(
+def _why_paused(
     recording: Recording, parameters: Rate, messages: tuple[Message, ...]
-) -> Finding | None:
-    """The finding of the longest time without a message, if it is too long."""
+) -> Cause | None:
+    """Why the longest time without a message is too long, or None."""
     if parameters.pause is None:
         return None
+    last_ns = messages[-1].stamp_ns
+    stop_ns = max(recording.stop_ns, last_ns)
     # Where numbers are missing, messages came that were lost.
-    gaps = [
-        (one.stamp_ns, other.stamp_ns)
-        for one, other in pairwise(messages)
-        if other.sequence - one.sequence <= 1
-    ]
-    stop_ns = max(recording.stop_ns, messages[-1].stamp_ns)
-    gaps.append((messages[-1].stamp_ns, stop_ns))
-    begin_ns, end_ns = max(gaps, key=lambda gap: gap[1] - gap[0])
-    gap_s = (end_ns - begin_ns) / NS
-    if gap_s <= parameters.pause:
-        return None
-    begin_s = recording.since_launch_s(begin_ns)
+    gaps = [(a.stamp_ns, b.stamp_ns) for a, b in pairwise(messages) if not lost(a, b)]
+    begin_ns, end_ns = max([*gaps, (last_ns, stop_ns)], key=lambda gap: gap[1] - gap[0])
     until = " until the end" if end_ns == stop_ns else ""
-    observed = (
-        f"no message for {format_duration(gap_s)}{until}, from {begin_s:.2f} s after launch on, "
-        f"after {counted(sum(m.stamp_ns <= begin_ns for m in messages), 'message')}"
-    )
-    ended = why_ended(recording, observed)
-    if ended is not None and until:
-        return ended.finding(parameters.words)
-    if gap_s - recording.stolen_s(begin_ns, end_ns) <= parameters.pause:
-        return Finding.to_repeat(
-            parameters.words, f"{observed}, but the machine took time from the process"
-        )
-    return Finding.failed(
-        parameters.words,
-        observed,
+    before = sum(message.stamp_ns <= begin_ns for message in messages)
+    return why_paused(
+        recording,
+        (begin_ns, end_ns),
+        parameters.pause,
+        f"no message for {format_duration((end_ns - begin_ns) / NS)}{until}, from "
+        f"{recording.since_launch_s(begin_ns):.2f} s after launch on, after "
+        f"{counted(before, 'message')}",
         "Look for an `if` or a `return` before publish(msg), for an `except: pass` that hides an "
         "error, for a timer that is cancelled, and for a callback that does not return.",
-        Evidence(moments=(Moment("no message from here on", begin_s),)),
     )
-
-
-def _steps(messages: tuple[Message, ...]) -> int:
-    """Messages after the first, those included that were lost on their way."""
-    first, last = messages[0].sequence, messages[-1].sequence
-    numbered = 0 < first < last < _SEQUENCE_LIMIT and all(
-        one.sequence < other.sequence for one, other in pairwise(messages)
-    )
-    return last - first if numbered else len(messages) - 1

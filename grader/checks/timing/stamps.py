@@ -1,4 +1,4 @@
-"""Whether source timestamps can be believed: they come from the writer, arrivals from us."""
+"""Whether the source timestamps of messages, which their writer gives, agree with arrivals."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from grader.diagnosis.cause import Cause
 from grader.recording.model import NS, Message, Recording
 from grader.spec.unit import format_duration
 
+# Arrivals and source timestamps may differ so much in their medians, or in a single message.
 _RELATIVE = 0.20
 _ABSOLUTE_S = 0.020
 _CLOCK_SLACK_NS = 50_000_000
@@ -44,16 +45,24 @@ def why_not_believed(recording: Recording, messages: Sequence[Message]) -> Cause
                 _HINT,
                 _arrival(recording, message),
             )
-    return _arrivals_differ(recording, messages)
-
-
-def _arrivals_differ(recording: Recording, messages: Sequence[Message]) -> Cause | None:
     # What was published before the match (transient local) arrives all at once.
     begin_ns = recording.matched_ns or recording.launched_ns
     live = [message for message in messages if message.stamp_ns >= begin_ns]
-    if len(live) <= _FEWEST:
-        return None
-    late = _late(recording, live)
+    return _why_arrivals_differ(recording, live) if len(live) > _FEWEST else None
+
+
+def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Cause | None:
+    usual_s = median(map(_way_s, live))
+    # The first message of a publisher waits for its match. What holds up the middleware need not
+    # show at the same moment in what the machine took.
+    late = [
+        item
+        for item in live
+        if item.sequence != 1
+        and abs(_way_s(item) - usual_s)
+        > _ABSOLUTE_S
+        + recording.stolen_s(item.stamp_ns - _AROUND_NS, item.received_ns + _AROUND_NS)
+    ]
     if len(late) > max(_MOST_LATE, _LATE_SHARE * len(live)):
         way_s = max(map(_way_s, late)) - min(map(_way_s, live))
         return Cause(
@@ -73,23 +82,6 @@ def _arrivals_differ(recording: Recording, messages: Sequence[Message]) -> Cause
         f"messages arrive every {format_duration(arrival_s)}, but their source timestamps are "
         f"{format_duration(source_s)} apart, while the machine was busy"
     )
-
-
-def _late(recording: Recording, messages: Sequence[Message]) -> list[Message]:
-    """Messages whose way to the probe took longer or shorter than that of most, unexplained.
-
-    The first message of a publisher waits for its match. What holds up the middleware here need not
-    show at the same moment in what the machine took.
-    """
-    usual_s = median(map(_way_s, messages))
-    return [
-        item
-        for item in messages
-        if item.sequence != 1
-        and abs(_way_s(item) - usual_s)
-        > _ABSOLUTE_S
-        + recording.stolen_s(item.stamp_ns - _AROUND_NS, item.received_ns + _AROUND_NS)
-    ]
 
 
 def _arrival(recording: Recording, message: Message) -> Evidence:

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import math
+
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.need import Recorded
-from grader.checks.timing.period import (
+from grader.checks.timing.stamps import why_not_believed
+from grader.checks.tolerance import TimeTolerance, Tolerance
+from grader.checks.wording import code, counted
+from grader.diagnosis.explanation import cause_of
+from grader.diagnosis.few_messages import why_few
+from grader.diagnosis.no_messages import ENDED_HINT
+from grader.diagnosis.wrong_rhythm import WrongRhythm, why_paused
+from grader.measure import declarations
+from grader.measure.period import (
     MOST_INTERVALS,
     Interval,
     PeriodLimits,
@@ -16,20 +26,14 @@ from grader.checks.timing.period import (
     intervals,
     judge,
 )
-from grader.checks.timing.rhythm import explain, is_declared
-from grader.checks.timing.stamps import why_not_believed
-from grader.checks.tolerance import TimeTolerance, Tolerance
-from grader.checks.wording import code, counted
-from grader.diagnosis.cause import Cause
-from grader.diagnosis.few_messages import why_few
-from grader.diagnosis.no_messages import ENDED_HINT
-from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration, Ratio
 from grader.spec.unit import format_duration
 
 _MS = 1e3
+# A declared period is the one that was seen.
+_SAME = 0.05
 # One message may be late or left out; after so many periods they have stopped.
 _ENDED_PERIODS = 3.0
 
@@ -83,9 +87,8 @@ def period(recording: Recording, parameters: Period) -> Finding:
     within `tolerance`; an interval that differs from the median by more than `spread` is
     irregular, and only few may be (`outliers`). One late message makes an interval too long
     and the next one too short: that counts once; a pause counts for every message that is
-    missing in it. Messages must go on until the end of the
-    observation. What the machine took from the process is
-    measured, and never costs a point.
+    missing in it. Messages must go on until the end of the observation. What the machine took
+    from the process is measured, and never costs a point.
     """
     limits = parameters.limits
     expected = (
@@ -107,67 +110,57 @@ def period(recording: Recording, parameters: Period) -> Finding:
             f"the probe that only {counted(len(measured), 'interval')} can be judged",
         )
     verdict = judge([item.seconds for item in measured], limits)
+    observed = _figures(measured, verdict)
+    evidence = _evidence(recording, parameters, measured, verdict)
     if verdict.good:
-        ended = _why_ended(recording, messages, parameters)
-        if ended is not None:
-            return ended.finding(expected)
-        return Finding.passed(
-            expected,
-            _figures(measured, verdict),
-            _evidence(recording, parameters, measured, verdict),
+        last_ns = messages[-1].stamp_ns
+        silent = why_paused(
+            recording,
+            (last_ns, recording.stop_ns),
+            # Of a flood only the beginning is looked at.
+            _ENDED_PERIODS * parameters.period if len(messages) <= MOST_INTERVALS else math.inf,
+            f"{counted(len(messages), 'message')} at the right period, but none in the last "
+            f"{format_duration((recording.stop_ns - last_ns) / NS)} of the observation",
+            ENDED_HINT,
         )
-    forgivable = not is_declared(recording, verdict, limits)
+        return silent.finding(expected) if silent else Finding.passed(expected, observed, evidence)
+    forgivable = verdict.period_good or not _is_declared(recording, verdict, limits)
     if forgivable and judge(forgiven(recording, measured, limits), limits).good:
         stolen_s = recording.stolen_s(measured[0].begin_ns, measured[-1].end_ns)
         return Finding.to_repeat(
             expected,
-            f"{_figures(measured, verdict)}; the machine took up to {format_duration(stolen_s)} "
-            "from the process meanwhile, which may explain it",
+            f"{observed}; the machine took up to {format_duration(stolen_s)} from the process "
+            "meanwhile, which may explain it",
         )
-    explanation = explain(recording, parameters.topic, measured, verdict, limits)
-    observed = _figures(measured, verdict)
     if verdict.period_good:
+        number = len(verdict.irregular)
         observed += (
-            f"; {counted(len(verdict.irregular), 'interval')} of {len(measured)} "
-            f"{'differs' if len(verdict.irregular) == 1 else 'differ'} from the median by more "
-            f"than {format_duration(limits.spread_s)}"
+            f"; {counted(number, 'interval')} of {len(measured)} "
+            f"{'differs' if number == 1 else 'differ'} from the median by more than "
+            f"{format_duration(limits.spread_s)}"
         )
-    observed += f": {explanation.words}" if explanation.words else ""
-    return Finding.failed(
-        expected, observed, explanation.hint, _evidence(recording, parameters, measured, verdict)
-    )
+    cause = cause_of(WrongRhythm(recording, parameters.topic, measured, verdict, limits))
+    observed += f": {cause.observed}" if cause.observed else ""
+    return Finding.failed(expected, observed, cause.hint, evidence)
 
 
-def _why_ended(
-    recording: Recording, messages: tuple[Message, ...], parameters: Period
-) -> Cause | None:
-    """Why nothing was published any more, long before the observation ended."""
-    last_ns = messages[-1].stamp_ns
-    silent_s = (recording.stop_ns - last_ns) / NS
-    # Of a flood only the beginning is looked at.
-    if silent_s <= _ENDED_PERIODS * parameters.period or len(messages) > MOST_INTERVALS:
-        return None
-    seen = (
-        f"{counted(len(messages), 'message')} at the right period, but none in the last "
-        f"{format_duration(silent_s)} of the observation"
-    )
-    stolen_s = recording.stolen_s(last_ns, recording.stop_ns)
-    if silent_s - stolen_s <= _ENDED_PERIODS * parameters.period:
-        return Cause.to_repeat(f"{seen}; the machine took {format_duration(stolen_s)} of them")
-    return why_ended(recording, seen) or Cause(
-        seen,
-        ENDED_HINT,
-        Evidence(moments=(Moment("last message", recording.since_launch_s(last_ns)),)),
+def _is_declared(recording: Recording, verdict: PeriodVerdict, limits: PeriodLimits) -> bool:
+    """Whether the process declared a wrong period that is the median, and no right one.
+
+    What holds up a process moves single messages of a timer, never its period.
+    """
+    declared = [timer.period_s for timer in declarations.timers(recording)]
+    right = any(judge([item], limits).period_good for item in declared)
+    return not right and any(
+        math.isclose(item, verdict.median_s, rel_tol=_SAME) for item in declared
     )
 
 
 def _too_slow(messages: tuple[Message, ...], limits: PeriodLimits) -> bool:
     """Whether there are few messages because their period is too long."""
-    measured = intervals(messages)
-    if not measured:
-        return False
-    verdict = judge([item.seconds for item in measured], limits)
-    return not verdict.period_good and verdict.median_s > limits.period_s
+    seconds = [item.seconds for item in intervals(messages)]
+    verdict = judge(seconds, limits) if seconds else None
+    return verdict is not None and not verdict.period_good and verdict.median_s > limits.period_s
 
 
 def _figures(measured: tuple[Interval, ...], verdict: PeriodVerdict) -> str:
@@ -188,13 +181,9 @@ def _evidence(
     else:
         middle_s, within_s = limits.period_s, limits.median_s
     worst = max(measured, key=lambda item: abs(item.seconds - limits.period_s))
+    label = f"worst interval: {format_duration(worst.seconds)}"
     return Evidence(
-        moments=(
-            Moment(
-                f"worst interval: {format_duration(worst.seconds)}",
-                recording.since_launch_s(worst.end_ns),
-            ),
-        ),
+        moments=(Moment(label, recording.since_launch_s(worst.end_ns)),),
         plots=(
             Plot(
                 title=f"Time between messages on {parameters.topic}",
@@ -202,10 +191,7 @@ def _evidence(
                 y_label="time between messages (ms)",
                 x=tuple(recording.since_launch_s(item.end_ns) for item in measured),
                 y=tuple(item.seconds * _MS for item in measured),
-                band=(
-                    (middle_s - within_s) * _MS,
-                    (middle_s + within_s) * _MS,
-                ),
+                band=((middle_s - within_s) * _MS, (middle_s + within_s) * _MS),
                 histogram=True,
             ),
         ),

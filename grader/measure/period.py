@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
 
+from grader.measure.numbering import is_numbered, lost
 from grader.recording.model import NS, Message, Recording
 
 # A flood is judged by its beginning, which keeps a regrade fast.
@@ -59,7 +60,7 @@ class PeriodLimits:
 
 @dataclass(frozen=True)
 class PeriodVerdict:
-    """How intervals compare with limits."""
+    """How intervals compare with limits; ``irregular`` has the indices of irregular ones."""
 
     median_s: float
     irregular: tuple[int, ...]
@@ -79,13 +80,11 @@ def intervals(messages: Sequence[Message]) -> tuple[Interval, ...]:
     the time between these two is no interval of the writer's, and is left out.
     """
     messages = messages[: MOST_INTERVALS + 1]
-    numbers = [message.sequence for message in messages]
-    # Numbers that do not grow come from several writers, or the middleware does not know them.
-    numbered = all(a < b for a, b in pairwise(numbers))
+    numbered = is_numbered(messages)
     found = []
     before_ns = messages[0].stamp_ns if messages else 0
     for one, other in pairwise(messages):
-        if not numbered or other.sequence == one.sequence + 1:
+        if not numbered or not lost(one, other):
             seconds = (other.stamp_ns - one.stamp_ns) / NS
             found.append(Interval(one.stamp_ns, other.stamp_ns, seconds, before_ns))
         before_ns = one.stamp_ns
@@ -100,18 +99,14 @@ def judge(seconds: Sequence[float], limits: PeriodLimits) -> PeriodVerdict:
     """
     middle = median(seconds)
     irregular = _irregular([value - middle for value in seconds], limits.spread_s + _EPSILON_S)
+    # An irregular interval counts for each message that is missing in it.
+    missing = [round(seconds[index] / middle) - 1 if middle > 0.0 else 1 for index in irregular]
     return PeriodVerdict(
         median_s=middle,
         irregular=irregular,
         period_good=abs(middle - limits.period_s) <= limits.median_s + _EPSILON_S,
-        regular=sum(_weight(seconds[index], middle) for index in irregular)
-        <= limits.allowed(len(seconds)),
+        regular=sum(max(1, number) for number in missing) <= limits.allowed(len(seconds)),
     )
-
-
-def _weight(seconds: float, middle_s: float) -> int:
-    """For how many irregular intervals one counts: for each message that is missing in it."""
-    return max(1, round(seconds / middle_s) - 1) if middle_s > 0.0 else 1
 
 
 def _irregular(deviations: Sequence[float], allowed_s: float) -> tuple[int, ...]:
@@ -133,22 +128,17 @@ def _irregular(deviations: Sequence[float], allowed_s: float) -> tuple[int, ...]
 def forgiven(
     recording: Recording, measured: Sequence[Interval], limits: PeriodLimits
 ) -> tuple[float, ...]:
-    """The intervals as they could have been if the host had taken nothing.
+    """The intervals in seconds as they could have been if the host had taken nothing.
 
     Each is moved towards the expected period by at most what the host took: from a long one
     what was taken during it, to a short one what was taken before it began, since then the
     message before was late.
-
-    Returns:
-        Intervals in seconds, as many as given.
     """
     found = []
     for item in measured:
         deviation = item.seconds - limits.period_s
-        if deviation > 0.0:
-            stolen_s = recording.stolen_s(item.begin_ns, item.end_ns)
-            found.append(item.seconds - min(deviation, stolen_s))
-        else:
-            stolen_s = recording.stolen_s(item.before_ns, item.end_ns)
-            found.append(item.seconds + min(-deviation, stolen_s))
+        begin_ns = item.begin_ns if deviation > 0.0 else item.before_ns
+        stolen_s = recording.stolen_s(begin_ns, item.end_ns)
+        moved = min(abs(deviation), stolen_s)
+        found.append(item.seconds - moved if deviation > 0.0 else item.seconds + moved)
     return tuple(found)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.timing.period import MOST_INTERVALS, PeriodLimits, forgiven, intervals, judge
+from grader.measure.period import MOST_INTERVALS, PeriodLimits, forgiven, intervals, judge
 from tests.checks.builder import after, every, message, messages, recording, taken
 
 LIMITS = PeriodLimits(period_s=0.3, median_s=0.015, spread_s=0.03, outliers=0.1)
