@@ -10,7 +10,7 @@ from grader.assignment.model import CheckSpec
 from grader.assignment.own_check import load_own_check
 from grader.checks.check import Check, Parameters
 from grader.errors import Problem
-from grader.spec.nearest_name import did_you_mean
+from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Source
 
 
@@ -61,18 +61,16 @@ def _about(bound: BoundCheck, alike: Sequence[BoundCheck]) -> str:
 def bind(
     source: Source, index: int, spec: CheckSpec, catalogue: Mapping[str, Check], folder: Path
 ) -> tuple[BoundCheck | None, list[Problem]]:
-    """Find the check that an entry uses, and read its parameters.
-
-    Returns:
-        The bound check and no problem, or None and at least one.
-    """
+    """Find the check that an entry uses, and read its parameters; or say why not."""
     place = ("checks", index)
     if spec.uses is not None and spec.python is not None:
         return None, [source.problem(place, "give either 'uses' or 'python', not both")]
     if spec.uses is not None:
         found = catalogue.get(spec.uses)
         if found is None:
-            return None, [source.problem((*place, "uses"), _unknown(spec.uses, catalogue))]
+            advice = nearest_or_all(spec.uses, sorted(catalogue), "The checks are")
+            text = f"there is no check {spec.uses!r}.{advice}"
+            return None, [source.problem((*place, "uses"), text)]
     elif spec.python is not None:
         try:
             found = load_own_check(spec.python, folder)
@@ -85,8 +83,3 @@ def bind(
     if parameters is None:
         return None, problems
     return BoundCheck(spec, found, parameters), []
-
-
-def _unknown(name: str, catalogue: Mapping[str, Check]) -> str:
-    listed = f" The checks are: {', '.join(sorted(catalogue))}."
-    return f"there is no check {name!r}." + (did_you_mean(name, catalogue) or listed)

@@ -12,10 +12,9 @@ from grader import resources, ros
 from grader.assignment.binding import BoundCheck
 from grader.assignment.model import Assignment
 from grader.errors import GraderFault, Problem
-from grader.recording.interface import DefinitionError, sections_of
 from grader.spec.document import Place
 from grader.spec.name import INTERFACE
-from grader.spec.nearest_name import did_you_mean
+from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.source import Source
 from grader.submission.read.rosdistro import PACKAGES
 
@@ -23,8 +22,6 @@ FOLDER = "interfaces"
 """Beside ``assignment.yaml``: our copy of the interface packages that the student writes."""
 
 _MANIFEST = "package.xml"
-# Parameters of checks that name an interface.
-_PARAMETERS = ("type", "interface")
 
 
 @dataclass(frozen=True)
@@ -51,25 +48,13 @@ class Interfaces:
         return cls({file.parent.name: file.parent for file in files}, prefixes)
 
     def find(self, interface: str) -> str:
-        """The text of a definition.
-
-        Raises:
-            KeyError: There is none at hand.
-        """
+        """The text of a definition; KeyError where there is none at hand."""
         package, kind, name = interface.split("/")
         for folder in self._folders(package):
             file = folder / kind / f"{name}.{kind}"
             if file.is_file():
                 return file.read_text(encoding="utf-8", errors="replace")
         raise KeyError(interface)
-
-    def has(self, interface: str) -> bool:
-        """Whether a definition is at hand."""
-        try:
-            self.find(interface)
-        except KeyError:
-            return False
-        return True
 
     def names(self, package: str, kind: str) -> list[str]:
         """Names of the interfaces of one kind in a package."""
@@ -78,7 +63,7 @@ class Interfaces:
 
     @cached_property
     def packages(self) -> set[str]:
-        """Every package with interfaces, or that is known to be one of ROS."""
+        """Every package with interfaces."""
         indices = (prefix / "share/ament_index/resource_index" for prefix in self.prefixes or ())
         found = {file.name for index in indices for file in index.glob("rosidl_interfaces/*")}
         return found | set(self.own)
@@ -101,9 +86,9 @@ def problems(
     """
     handed_in = {package.name for package in assignment.packages}
     elsewhere = {name for package in assignment.packages for name in package.depends} | PACKAGES
-    for place, interface in _played(assignment):
+    for place, interface in _imported_by_the_probe(assignment):
         package = interface.split("/")[0]
-        if package in handed_in and not known.has(interface) and package not in known.own:
+        if package in handed_in and package not in known.packages:
             text = (
                 f"{package!r} is handed in, and the probe never imports what a student wrote: our "
                 f"own copy of it must be in {FOLDER}/{package} beside the assignment"
@@ -111,7 +96,7 @@ def problems(
             yield source.problem(place, text)
         else:
             yield from _unknown(source, place, interface, elsewhere, known)
-    for place, interface in _judged(checks):
+    for place, interface in _named_by_checks(checks):
         if interface.split("/")[0] not in handed_in:
             yield from _unknown(source, place, interface, elsewhere, known)
 
@@ -119,19 +104,14 @@ def problems(
 def _unknown(
     source: Source, place: Place, interface: str, elsewhere: set[str], known: Interfaces
 ) -> Iterator[Problem]:
-    if known.has(interface):
-        circle = _circle((interface,), known, set())
-        if circle:
-            text = f"no message can hold itself: {' -> '.join(circle)}"
-            yield source.problem(place, text)
-        return
     package, kind, name = interface.split("/")
+    names = known.names(package, kind)
+    if name in names:
+        return
     if package in known.packages:
-        names = known.names(package, kind)
-        listed = f" It has: {', '.join(names[:10])}." if names else ""
         where = f"{FOLDER}/{package}" if package in known.own else package
-        text = f"{where} has no {kind} {name!r}.{did_you_mean(name, names) or listed}"
-        yield source.problem(place, text)
+        text = f"{where} has no {kind} {name!r}."
+        yield source.problem(place, text + nearest_or_all(name, names, "It has"))
     elif known.prefixes is not None and package not in elsewhere:
         text = (
             f"there is no package {package!r}: not in ROS, not in {FOLDER}/ beside the assignment, "
@@ -140,31 +120,7 @@ def _unknown(
         yield source.problem(place, text + did_you_mean(package, known.packages))
 
 
-def _circle(way: tuple[str, ...], known: Interfaces, seen: set[str]) -> tuple[str, ...]:
-    """The way from an interface through its fields until one comes again; nothing if none does.
-
-    Args:
-        seen: Those that lead to no circle; more are added.
-    """
-    try:
-        sections = sections_of(way[-1], known.find(way[-1]))
-    except (KeyError, DefinitionError):
-        # What is missing or broken here may be there and right where it is built.
-        sections = ()
-    types = (field.type for part in sections for field in part.fields if field.is_message)
-    for inner in dict.fromkeys(types):
-        if inner in way:
-            return (*way[way.index(inner) :], inner)
-        if inner not in seen:
-            circle = _circle((*way, inner), known, seen)
-            if circle:
-                return circle
-    seen.add(way[-1])
-    return ()
-
-
-def _played(assignment: Assignment) -> Iterator[tuple[Place, str]]:
-    """Interfaces that the probe itself imports."""
+def _imported_by_the_probe(assignment: Assignment) -> Iterator[tuple[Place, str]]:
     for index, scenario in enumerate(assignment.scenarios):
         for key, items in (("record", scenario.record), ("stimuli", scenario.stimuli)):
             for number, item in enumerate(items):
@@ -173,10 +129,9 @@ def _played(assignment: Assignment) -> Iterator[tuple[Place, str]]:
                     yield ("scenarios", index, key, number, "type"), interface
 
 
-def _judged(checks: Sequence[BoundCheck]) -> Iterator[tuple[Place, str]]:
-    """Interfaces that checks only name."""
+def _named_by_checks(checks: Sequence[BoundCheck]) -> Iterator[tuple[Place, str]]:
     for index, bound in enumerate(checks):
-        for key in _PARAMETERS:
+        for key in ("type", "interface"):
             interface = getattr(bound.parameters, key, None)
             if isinstance(interface, str) and re.fullmatch(INTERFACE, interface):
                 yield ("checks", index, "with", key), interface

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -12,19 +12,40 @@ from grader.spec.source import Model
 
 _DEFAULTS = SandboxLimits()
 
+_Memory = Annotated[Size, Field(description="Of all processes together.")]
+_Processes = Annotated[
+    int,
+    Field(
+        ge=16,
+        le=4096,
+        description="Processes and threads together; a node of rclpy has 14 threads.",
+    ),
+]
+_CpuTime = Annotated[Duration, Field(description="CPU time of all processes together.")]
+_FileSize = Annotated[Size, Field(description="Size of one file.")]
+_Disk = Annotated[Size, Field(description="Everything that is written; it is kept in memory.")]
+_Files = Annotated[int, Field(ge=100, description="Files and folders that are made.")]
+_Output = Annotated[
+    Size, Field(description="Output to the terminal; a program that writes more is ended.")
+]
 
-class _Bounds(Model):
-    """What the options of runs and builds have in common; each says its own defaults."""
 
-    _least_address_bytes: ClassVar[int]
+class LimitOptions(Model):
+    """What the processes of a student may take in a sandbox.
 
-    memory: Size
-    processes: int
-    cpu_time: Duration
-    file_size: Size
-    disk: Size
-    files: int
-    output: Size
+    Without a sandbox nothing is bounded but time. How long a run lasts is bounded by
+    `discovery`, `timeout` and `shutdown`.
+    """
+
+    _least_address_bytes: ClassVar[int] = _DEFAULTS.address_bytes
+
+    memory: _Memory = _DEFAULTS.memory_bytes
+    processes: _Processes = _DEFAULTS.processes
+    cpu_time: _CpuTime = _DEFAULTS.cpu_s
+    file_size: _FileSize = _DEFAULTS.file_bytes
+    disk: _Disk = _DEFAULTS.disk_bytes
+    files: _Files = _DEFAULTS.files
+    output: _Output = _DEFAULTS.output_bytes
 
     def limits(self) -> SandboxLimits:
         """For the sandbox."""
@@ -40,75 +61,24 @@ class _Bounds(Model):
         )
 
 
-class LimitOptions(_Bounds):
-    """What the processes of a student may take in a sandbox.
-
-    Without a sandbox nothing is bounded but time. How long a run lasts is bounded by
-    `discovery`, `timeout` and `shutdown`.
-    """
-
-    _least_address_bytes = _DEFAULTS.address_bytes
-
-    memory: Size = Field(
-        _DEFAULTS.memory_bytes, description="Of all processes together.", validate_default=False
-    )
-    processes: int = Field(
-        _DEFAULTS.processes,
-        ge=16,
-        le=4096,
-        description="Processes and threads together; a node of rclpy has 14 threads.",
-    )
-    cpu_time: Duration = Field(
-        _DEFAULTS.cpu_s, description="CPU time of all processes together.", validate_default=False
-    )
-    file_size: Size = Field(
-        _DEFAULTS.file_bytes, description="Size of one file.", validate_default=False
-    )
-    disk: Size = Field(
-        _DEFAULTS.disk_bytes,
-        description="Everything in home and /tmp; it is kept in memory.",
-        validate_default=False,
-    )
-    files: int = Field(_DEFAULTS.files, ge=100, description="Files and folders in home and /tmp.")
-    output: Size = Field(
-        _DEFAULTS.output_bytes,
-        description="Output to the terminal; a program that writes more is ended.",
-        validate_default=False,
-    )
-
-
-class BuildLimitOptions(_Bounds):
+class BuildLimitOptions(LimitOptions):
     """What the build of a submission may take; `setup.py` and `CMakeLists.txt` are programs, too.
 
     Without a sandbox only `wall_time` and `output` are bounded. A build that passes a limit has
     failed.
     """
 
-    _least_address_bytes = BUILD.address_bytes
+    _least_address_bytes: ClassVar[int] = BUILD.address_bytes
 
-    memory: Size = Field(
-        BUILD.memory_bytes, description="Of all processes together.", validate_default=False
-    )
-    processes: int = Field(
-        BUILD.processes, ge=16, le=4096, description="Processes and threads together."
-    )
-    cpu_time: Duration = Field(
-        BUILD.cpu_s, description="CPU time of all processes together.", validate_default=False
-    )
+    memory: _Memory = BUILD.memory_bytes
+    processes: _Processes = BUILD.processes
+    cpu_time: _CpuTime = BUILD.cpu_s
     wall_time: Duration | None = Field(
         None,
         description="Of the whole build; by default 2 min where all packages are ament_python, "
         "else 5 min.",
     )
-    file_size: Size = Field(
-        BUILD.file_bytes, description="Size of one file.", validate_default=False
-    )
-    disk: Size = Field(
-        BUILD.disk_bytes, description="Everything that it writes.", validate_default=False
-    )
-    files: int = Field(BUILD.files, ge=100, description="Files and folders that it makes.")
-    output: Size = Field(
-        BUILD_OUTPUT_BYTES,
-        description="Output to the terminal; a program that writes more is ended.",
-        validate_default=False,
-    )
+    file_size: _FileSize = BUILD.file_bytes
+    disk: _Disk = BUILD.disk_bytes
+    files: _Files = BUILD.files
+    output: _Output = BUILD_OUTPUT_BYTES

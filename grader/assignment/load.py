@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -11,7 +11,6 @@ from pathlib import Path
 from grader import resources
 from grader.assignment import expected, interfaces, rules, simulation
 from grader.assignment.binding import BoundCheck, bind, tell_apart
-from grader.assignment.draft import Draft
 from grader.assignment.lesson_checks import lesson_checks
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.stimuli import stimulus_rules as stimulation
@@ -19,22 +18,12 @@ from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, Problem, UsageError
-from grader.spec.nearest_name import did_you_mean
-from grader.spec.source import Source, read_source
-
-__all__ = [
-    "ASSIGNMENT_FILE",
-    "BoundCheck",
-    "LoadedAssignment",
-    "find_assignment",
-    "folder_sha256",
-    "list_assignments",
-    "load_assignment",
-]
+from grader.spec.nearest_name import nearest_or_all
+from grader.spec.source import Source, in_order, read_source
 
 ASSIGNMENT_FILE = "assignment.yaml"
 _TELLING = frozenset({"id", "title", "packages", "checks"})
-"""What no other YAML of ours has, and of which no draft has nothing."""
+"""Keys that no other YAML of ours has."""
 
 
 @dataclass(frozen=True)
@@ -86,9 +75,6 @@ def find_assignment(name: str | Path, folder: Path | None = None) -> Path:
 
     Args:
         folder: Where ids are looked up, by default rosgrade's own assignments.
-
-    Raises:
-        UsageError: There is none, with the nearest id.
     """
     given = Path(name)
     if given.is_file():
@@ -103,19 +89,14 @@ def find_assignment(name: str | Path, folder: Path | None = None) -> Path:
         raise UsageError(f"{given}: there is no {ASSIGNMENT_FILE} in it")
     if given.name != str(name) or given.suffix:
         raise UsageError(f"{given}: no such file or folder")
-    listed = f" There are: {', '.join(known) or 'none'}."
     raise UsageError(
-        f"no assignment {str(name)!r}.{did_you_mean(str(name), known) or listed} "
+        f"no assignment {str(name)!r}.{nearest_or_all(str(name), known)} "
         f"One of your own is named by its folder, such as path/to/{name}."
     )
 
 
 def refuse_swapped(name: str, submission: Path) -> None:
-    """Help whoever names what was handed in first, and then the assignment.
-
-    Raises:
-        UsageError: What stands for the submission is the id of an assignment, and is nothing else.
-    """
+    """Say it where the submission was named first, and then the assignment."""
     known = list_assignments()
     if name not in known and str(submission) in known and not submission.exists():
         raise UsageError(
@@ -127,6 +108,8 @@ def load_assignment(
     name: str | Path, catalogue: Mapping[str, Check] = CATALOGUE, folder: Path | None = None
 ) -> LoadedAssignment:
     """Load an assignment.
+
+    Mistakes in its form are told first; once there are none, what does not fit together.
 
     Args:
         folder: Where ids are looked up, by default rosgrade's own assignments.
@@ -142,59 +125,49 @@ def load_assignment(
             f"{file}: is no assignment: it has no {', '.join(sorted(_TELLING))}. Worlds and "
             f"mutants are read with the {ASSIGNMENT_FILE} that they belong to: name that one"
         )
-    assignment, found = source.examine(Assignment)
+    assignment = source.read(Assignment)
     try:
         own = lesson_checks(file.parent)
     except ValueError as error:
-        raise AssignmentError(file, [*found, source.problem(("checks",), str(error))]) from error
-    checks, more = _fit(source, {**catalogue, **own} if own else catalogue)
-    found += [problem for problem in more if problem not in found]
-    if assignment is not None and not found:
+        raise AssignmentError(file, [source.problem(("checks",), str(error))]) from error
+    checks, found = _bind(source, assignment, {**catalogue, **own})
+    found += rules.problems(source, assignment, checks)
+    found += _folder_name(source, assignment)
+    bound = [check for check in checks if check is not None]
+    if not found:
         found += simulation.problems(source, assignment)
         known = interfaces.Interfaces.of(file.parent)
-        found += interfaces.problems(source, assignment, checks, known)
+        found += interfaces.problems(source, assignment, bound, known)
         found += stimulation.problems(source, assignment, known)
-        found += expected.problems(source, assignment, checks, known)
-    if assignment is None or found:
-        raise AssignmentError(file, sorted(found, key=lambda problem: problem.line or 0))
+        found += expected.problems(source, assignment, bound, known)
+    if found:
+        raise AssignmentError(file, in_order(found))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
-    return LoadedAssignment(assignment, file, digest, tuple(tell_apart(checks)))
+    return LoadedAssignment(assignment, file, digest, tuple(tell_apart(bound)))
 
 
-def _fit(source: Source, catalogue: Mapping[str, Check]) -> tuple[list[BoundCheck], list[Problem]]:
-    """Bind the checks and see whether everything fits together."""
-    draft = Draft.of(source)
-    found: list[Problem] = []
+def _bind(
+    source: Source, assignment: Assignment, catalogue: Mapping[str, Check]
+) -> tuple[list[BoundCheck | None], list[Problem]]:
+    """The check that each entry uses, or None where there is a problem."""
     bound: list[BoundCheck | None] = []
-    for index, spec in enumerate(draft.checks):
-        if spec is None:
-            bound.append(None)
-            continue
+    found: list[Problem] = []
+    for index, spec in enumerate(assignment.checks):
         check, problems = bind(source, index, spec, catalogue, source.file.parent)
         bound.append(check)
         found += problems
-    found += rules.problems(draft, bound)
-    found += _folder_name(source)
-    return [check for check in bound if check is not None], found
+    return bound, found
 
 
-def _folder_name(source: Source) -> list[Problem]:
+def _folder_name(source: Source, assignment: Assignment) -> Iterator[Problem]:
     """The id of an assignment is the name of its folder: ids are found by it."""
-    folder = source.file.resolve().parent.name
-    identity = source.data.get("id")
-    if source.file.name != ASSIGNMENT_FILE or not isinstance(identity, str):
-        return []
-    if identity == folder:
-        return []
-    return [source.problem(("id",), f"{identity!r} is not the name of its folder, {folder!r}")]
+    folder, name = source.file.resolve().parent.name, assignment.id
+    if source.file.name == ASSIGNMENT_FILE and name != folder:
+        yield source.problem(("id",), f"{name!r} is not the name of its folder, {folder!r}")
 
 
 def folder_sha256(folder: Path, besides: Path | None = None) -> str:
-    """Hash the paths and contents of all files in a folder, hidden ones and caches left out.
-
-    Raises:
-        UsageError: A file cannot be read.
-    """
+    """Hash the paths and contents of all files in a folder, hidden ones and caches left out."""
     digest = sha256()
     for file in sorted(folder.rglob("*"), key=lambda path: path.relative_to(folder).as_posix()):
         inside = file.relative_to(folder)

@@ -29,26 +29,6 @@ from grader.spec.source import Model
 from grader.spec.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
 
-__all__ = [
-    "Assignment",
-    "CheckSpec",
-    "Durability",
-    "Id",
-    "InterfaceName",
-    "Launch",
-    "Namespace",
-    "NodeName",
-    "Package",
-    "PackageName",
-    "RandomRange",
-    "RecordedTopic",
-    "Reliability",
-    "Scenario",
-    "TopicName",
-    "Until",
-    "Visibility",
-]
-
 
 class RandomRange(Model):
     """Bounds of a random value; both with the same unit, or both without."""

@@ -14,18 +14,15 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from grader.assignment.model import Assignment, Id
+from grader.assignment.model import Assignment
 from grader.checks.finding import Status
 from grader.spec.document import Place
+from grader.spec.name import Id
 from grader.spec.source import Model
 
 
 def _inside(text: str) -> str:
-    """A path that stays in the folder it is relative to.
-
-    Raises:
-        ValueError: It is absolute, leads out of the folder, or is written in another way.
-    """
+    """A path that stays in the folder it is relative to."""
     path = PurePosixPath(text)
     if path.is_absolute() or ".." in path.parts or not path.parts or str(path) != text:
         raise ValueError(f"{text!r} is not a path in the reference, such as 'package/setup.py'")
@@ -89,75 +86,55 @@ class MutantFile(Model):
 def mutate(
     change: Change, files: Mapping[str, bytes]
 ) -> tuple[dict[str, bytes], list[tuple[Place, str]]]:
-    """Change the files of a reference."""
+    """Change the files of a reference: the new files, and what does not apply."""
     result = dict(files)
-    problems = [
-        *_edit(change, result),
-        *_replace(change, result),
-        *_move(change, result),
-    ]
+    problems = list(_apply(change, result))
     if not problems and result == dict(files):
         problems.append(((), "changes nothing"))
     return result, problems
 
 
-def _edit(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
+def _apply(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
     for index, edit in enumerate(change.edits):
+        old, new = edit.replace.encode(), edit.with_.encode()
+        found = files.get(edit.file, b"").count(old)
         if edit.file not in files:
             yield ("edits", index, "file"), f"the reference has no file {edit.file!r}"
-            continue
-        old, new = edit.replace.encode(), edit.with_.encode()
-        found = files[edit.file].count(old)
-        if found != edit.count:
-            text = f"the text stands {_times(found)} in {edit.file}, not {_times(edit.count)}"
+        elif found != edit.count:
+            text = f"the text stands {found} times in {edit.file}, {edit.count} is expected"
             yield ("edits", index, "replace"), text
-            continue
-        files[edit.file] = files[edit.file].replace(old, new)
-
-
-def _times(count: int) -> str:
-    return {0: "never", 1: "once", 2: "twice"}.get(count, f"{count} times")
-
-
-def _replace(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
+        else:
+            files[edit.file] = files[edit.file].replace(old, new)
     for name, content in change.files.items():
         if content is not None:
             files[name] = content.encode()
-            continue
-        gone = _below(name, files)
-        if not gone:
+        elif not _take(name, files):
             yield ("files", name), f"nothing to delete: the reference has no {name!r}"
-        for path in gone:
-            del files[path]
-
-
-def _move(change: Change, files: dict[str, bytes]) -> Iterator[tuple[Place, str]]:
     for source, target in change.move.items():
-        moved = {path: files.pop(path) for path in _below(source, files)}
+        moved = _take(source, files)
         if not moved:
             yield ("move", source), f"nothing to move: the reference has no {source!r}"
-        files.update({target + path[len(source) :]: moved[path] for path in moved})
+        files.update({target + path.removeprefix(source): moved[path] for path in moved})
 
 
-def _below(name: str, files: Mapping[str, bytes]) -> list[str]:
-    """The file of that name, or all in the folder of that name."""
-    return [path for path in files if path == name or path.startswith(f"{name}/")]
+def _take(name: str, files: dict[str, bytes]) -> dict[str, bytes]:
+    """Take out the file of that name, or all in the folder of that name."""
+    paths = [path for path in files if path == name or path.startswith(f"{name}/")]
+    return {path: files.pop(path) for path in paths}
 
 
 def expected_statuses(
     assignment: Assignment, change: Change, put_right: Collection[str] = ()
 ) -> dict[str, Status]:
-    """How each check must end for a mutant or a variant.
+    """How each check must end for a mutant or a variant, by its id, in the author's order.
 
-    Returns:
-        By id of the check, in the author's order: ``failed`` for those that the mutant names,
-        ``skipped`` for those that require one of them, directly or not, else ``passed``. What
-        requires only what was put right is ``passed`` as well.
+    Args:
+        put_right: Checks that fail by a wrong name which the runs put right: nothing that
+            requires them is skipped.
     """
-    loses = change.loses if isinstance(change, Mutant) else ()
-    requires = {spec.id: spec.requires for spec in assignment.checks}
-    lost = {spec.id for spec in assignment.checks if spec.id in loses}
+    lost = set(change.loses if isinstance(change, Mutant) else ())
     stopping = lost.difference(put_right)
+    requires = {spec.id: spec.requires for spec in assignment.checks}
     statuses = {}
     for check in requires:
         status = Status.FAILED if check in lost else Status.PASSED

@@ -10,9 +10,8 @@ from grader import resources
 from grader.assignment.model import Assignment
 from grader.assignment.mutant import Change, Mutant, MutantFile, Variant, mutate, required_by
 from grader.errors import AssignmentError, Problem, UsageError
-from grader.spec.document import Place
-from grader.spec.nearest_name import did_you_mean
-from grader.spec.source import Source, read_source
+from grader.spec.nearest_name import nearest_or_all
+from grader.spec.source import Source, in_order, read_source
 
 MUTANTS_FILE = "mutants.yaml"
 REFERENCE_FOLDER = "reference"
@@ -34,8 +33,8 @@ class Mutants:
 def reference_of(assignment: str, folder: Path | None = None) -> Path:
     """The folder of an assignment's reference solution.
 
-    Raises:
-        UsageError: It has none.
+    Args:
+        folder: Of the assignment.
     """
     beside = folder / REFERENCE_FOLDER if folder is not None else None
     if beside is not None and beside.is_dir():
@@ -53,22 +52,19 @@ def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = 
     Args:
         reference: Folder of the reference solution, by default the one in the assignment's
             folder or rosgrade's own.
-
-    Raises:
-        UsageError: There is no such file, or no reference.
-        AssignmentError: With every mistake: an id twice, an unknown check, an edit that does
-            not apply to the reference.
     """
     reference = reference_of(assignment.id, folder) if reference is None else reference
     source = read_source(folder / MUTANTS_FILE)
     content = source.read(MutantFile)
     files = _read(reference)
-    problems = [*_duplicates(source), *_losses(source, content, assignment)]
-    for place, change in _changes(content):
-        _, found = mutate(change, files)
-        problems += [source.problem((*place, *inside), text) for inside, text in found]
+    problems = [*source.duplicates("id", "mutants", "variants")]
+    problems += _losses(source, content, assignment)
+    for key, changes in (("mutants", content.mutants), ("variants", content.variants)):
+        for index, change in enumerate(changes):
+            _, found = mutate(change, files)
+            problems += [source.problem((key, index, *inside), text) for inside, text in found]
     if problems:
-        raise AssignmentError(source.file, sorted(problems, key=lambda one: one.line or 0))
+        raise AssignmentError(source.file, in_order(problems))
     return Mutants(source.file, reference, content.mutants, content.variants)
 
 
@@ -77,10 +73,6 @@ def apply(change: Change, reference: Path, target: Path) -> None:
 
     Args:
         target: Folder to write; it may exist, but must be empty.
-
-    Raises:
-        UsageError: The target holds something.
-        AssignmentError: The change does not apply.
     """
     files, found = mutate(change, _read(reference))
     if found:
@@ -105,35 +97,14 @@ def _read(folder: Path) -> dict[str, bytes]:
     }
 
 
-def _changes(content: MutantFile) -> Iterator[tuple[Place, Change]]:
-    for index, mutant in enumerate(content.mutants):
-        yield ("mutants", index), mutant
-    for index, variant in enumerate(content.variants):
-        yield ("variants", index), variant
-
-
-def _duplicates(source: Source) -> Iterator[Problem]:
-    seen: dict[object, Place] = {}
-    for key in ("mutants", "variants"):
-        for index, entry in enumerate(source.entries(key)):
-            place: Place = (key, index, "id")
-            first = seen.setdefault(entry["id"], place)
-            if first != place:
-                line = source.line(first)
-                text = f"{entry['id']!r} stands twice (first in line {line})"
-                yield source.problem(place, text)
-
-
 def _losses(source: Source, content: MutantFile, assignment: Assignment) -> Iterator[Problem]:
     requires = {spec.id: spec.requires for spec in assignment.checks}
     for index, mutant in enumerate(content.mutants):
         for number, lost in enumerate(mutant.loses):
             place = ("mutants", index, "loses", number)
             if lost not in requires:
-                listed = f" The checks are: {', '.join(requires)}."
-                text = f"there is no check {lost!r}." + (did_you_mean(lost, requires) or listed)
-                yield source.problem(place, text)
-                continue
+                advice = nearest_or_all(lost, requires, "The checks are")
+                yield source.problem(place, f"there is no check {lost!r}.{advice}")
             above = sorted(required_by(lost, requires) & set(mutant.loses))
             if above:
                 text = f"{lost!r} requires {above[0]!r}, so it is skipped: leave it out"

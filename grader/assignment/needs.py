@@ -5,14 +5,13 @@ A check without it would end as an error, or as a failure, for every student.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
 from typing import Any
 
 from grader.assignment.binding import BoundCheck
-from grader.assignment.draft import Draft
-from grader.assignment.model import Package, Scenario
+from grader.assignment.model import Assignment, Package, Scenario
 from grader.assignment.stimuli.kinds.join import Join
 from grader.assignment.stimuli.kinds.publish import Publish
 from grader.assignment.stimuli.kinds.request import (
@@ -21,23 +20,11 @@ from grader.assignment.stimuli.kinds.request import (
     SendGoal,
     SetParameters,
 )
-from grader.checks.need import (
-    Called,
-    GoalSent,
-    Joined,
-    Need,
-    ParameterSet,
-    ParametersRead,
-    Published,
-    Recorded,
-    RuffRules,
-    SimulatedRobot,
-    Submitted,
-)
+from grader.checks import need as needs
 from grader.checks.value import same_value
-from grader.errors import GraderFault, Problem
+from grader.errors import GraderFault
 from grader.spec.document import Place
-from grader.spec.nearest_name import did_you_mean
+from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.unit import format_duration
 from grader.submission.read.lint import find_ruff, known_rules
 
@@ -50,28 +37,33 @@ class _User:
     """A check with what its needs are looked for in."""
 
     bound: BoundCheck
-    draft: Draft
+    assignment: Assignment
     scenarios: Sequence[Scenario]
 
     def value(self, key: str | None) -> Any:
         return getattr(self.bound.parameters, key) if key else None
 
 
-def need_problems(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
-    """Find what a check needs and the assignment lacks."""
-    user = _User(bound, draft, draft.scenarios_of(bound.spec) or ())
+def need_problems(
+    assignment: Assignment, bound: BoundCheck, scenarios: Sequence[Scenario]
+) -> Iterator[_Lack]:
+    """Find what a check needs and the assignment lacks.
+
+    Args:
+        scenarios: Those that the check judges.
+    """
+    user = _User(bound, assignment, scenarios)
     for need in bound.parameters.needs:
-        for key, text in _lacks(need, user):
-            yield draft.source.problem((*place, *key), text)
+        yield from _lacks(need, user)
 
 
 @singledispatch
-def _lacks(need: Need, user: _User) -> Iterator[_Lack]:
+def _lacks(need: needs.Need, user: _User) -> Iterator[_Lack]:
     raise NotImplementedError(type(need))
 
 
 @_lacks.register
-def _(need: SimulatedRobot, user: _User) -> Iterator[_Lack]:
+def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         if scenario.world is None:
             text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
@@ -79,56 +71,42 @@ def _(need: SimulatedRobot, user: _User) -> Iterator[_Lack]:
 
 
 @_lacks.register
-def _(need: Recorded, user: _User) -> Iterator[_Lack]:
+def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
     topic, interface = user.value(need.topic), user.value(need.type)
     if user.value(need.kind) == "subscription":
         return
     for scenario in user.scenarios:
         recorded = scenario.recorded_types
         if topic not in recorded:
-            listed = f" It records: {', '.join(recorded) or 'nothing'}."
             text = f"the scenario {scenario.id!r} does not record {topic!r}."
-            yield ("with", need.topic), text + (did_you_mean(topic, recorded) or listed)
+            yield ("with", need.topic), text + nearest_or_all(topic, recorded, "It records")
         elif interface not in (None, recorded[topic]):
             text = f"the scenario {scenario.id!r} records {topic!r} as {recorded[topic]!r}"
             yield ("with", "type"), text
 
 
 @_lacks.register
-def _(need: Published, user: _User) -> Iterator[_Lack]:
+def _(need: needs.Published, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         topics = [one.publish for one in scenario.stimuli if isinstance(one, Publish)]
-        yield from _unnamed(user, scenario, need.topic, topics, "do not publish on")
+        yield from _unnamed(user, need.topic, scenario, topics, "publishes on")
 
 
 @_lacks.register
-def _(need: Joined, user: _User) -> Iterator[_Lack]:
+def _(need: needs.Joined, user: _User) -> Iterator[_Lack]:
     for scenario in user.scenarios:
         names = [one.name for one in scenario.stimuli if isinstance(one, Join)]
-        yield from _unnamed(user, scenario, need.name, names, "do not have a join")
-
-
-def _unnamed(
-    user: _User, scenario: Scenario, key: str, names: Sequence[str], lack: str
-) -> Iterator[_Lack]:
-    wanted = user.value(key)
-    if wanted is not None and wanted not in names:
-        text = f"the stimuli of the scenario {scenario.id!r} {lack} {wanted!r}."
-        yield ("with", key), text + _advice(wanted, names)
-
-
-def _advice(wanted: str, names: Sequence[str]) -> str:
-    return did_you_mean(wanted, names) or f" There are: {', '.join(names) or 'none'}."
+        yield from _unnamed(user, need.name, scenario, names, "is a join with the name")
 
 
 @_lacks.register
-def _(need: Called, user: _User) -> Iterator[_Lack]:
-    service = user.value(need.service) + need.suffix
-    key = ("with", need.service)
+def _(need: needs.Called, user: _User) -> Iterator[_Lack]:
+    service, key = user.value(need.service) + need.suffix, ("with", need.service)
     for scenario in user.scenarios:
         calls = [one for one in scenario.stimuli if isinstance(one, CallService)]
-        yield from _unasked(scenario, key, service, [one.call for one in calls])
         mine = [one for one in calls if one.call == service]
+        names = [one.call for one in calls]
+        yield from _unnamed(user, need.service, scenario, names, "asks", service)
         if mine and all(one.at_once < need.at_once for one in mine):
             text = f"the scenario {scenario.id!r} calls it never twice at once: 'at_once: 2'"
             yield key, text
@@ -142,23 +120,90 @@ def _(need: Called, user: _User) -> Iterator[_Lack]:
 
 
 @_lacks.register
-def _(need: GoalSent, user: _User) -> Iterator[_Lack]:
-    action, key = user.value(need.action), ("with", need.action)
+def _(need: needs.GoalSent, user: _User) -> Iterator[_Lack]:
+    action = user.value(need.action)
     for scenario in user.scenarios:
         goals = [one for one in scenario.stimuli if isinstance(one, SendGoal)]
-        yield from _unasked(scenario, key, action, [one.send_goal for one in goals])
         mine = [one for one in goals if one.send_goal == action]
+        names = [one.send_goal for one in goals]
+        yield from _unnamed(user, need.action, scenario, names, "asks")
         if need.having is not None and mine and not any(getattr(g, need.having) for g in mine):
-            yield key, f"no goal of the scenario {scenario.id!r} has {need.having!r}"
+            text = f"no goal of the scenario {scenario.id!r} has {need.having!r}"
+            yield ("with", need.action), text
         fields = user.value(need.goal)
         waits_s = [one.within for one in mine if _has_fields(fields, [one.goal])]
         yield from _impatient(user, scenario, need.within, waits_s)
 
 
-def _unasked(scenario: Scenario, key: Place, wanted: str, there: Sequence[str]) -> Iterator[_Lack]:
-    if wanted not in there:
-        text = f"no stimulus of the scenario {scenario.id!r} asks {wanted!r}."
-        yield key, text + _advice(wanted, there)
+@_lacks.register
+def _(need: needs.ParametersRead, user: _User) -> Iterator[_Lack]:
+    for scenario in user.scenarios:
+        read = [one.read_parameters for one in scenario.stimuli if isinstance(one, ReadParameters)]
+        yield from _unnamed(user, need.node, scenario, [*_nodes_set(scenario), *read], "asks")
+
+
+@_lacks.register
+def _(need: needs.ParameterSet, user: _User) -> Iterator[_Lack]:
+    node, name, wanted = map(user.value, (need.node, need.name, need.value))
+    for scenario in user.scenarios:
+        nodes = _nodes_set(scenario)
+        yield from _unnamed(user, need.node, scenario, nodes, "asks")
+        tried = [
+            one.set_parameters[name]
+            for one in scenario.stimuli
+            if isinstance(one, SetParameters) and one.node == node and name in one.set_parameters
+        ]
+        drawn = any(isinstance(value, str) for value in tried)
+        if node in nodes and not drawn and not any(same_value(wanted, value) for value in tried):
+            listed = ", ".join(map(repr, tried)) or "nothing"
+            text = f"the scenario {scenario.id!r} sets {name!r} to {listed}, never to {wanted!r}"
+            yield ("with", need.value), text
+
+
+def _nodes_set(scenario: Scenario) -> list[str]:
+    return [one.node for one in scenario.stimuli if isinstance(one, SetParameters)]
+
+
+@_lacks.register
+def _(need: needs.Submitted, user: _User) -> Iterator[_Lack]:
+    name, executable = user.value(need.package), user.value(need.executable)
+    packages = {package.name: package for package in user.assignment.packages}
+    if name not in packages:
+        yield ("with", need.package), no_package(name, packages)
+    elif need.executable and executable not in packages[name].executables:
+        yield ("with", need.executable), no_executable(executable, packages[name])
+
+
+@_lacks.register
+def _(need: needs.RuffRules, user: _User) -> Iterator[_Lack]:
+    ruff = find_ruff()
+    try:
+        known = known_rules(ruff) if ruff is not None else frozenset()
+    except GraderFault:
+        return
+    for index, rule in enumerate(user.value(need.rules) if known else ()):
+        if not any(code.startswith(rule) for code in known):
+            text = f"ruff has no rule {rule!r}." + did_you_mean(rule, known)
+            yield ("with", need.rules, index), text
+
+
+def _unnamed(
+    user: _User,
+    key: str,
+    scenario: Scenario,
+    names: Sequence[str],
+    does: str,
+    wanted: str | None = None,
+) -> Iterator[_Lack]:
+    """No stimulus is about what a parameter names.
+
+    Args:
+        wanted: What it is about, where the parameter is only a part of that.
+    """
+    wanted = wanted or user.value(key)
+    if wanted is not None and wanted not in names:
+        text = f"no stimulus of the scenario {scenario.id!r} {does} {wanted!r}."
+        yield ("with", key), text + nearest_or_all(wanted, names)
 
 
 def _has_fields(wanted: Mapping[str, Any], given: Sequence[Mapping[str, Any]]) -> bool:
@@ -180,70 +225,12 @@ def _impatient(
         yield ("with", key), f"{text}: give it 'within: {needed}' too"
 
 
-@_lacks.register
-def _(need: ParametersRead, user: _User) -> Iterator[_Lack]:
-    for scenario in user.scenarios:
-        read = [one.read_parameters for one in scenario.stimuli if isinstance(one, ReadParameters)]
-        nodes = [*_nodes_set(scenario), *read]
-        yield from _unasked(scenario, ("with", need.node), user.value(need.node), nodes)
-
-
-@_lacks.register
-def _(need: ParameterSet, user: _User) -> Iterator[_Lack]:
-    node, name, wanted = map(user.value, (need.node, need.name, need.value))
-    for scenario in user.scenarios:
-        nodes = _nodes_set(scenario)
-        yield from _unasked(scenario, ("with", need.node), node, nodes)
-        tried = [
-            one.set_parameters[name]
-            for one in scenario.stimuli
-            if isinstance(one, SetParameters) and one.node == node and name in one.set_parameters
-        ]
-        drawn = any(isinstance(value, str) for value in tried)
-        if node in nodes and not drawn and not any(same_value(wanted, value) for value in tried):
-            listed = ", ".join(map(repr, tried)) or "nothing"
-            text = f"the scenario {scenario.id!r} sets {name!r} to {listed}, never to {wanted!r}"
-            yield ("with", need.value), text
-
-
-def _nodes_set(scenario: Scenario) -> list[str]:
-    return [one.node for one in scenario.stimuli if isinstance(one, SetParameters)]
-
-
-@_lacks.register
-def _(need: Submitted, user: _User) -> Iterator[_Lack]:
-    name, executable = user.value(need.package), user.value(need.executable)
-    names = [one for one in user.draft.names("packages", "name") if one is not None]
-    package = user.draft.package(name)
-    if name not in names:
-        yield ("with", need.package), no_package(name, names)
-    elif package and need.executable and executable not in package.executables:
-        yield ("with", need.executable), no_executable(executable, package)
-
-
-def no_package(name: str, names: Sequence[str]) -> str:
+def no_package(name: str, names: Collection[str]) -> str:
     """That no package of the assignment has a name."""
-    listed = f" The packages are: {', '.join(names) or 'none'}."
-    return f"{name!r} is not among 'packages'." + (did_you_mean(name, names) or listed)
+    return f"{name!r} is not among 'packages'.{nearest_or_all(name, names, 'The packages are')}"
 
 
 def no_executable(name: str, package: Package) -> str:
     """That a package has no executable of a name."""
-    listed = f" It has: {', '.join(package.executables) or 'none'}."
-    advice = did_you_mean(name, package.executables) or listed
+    advice = nearest_or_all(name, package.executables, "It has")
     return f"the package {package.name!r} has no executable {name!r} in 'packages'.{advice}"
-
-
-@_lacks.register
-def _(need: RuffRules, user: _User) -> Iterator[_Lack]:
-    ruff = find_ruff()
-    if ruff is None:
-        return
-    try:
-        known = known_rules(ruff)
-    except GraderFault:
-        return
-    for index, rule in enumerate(user.value(need.rules)):
-        if not any(code.startswith(rule) for code in known):
-            text = f"ruff has no rule {rule!r}." + did_you_mean(rule, known)
-            yield ("with", need.rules, index), text

@@ -2,213 +2,148 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from graphlib import CycleError, TopologicalSorter
 
 from grader.assignment.binding import BoundCheck
-from grader.assignment.draft import Draft
-from grader.assignment.model import Launch, Scenario
+from grader.assignment.model import Assignment, CheckSpec, Launch, Scenario
 from grader.assignment.needs import need_problems, no_executable, no_package
 from grader.assignment.withheld import SHOWN_FROM
 from grader.checks.check import Subject
 from grader.errors import Problem
 from grader.spec.document import Place
-from grader.spec.nearest_name import did_you_mean
+from grader.spec.nearest_name import nearest_or_all
+from grader.spec.source import Source
 from grader.spec.unit import format_duration
 
 
-def problems(draft: Draft, bound: Sequence[BoundCheck | None]) -> Iterator[Problem]:
+def problems(
+    source: Source, assignment: Assignment, bound: Sequence[BoundCheck | None]
+) -> Iterator[Problem]:
     """Find everything that does not fit together.
 
     Args:
         bound: One per entry of ``checks``; None where it could not be bound.
     """
-    yield from _duplicates(draft, "packages", "name")
-    yield from _duplicates(draft, "scenarios", "id")
-    yield from _duplicates(draft, "checks", "id")
-    for index, scenario in enumerate(draft.scenarios):
-        if scenario is not None:
-            yield from _scenario(draft, index, scenario)
-    yield from _requirements(draft)
-    yield from _circles(draft)
-    yield from _points(draft)
+    for key, name in (("packages", "name"), ("scenarios", "id"), ("checks", "id")):
+        yield from source.duplicates(name, key)
+    for index, scenario in enumerate(assignment.scenarios):
+        for place, text in _scenario(assignment, scenario):
+            yield source.problem(("scenarios", index, *place), text)
+    yield from _requirements(source, assignment.checks)
+    yield from _points(source, assignment)
     for index, check in enumerate(bound):
-        if check is not None:
-            yield from _check(draft, index, check)
+        for place, text in _check(assignment, check) if check is not None else ():
+            yield source.problem(("checks", index, *place), text)
 
 
-def _duplicates(draft: Draft, key: str, name: str) -> Iterator[Problem]:
-    seen: dict[str, Place] = {}
-    for index, value in enumerate(draft.names(key, name)):
-        place = (key, index, name)
-        if value in seen:
-            line = draft.source.line(seen[value])
-            yield draft.source.problem(place, f"{value!r} stands twice (first in line {line})")
-        elif value is not None:
-            seen[value] = place
-
-
-def _scenario(draft: Draft, index: int, scenario: Scenario) -> Iterator[Problem]:
-    place: Place = ("scenarios", index)
-    problem = draft.source.problem
+def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Place, str]]:
     for number, launch in enumerate(scenario.launch):
-        yield from _launch(draft, (*place, "launch", number), launch)
+        for place, text in _launch(assignment, launch):
+            yield ("launch", number, *place), text
     topics = [recorded.topic for recorded in scenario.record]
     for number, topic in enumerate(topics):
         if topic in topics[:number]:
-            yield problem((*place, "record", number, "topic"), f"{topic!r} is recorded twice")
+            yield ("record", number, "topic"), f"{topic!r} is recorded twice"
     until = scenario.until
-    if not topics:
-        for key in ("messages", "quiet"):
-            if getattr(until, key) is not None:
-                yield problem((*place, "until", key), "no topic is recorded: 'record' is missing")
+    for key in ("messages", "quiet"):
+        if not topics and getattr(until, key) is not None:
+            yield ("until", key), "no topic is recorded: 'record' is missing"
     if scenario.world is None:
         for key in ("robot", "lidar", "odometry", "topics"):
             if key in scenario.model_fields_set:
-                text = "there is a simulated robot only in a 'world', which is missing"
-                yield problem((*place, key), text)
+                yield (key,), "there is a simulated robot only in a 'world', which is missing"
         for key in ("at_rest", "travelled"):
             if any(getattr(one, key) is not None for one in (until, *until.any)):
                 text = f"{key!r} is about the simulated robot: 'world' is missing"
-                yield problem((*place, "until"), text)
+                yield ("until",), text
     for key, limit in (("quiet", until.quiet), ("elapsed", until.elapsed)):
         if limit is not None and limit >= scenario.timeout:
             shown, timeout = format_duration(limit), format_duration(scenario.timeout)
-            yield problem(
-                (*place, "until", key),
-                f"{shown} can never pass before the timeout of {timeout} ends the scenario",
-            )
+            text = f"{shown} can never pass before the timeout of {timeout} ends the scenario"
+            yield ("until", key), text
 
 
-def _launch(draft: Draft, place: Place, launch: Launch) -> Iterator[Problem]:
-    names = [name for name in draft.names("packages", "name") if name is not None]
-    if launch.package is None and len(names) != 1:
-        listed = ", ".join(names) or "none"
-        text = f"the key 'package' is missing: there is not exactly one package ({listed})"
-        yield draft.source.problem(place, text)
+def _launch(assignment: Assignment, launch: Launch) -> Iterator[tuple[Place, str]]:
+    # Of a name that stands twice the first counts.
+    packages = {package.name: package for package in reversed(assignment.packages)}
+    if launch.package is None and len(packages) != 1:
+        listed = ", ".join(one.name for one in assignment.packages)
+        yield (), f"the key 'package' is missing: there is not exactly one package ({listed})"
         return
-    package = draft.package(launch.package or names[0])
-    if launch.package is not None and launch.package not in names:
-        yield draft.source.problem((*place, "package"), no_package(launch.package, names))
-    elif package is None or launch.executable is None:
-        return
-    elif launch.executable not in package.executables:
-        yield draft.source.problem(
-            (*place, "executable"), no_executable(launch.executable, package)
-        )
+    package = packages.get(launch.package or assignment.packages[0].name)
+    if package is None:
+        yield ("package",), no_package(str(launch.package), packages)
+    elif launch.executable is not None and launch.executable not in package.executables:
+        yield ("executable",), no_executable(launch.executable, package)
 
 
-def _requirements(draft: Draft) -> Iterator[Problem]:
-    names = draft.names("checks")
-    known = [name for name in names if name is not None]
-    for index, spec in enumerate(draft.checks):
-        for number, required in enumerate(spec.requires if spec else ()):
-            place = ("checks", index, "requires", number)
-            if required == names[index]:
-                yield draft.source.problem(place, "a check cannot require itself")
-            elif required not in known:
-                listed = f" The checks are: {', '.join(known)}."
-                advice = did_you_mean(required, known) or listed
-                yield draft.source.problem(place, f"there is no check {required!r}.{advice}")
-    yield from _shown_too_late(draft)
-
-
-def _shown_too_late(draft: Draft) -> Iterator[Problem]:
-    """What a check waits for is shown no later than the check, or a skip could not be told."""
-    shown = {spec.id: spec.visibility for spec in draft.checks if spec is not None}
-    for index, spec in enumerate(draft.checks):
-        for number, required in enumerate(spec.requires if spec else ()):
-            if spec is None or required not in shown:
-                continue
-            mine, other = spec.visibility, shown[required]
-            if SHOWN_FROM.index(other) > SHOWN_FROM.index(mine):
+def _requirements(source: Source, checks: Sequence[CheckSpec]) -> Iterator[Problem]:
+    shown = {spec.id: spec.visibility for spec in checks}
+    for index, spec in enumerate(checks):
+        for number, required in enumerate(spec.requires):
+            place: Place = ("checks", index, "requires", number)
+            if required not in shown:
+                advice = nearest_or_all(required, shown, "The checks are")
+                yield source.problem(place, f"there is no check {required!r}.{advice}")
+            # A skip could not be told otherwise.
+            elif SHOWN_FROM.index(shown[required]) > SHOWN_FROM.index(spec.visibility):
                 text = (
-                    f"{required!r} is {other.value!r}, so {spec.id!r} cannot be {mine.value!r}: "
-                    "a student would lose its points for a reason that is not shown"
+                    f"{required!r} is {shown[required].value!r}, so {spec.id!r} cannot be "
+                    f"{spec.visibility.value!r}: a student would lose its points for a reason that "
+                    "is not shown"
                 )
-                yield draft.source.problem(("checks", index, "requires", number), text)
+                yield source.problem(place, text)
+    try:
+        TopologicalSorter({spec.id: spec.requires for spec in checks}).prepare()
+    except CycleError as error:
+        circle = error.args[1][::-1]
+        place = ("checks", list(shown).index(circle[0]), "requires")
+        text = f"never judged, because it requires itself: {' -> '.join(circle)}"
+        yield source.problem(place, text)
 
 
-def _circles(draft: Draft) -> Iterator[Problem]:
-    requires = {
-        spec.id: {other for other in spec.requires if other != spec.id}
-        for spec in draft.checks
-        if spec is not None
-    }
-    waiting = {check: others & requires.keys() for check, others in requires.items()}
-    while waiting:
-        ready = [check for check, others in waiting.items() if not others & waiting.keys()]
-        if not ready:
-            circle = _circle(waiting)
-            place = ("checks", draft.names("checks").index(circle[0]), "requires")
-            text = f"never judged, because it requires itself: {' -> '.join(circle)}"
-            yield draft.source.problem(place, text)
-            ready = circle
-        waiting = {check: others for check, others in waiting.items() if check not in ready}
+def _points(source: Source, assignment: Assignment) -> Iterator[Problem]:
+    found, stated = math.fsum(spec.points for spec in assignment.checks), assignment.points
+    if found == 0.0:
+        yield source.problem(("checks",), "the points of all checks add up to 0")
+    if stated is not None and not math.isclose(found, stated):
+        text = f"the points of all checks add up to {found:g}, not to {stated:g}"
+        yield source.problem(("points",), text)
 
 
-def _circle(waiting: dict[str, set[str]]) -> list[str]:
-    path = [next(iter(waiting))]
-    while path.count(path[-1]) == 1:
-        path.append(min(waiting[path[-1]] & waiting.keys()))
-    circle = path[path.index(path[-1]) : -1]
-    # Told from the check that the author wrote first.
-    first = min(circle, key=list(waiting).index)
-    at = circle.index(first)
-    return [*circle[at:], *circle[:at], first]
-
-
-def _points(draft: Draft) -> Iterator[Problem]:
-    if draft.checks and all(spec is not None and spec.points == 0.0 for spec in draft.checks):
-        yield draft.source.problem(("checks",), "the points of all checks add up to 0")
-    stated = draft.source.data.get("points")
-    if isinstance(stated, bool) or not isinstance(stated, int | float):
-        return
-    if all(spec is not None for spec in draft.checks):
-        # The small amount is float noise of the sum.
-        found = sum(spec.points for spec in draft.checks if spec is not None)
-        if abs(found - stated) > 1e-9:
-            text = f"the points of all checks add up to {found:g}, not to {stated:g}"
-            yield draft.source.problem(("points",), text)
-
-
-def _check(draft: Draft, index: int, bound: BoundCheck) -> Iterator[Problem]:
-    place: Place = ("checks", index)
-    problem = draft.source.problem
+def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, str]]:
     name, spec = bound.check.name, bound.spec
-    known = [one for one in draft.names("scenarios") if one is not None]
+    scenarios = {scenario.id: scenario for scenario in assignment.scenarios}
+    judged = [scenarios[one] for one in spec.scenarios or scenarios if one in scenarios]
     if bound.check.subject is Subject.SUBMISSION:
         if spec.scenarios:
             text = f"{name!r} judges what was handed in, not a run: leave 'scenarios' out"
-            yield problem((*place, "scenarios"), text)
-    elif not draft.scenarios:
-        yield problem(place, f"{name!r} judges a run, but the assignment has no scenarios")
+            yield ("scenarios",), text
+    elif not scenarios:
+        yield (), f"{name!r} judges a run, but the assignment has no scenarios"
     else:
         for number, scenario in enumerate(spec.scenarios):
-            if scenario not in known:
-                advice = did_you_mean(scenario, known)
-                text = f"there is no scenario {scenario!r}."
-                listed = f" The scenarios are: {', '.join(known)}."
-                yield problem((*place, "scenarios", number), text + (advice or listed))
-        yield from _unnamed(draft, place, bound)
-    yield from need_problems(draft, place, bound)
+            if scenario not in scenarios:
+                advice = nearest_or_all(scenario, scenarios, "The scenarios are")
+                yield ("scenarios", number), f"there is no scenario {scenario!r}.{advice}"
+        if not spec.scenarios:
+            yield from _unnamed(judged)
+    yield from need_problems(assignment, bound, judged)
 
 
-def _unnamed(draft: Draft, place: Place, bound: BoundCheck) -> Iterator[Problem]:
+def _unnamed(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
     """A check of all scenarios would judge one program in the runs of another, too."""
-    if bound.spec.scenarios:
-        return
-    launched = {
-        scenario.id: sorted(map(_program, scenario.launch))
-        for scenario in draft.scenarios_of(bound.spec) or ()
-    }
-    first = next(iter(launched), None)
-    for scenario, programs in launched.items():
-        if first is not None and programs != launched[first]:
+    launched = [sorted(map(_program, scenario.launch)) for scenario in scenarios]
+    for scenario, programs in zip(scenarios, launched, strict=True):
+        if programs != launched[0]:
             text = (
-                f"name the 'scenarios' that it judges, for they do not launch the same: {first!r} "
-                f"launches {', '.join(launched[first])}, but {scenario!r} {', '.join(programs)}"
+                "name the 'scenarios' that it judges, for they do not launch the same: "
+                f"{scenarios[0].id!r} launches {', '.join(launched[0])}, but {scenario.id!r} "
+                f"{', '.join(programs)}"
             )
-            yield draft.source.problem(place, text)
+            yield (), text
             return
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Collection
 
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Scenario, Visibility
+from grader.assignment.model import Visibility
+from grader.assignment.mutant import required_by
 from grader.assignment.withheld import Withheld
 from grader.checks.check import Subject
 from grader.errors import UsageError
-from grader.spec.nearest_name import did_you_mean
+from grader.spec.nearest_name import nearest_or_all
 
 
 def select(
@@ -28,38 +30,38 @@ def select(
     """
     if not checks and not scenarios:
         return loaded
-    known = {bound.spec.id: bound for bound in loaded.checks}
-    _refuse_unknown("check", checks, set(known), loaded)
-    named = {scenario.id for scenario in loaded.assignment.scenarios}
+    requires = {bound.spec.id: bound.spec.requires for bound in loaded.checks}
+    named = [scenario.id for scenario in loaded.assignment.scenarios]
+    _refuse_unknown("check", checks, requires, loaded)
     _refuse_unknown("scenario", scenarios, named, loaded)
-    wanted = _closure(loaded, checks) if checks else set(known)
-    kept_scenarios = set(scenarios or named)
-    kept = []
-    for bound in loaded.checks:
-        judged = [s.id for s in loaded.scenarios_of(bound) if s.id in kept_scenarios]
-        if bound.spec.id not in wanted:
-            continue
-        if bound.check.subject is Subject.RECORDING and not judged:
-            continue
-        spec = bound.spec.model_copy(update={"scenarios": tuple(judged)})
-        kept.append(dataclasses.replace(bound, spec=spec))
-    ids = {bound.spec.id for bound in kept}
-    kept = [
-        dataclasses.replace(
-            bound,
-            spec=bound.spec.model_copy(
-                update={"requires": tuple(r for r in bound.spec.requires if r in ids)}
-            ),
+    wanted = set(checks or requires).union(*(required_by(name, requires) for name in checks))
+    judged = {
+        bound.spec.id: tuple(
+            one.id for one in loaded.scenarios_of(bound) if one.id in (scenarios or named)
         )
-        for bound in kept
+        for bound in loaded.checks
+        if bound.spec.id in wanted
+    }
+    kept = [
+        bound
+        for bound in loaded.checks
+        if judged.get(bound.spec.id)
+        or (bound.spec.id in wanted and bound.check.subject is Subject.SUBMISSION)
     ]
+    ids = {bound.spec.id for bound in kept}
+    parts = []
+    for bound in kept:
+        required = tuple(one for one in bound.spec.requires if one in ids)
+        changes = {"scenarios": judged[bound.spec.id], "requires": required}
+        parts.append(dataclasses.replace(bound, spec=bound.spec.model_copy(update=changes)))
+    needed = {scenario for bound in parts for scenario in bound.spec.scenarios}
     assignment = loaded.assignment.model_copy(
         update={
-            "checks": tuple(bound.spec for bound in kept),
-            "scenarios": _needed(loaded, {s for b in kept for s in b.spec.scenarios}),
+            "checks": tuple(bound.spec for bound in parts),
+            "scenarios": tuple(s for s in loaded.assignment.scenarios if s.id in needed),
         }
     )
-    return dataclasses.replace(loaded, assignment=assignment, checks=tuple(kept))
+    return dataclasses.replace(loaded, assignment=assignment, checks=tuple(parts))
 
 
 def visible_part(loaded: LoadedAssignment) -> LoadedAssignment:
@@ -89,29 +91,10 @@ def visible_part(loaded: LoadedAssignment) -> LoadedAssignment:
     return dataclasses.replace(part, withheld=loaded.withheld + withheld)
 
 
-def _closure(loaded: LoadedAssignment, checks: tuple[str, ...]) -> set[str]:
-    requires = {bound.spec.id: bound.spec.requires for bound in loaded.checks}
-    wanted: set[str] = set()
-    queue = list(checks)
-    while queue:
-        name = queue.pop()
-        if name not in wanted:
-            wanted.add(name)
-            queue.extend(requires[name])
-    return wanted
-
-
-def _needed(loaded: LoadedAssignment, names: set[str]) -> tuple[Scenario, ...]:
-    return tuple(s for s in loaded.assignment.scenarios if s.id in names)
-
-
 def _refuse_unknown(
-    kind: str, given: tuple[str, ...], known: set[str], loaded: LoadedAssignment
+    kind: str, given: tuple[str, ...], known: Collection[str], loaded: LoadedAssignment
 ) -> None:
     for name in given:
         if name not in known:
-            listed = f" There are: {', '.join(sorted(known))}."
-            raise UsageError(
-                f"assignment {loaded.assignment.id!r} has no {kind} {name!r}."
-                + (did_you_mean(name, known) or listed)
-            )
+            advice = nearest_or_all(name, sorted(known))
+            raise UsageError(f"assignment {loaded.assignment.id!r} has no {kind} {name!r}.{advice}")

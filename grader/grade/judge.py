@@ -27,7 +27,8 @@ from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
     # Reading YAML is not needed to judge; a worker of a batch starts without it.
-    from grader.assignment.load import BoundCheck, LoadedAssignment
+    from grader.assignment.binding import BoundCheck
+    from grader.assignment.load import LoadedAssignment
 
 _NOT_YOURS = "Nothing to fix on your side: tell your instructor."
 

@@ -23,3 +23,9 @@ def did_you_mean(name: str, candidates: Iterable[str]) -> str:
     """Make the sentence to append to an error, or nothing when no name is near."""
     match = nearest(name, candidates)
     return f" Did you mean {match!r}?" if match else ""
+
+
+def nearest_or_all(name: str, candidates: Iterable[str], words: str = "There are") -> str:
+    """Make the sentence to append to an error: the nearest name, or else all of them."""
+    names = list(candidates)
+    return did_you_mean(name, names) or f" {words}: {', '.join(names) or 'none'}."

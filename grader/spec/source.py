@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -61,6 +61,22 @@ class Source:
         """The list under a key at the top, or an empty one where there is no list."""
         value = self.data.get(key)
         return value if isinstance(value, list) else []
+
+    def duplicates(self, name: str, *keys: str) -> Iterator[Problem]:
+        """Entries of some lists that have the name of an earlier one.
+
+        Args:
+            name: Key of each entry that it is named by.
+            keys: Of the lists, at the top.
+        """
+        seen: dict[str, Place] = {}
+        for key in keys:
+            for index, entry in enumerate(self.entries(key)):
+                place: Place = (key, index, name)
+                value = entry.get(name)
+                if seen.setdefault(value, place) != place:
+                    first = self.line(seen[value])
+                    yield self.problem(place, f"{value!r} stands twice (first in line {first})")
 
     def read(self, model: type[M], place: Place = ()) -> M:
         """Validate the document, or a part of it, as a model.

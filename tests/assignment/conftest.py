@@ -8,12 +8,12 @@ from typing import Literal
 
 import pytest
 
-from grader.assignment.model import InterfaceName, TopicName
 from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.checks.finding import Finding
 from grader.checks.need import Recorded, Submitted
 from grader.errors import GraderFault
 from grader.ros import RosInstallation
+from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration
 from tests.assignment.lessons import GOOD
 

@@ -139,17 +139,3 @@ def test_fields_of_our_copy_are_checked(
     (mistake,) = mistakes(sent="bot_msgs/msg/BotStatus", **OWN)
     assert mistake.startswith("15: ")
     assert "has no field 'modle'. Did you mean 'model'?" in mistake
-
-
-def test_a_message_that_holds_itself_is_one_mistake_and_no_endless_one(mistakes: Mistakes) -> None:
-    files = {
-        "lab_msgs/package.xml": "<package/>",
-        "lab_msgs/msg/Tree.msg": "uint8 KIND=1\nLeaf[] leaves\n",
-        "lab_msgs/msg/Leaf.msg": "lab_msgs/Tree tree\nstd_msgs/String text\n",
-    }
-    assert mistakes(recorded="lab_msgs/msg/Tree", **files) == [
-        "10: no message can hold itself: lab_msgs/msg/Tree -> lab_msgs/msg/Leaf -> "
-        "lab_msgs/msg/Tree"
-    ]
-    files["lab_msgs/msg/Leaf.msg"] = "std_msgs/String text\nstd_msgs/String other\n"
-    assert mistakes(recorded="lab_msgs/msg/Tree", **files) == []

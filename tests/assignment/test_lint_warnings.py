@@ -73,32 +73,6 @@ def all_told(folder: Path, checks: str, depends: str = "") -> list[str]:
     return [one for one in lint_warnings(loaded, []) if not one.startswith("no mutant")]
 
 
-@pytest.mark.parametrize(
-    ("tolerance", "doubt"),
-    [
-        ("tolerance: 0 %", "'tolerance' 0 %: what is measured is never exact"),
-        ("tolerance: 0 ms", "'tolerance' 0 %: what is measured is never exact"),
-        ("tolerance: 200 %", "'tolerance' 200 %: so wide that even next to 0 is near enough"),
-        ("tolerance: 300 ms", "'tolerance' 100 %: so wide that even next to 0 is near enough"),
-        ("spread: 100 %", "'spread' 100 %: so wide"),
-    ],
-)
-def test_a_tolerance_that_nothing_or_everything_meets_is_told(
-    tmp_path: Path, tolerance: str, doubt: str
-) -> None:
-    parameters = f"{{topic: /cmd_vel, period: 300 ms, {tolerance}}}"
-    check = f"  - {{id: some, uses: timing.period, with: {parameters}, points: 1}}\n"
-    (told_,) = all_told(tmp_path, check)
-    assert told_.startswith(f"the check 'some' has {doubt}")
-
-
-@pytest.mark.parametrize("tolerance", ["1 %", "99 %", "15 ms", "0.5"])
-def test_a_tolerance_that_some_meet_is_not_doubted(tmp_path: Path, tolerance: str) -> None:
-    parameters = f"{{topic: /cmd_vel, period: 300 ms, tolerance: {tolerance}, outliers: 0 %}}"
-    check = f"  - {{id: some, uses: timing.period, with: {parameters}, points: 1}}\n"
-    assert all_told(tmp_path, check) == []
-
-
 def test_a_dependency_that_is_a_slip_is_told_and_one_that_is_merely_unknown_is_not(
     tmp_path: Path,
 ) -> None:

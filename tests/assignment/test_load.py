@@ -125,7 +125,7 @@ def test_the_title_in_the_yaml_wins(write: Write, catalogue: Catalogue) -> None:
         ),
         (
             "{id: a, points: 1, uses: node.alive, requires: [a]}",
-            "checks[0].requires[0]: a check cannot require itself",
+            "checks[0].requires: never judged, because it requires itself: a -> a",
         ),
         (
             "{id: a, points: 1, uses: node.alive, scenarios: [runs]}",
@@ -366,29 +366,27 @@ def test_checks_that_wait_for_each_other_are_told_once_as_a_circle(mistakes: Mis
             ("c", "b"),
             ("d", "c"),
             ("e", "d"),
-            ("x", "y"),
-            ("y", "x, e"),
+            ("x", "e"),
         ]
     )
     assert mistakes(text) == [
         "14: checks[1].requires: never judged, because it requires itself: b -> d -> c -> b",
-        "18: checks[5].requires: never judged, because it requires itself: x -> y -> x",
     ]
 
 
-def test_form_and_fit_are_told_together(mistakes: Mistakes) -> None:
+def test_what_does_not_fit_is_told_once_the_form_is_right(mistakes: Mistakes) -> None:
     text = HEAD.replace("timeout: 5 s", "timeout: 5") + (
         "  - {id: a, uses: node.alife, points: 1, requires: [q]}\n"
         "  - {id: b, uses: node.alive, point: 1, scenarios: [run]}\n"
-        "  - {id: c, uses: messages.count, points: 1, with: {topic: /nowhere}, scenarios: [run]}\n"
-        "  - {id: d, uses: node.alive, points: 1, requires: [b]}\n"
     )
-    # The scenario is there, though it has a mistake: nothing that names it is wrong.
     assert mistakes(text) == [
         "11: scenarios[0].timeout: 5 has no unit: write for example '5 s'",
-        "13: checks[0].uses: there is no check 'node.alife'. Did you mean 'node.alive'?",
-        "13: checks[0].requires[0]: there is no check 'q'. The checks are: a, b, c, d.",
         "14: checks[1].point: unknown key 'point'. Did you mean 'points'?",
+    ]
+    text = text.replace("timeout: 5", "timeout: 5 s").replace("point:", "points:")
+    assert mistakes(text) == [
+        "13: checks[0].uses: there is no check 'node.alife'. Did you mean 'node.alive'?",
+        "13: checks[0].requires[0]: there is no check 'q'. The checks are: a, b.",
     ]
 
 

@@ -97,12 +97,12 @@ def test_files_and_folders_move_last() -> None:
         (
             {"edits": [{"file": "bot/setup.py", "replace": "zzz", "with": "b"}]},
             ("edits", 0, "replace"),
-            "the text stands never in bot/setup.py, not once",
+            "the text stands 0 times in bot/setup.py, 1 is expected",
         ),
         (
             {"edits": [{"file": "bot/bot/node.py", "replace": "spin", "with": "b"}]},
             ("edits", 0, "replace"),
-            "the text stands twice in bot/bot/node.py, not once",
+            "the text stands 2 times in bot/bot/node.py, 1 is expected",
         ),
         (
             {"files": {"bot/setup.cfg": None}},

@@ -299,11 +299,11 @@ def test_until_done_needs_a_stimulus_with_an_end(mistakes: Callable[[str], list[
     [
         (
             "uses: timing.latency, with: {stimulus: /chater, topic: /echo, most: 1 s}",
-            "do not publish on '/chater'. Did you mean '/chatter'?",
+            "publishes on '/chater'. Did you mean '/chatter'?",
         ),
         (
             "uses: qos.late_joiner, with: {joiner: latte, topic: /echo, last: 1}",
-            "do not have a join 'latte'. Did you mean 'late'?",
+            "is a join with the name 'latte'. Did you mean 'late'?",
         ),
     ],
 )

@@ -34,6 +34,11 @@ class Join(StimulusModel):
     durability: Durability = Field("volatile", description="Requested durability.")
     depth: int = Field(100, ge=1, le=10_000, description="Queue depth of the subscription.")
 
+    @property
+    def exchanged(self) -> tuple[str, str]:
+        """The topic and its type."""
+        return self.join, self.type
+
     def order(self, making: Making) -> dict[str, Any]:
         """The subscription."""
         return {
@@ -52,7 +57,6 @@ class Join(StimulusModel):
         alike = [one for one in scenario.stimuli if isinstance(one, Join) and one.name == self.name]
         if alike[0] is not self:
             yield ("name",), f"{self.name!r} stands twice"
-        published = [one.exchanged for one in scenario.stimuli if one.key == "publish"]
-        if any(found and found[0] == self.join for found in published):
+        if self.exchanged in [one.exchanged for one in scenario.stimuli if one.key == "publish"]:
             text = f"the probe publishes on {self.join!r} itself: a late joiner would hear that"
             yield ("join",), text
