@@ -33,8 +33,8 @@ lock: setup ## regenerate requirements.lock; UPGRADE=1 to newer versions
 bench: setup ## measure rosgrade's own overhead
 	@$(run) -m grader.bench
 
-soak: setup ## grade a class of 200 under load (N=100: seven submissions N times) and look for a verdict that changes
-	@$(run) -m grader.soak $(if $(N),--runs $(N))
+soak: setup ## grade a class of 200 (or N=...) under load, and look for a grade that changes
+	@$(run) -m grader.soak $(if $(N),--students $(N))
 
 docs: setup ## regenerate docs/, and build the site in build/site
 	@$(run) -m grader.docs
