@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
-import io
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from grader.checks.wording import listing
 from grader.errors import UsageError
 from grader.submission.intake.paths import shown
 
-_MOST_BYTES = 16 * 2**20
 # Column headers, as Canvas, Gradescope, GitHub Classroom and people write them.
 _COLUMNS = {
     "id": ("id", "student id", "student_id", "sid", "sis user id", "number", "matriculation"),
@@ -25,13 +21,9 @@ _COLUMNS = {
     "submission": ("submission", "path", "file", "folder", "repository", "repo", "url"),
 }
 _POINTS_POSSIBLE = "points possible"
-_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _EXCEL = "Windows-1252"
 """What Excel writes in Western Europe and America, unless it is asked for UTF-8."""
-# How Excel is told the delimiter, in a line before the header.
-_DELIMITER = re.compile(r'"?sep=(.)"?\s*\n', re.IGNORECASE)
 _NO_LETTER = re.compile(r"[\W_]+")
-_END = "end of the roster"
 
 
 @dataclass(frozen=True)
@@ -120,106 +112,72 @@ def name_forms(name: str) -> tuple[str, ...]:
 
 
 def read_roster(file: Path) -> Roster:
-    """Read a roster.
-
-    Args:
-        file: CSV with commas, semicolons or tabs and a header; a Canvas export will do.
+    """Read a roster: CSV with commas, semicolons or tabs, and a header.
 
     Raises:
         UsageError: It cannot be read, or no column names a student.
     """
     try:
-        if file.stat().st_size > _MOST_BYTES:
-            raise UsageError(f"{file}: is larger than {_MOST_BYTES // 2**20} MiB; is it a roster?")
         data = file.read_bytes()
     except OSError as error:
         raise UsageError(f"{file}: cannot be read: {error.strerror}") from error
     try:
-        text, doubt = _decoded(data)
+        return parse_roster(data.decode("utf-8-sig"), str(file))
+    except UnicodeDecodeError:
+        # Another encoding of one byte for a letter would be read as well, with other letters.
+        doubt = f"is not UTF-8 and was read as {_EXCEL}: look at letters with accents"
+    try:
+        roster = parse_roster(data.decode(_EXCEL), str(file))
     except UnicodeDecodeError as error:
         raise UsageError(f"{file}: is not UTF-8; save it as “CSV UTF-8”") from error
-    roster = parse_roster(text.replace("\r\n", "\n").replace("\r", "\n"), str(file))
-    return replace(roster, problems=(*doubt, *roster.problems))
-
-
-def _decoded(data: bytes) -> tuple[str, tuple[str, ...]]:
-    """The text of a file, and what is doubtful about it."""
-    if data.startswith(_UTF_16):
-        return data.decode("utf-16"), ()
-    try:
-        return data.decode("utf-8-sig"), ()
-    except UnicodeDecodeError:
-        # Another encoding of one byte would be read as well, with other letters.
-        doubt = f"is not UTF-8 and was read as {_EXCEL}: look at letters with accents"
-        return data.decode(_EXCEL), (doubt,)
+    return replace(roster, problems=(doubt, *roster.problems))
 
 
 def parse_roster(text: str, source: str) -> Roster:
     """Read the text of a roster.
 
     Raises:
-        UsageError: No column names a student.
+        UsageError: It is not CSV, or no column names a student.
     """
-    named = _DELIMITER.match(text)
-    first = text.partition("\n")[0]
-    delimiter = named[1] if named else max(",;\t", key=first.count)
-    reader = csv.reader(io.StringIO(f"{text}\n{_END}\n"), delimiter=delimiter)
+    lines = text.splitlines(keepends=True)
+    delimiter = max(",;\t", key=lines[0].count) if lines else ","
+    reader = csv.reader(lines, delimiter=delimiter, strict=True)
     rows: list[tuple[int, list[str]]] = []
     try:
         for row in reader:
-            rows.append((reader.line_num, row))
+            rows.append((reader.line_num, [cell.strip() for cell in row]))
     except csv.Error as error:
-        raise UsageError(f"{source}:{reader.line_num}: is not CSV: {error}") from error
-    if rows.pop()[1] != [_END]:
-        begins = rows[-1][0] + 1 if rows else 1
-        raise UsageError(f'{source}:{begins}: a quote (") opens here that nothing closes')
-    if named:
-        del rows[0]
-    header = rows.pop(0)[1]
-    columns = _columns(header)
+        line = rows[-1][0] + 1 if rows else 1
+        raise UsageError(f'{source}:{line}: is not CSV: is a quote (") missing? {error}') from error
+    header = [cell.casefold() for cell in rows[0][1]] if rows else []
+    columns = {
+        field: next(header.index(name) for name in names if name in header)
+        for field, names in _COLUMNS.items()
+        if not set(names).isdisjoint(header)
+    }
     if not set(columns) - {"submission"}:
         raise UsageError(
-            f"{source}:{2 if named else 1}: no column says who a student is; name one of them id, "
-            f"login, email or name (there are: {', '.join(header) or 'none'})"
+            f"{source}:1: no column says who a student is; name one of them id, login, email or "
+            f"name (there are: {', '.join(header) or 'none'})"
         )
-    return _collect(columns, rows)
-
-
-def _columns(header: Sequence[str]) -> dict[str, int]:
-    found: dict[str, int] = {}
-    lowered = [cell.strip().casefold() for cell in header]
-    for field, names in _COLUMNS.items():
-        for name in names:
-            if name in lowered and field not in found:
-                found[field] = lowered.index(name)
-    return found
+    return _collect(columns, rows[1:])
 
 
 def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) -> Roster:
     students: dict[str, Student] = {}
-    again: dict[str, list[int]] = {}
     problems: list[str] = []
-    for number, row in rows:
-        cells = [cell.strip() for cell in row]
+    for number, cells in rows:
         if not any(cells) or cells[0].casefold().startswith(_POINTS_POSSIBLE):
             continue
         values = {field: cells[column] for field, column in columns.items() if column < len(cells)}
         student = Student(number, **values)
-        broken = [field for field, cell in values.items() if "\n" in cell]
-        if broken:
-            told = f"its {' and '.join(broken)} goes over several lines: is a quote missing?"
-            problems.append(f"row {number}: {told}")
-            student = replace(student, problem=told)
         if not student.key:
-            problems.append(f"row {number}: names nobody")
+            problems.append(f"row {number}: has no name")
             continue
-        name = written(student.key)
-        known = students.setdefault(name, student)
+        known = students.setdefault(written(student.key), student)
         if known is not student:
             problems.append(f"row {number}: {student.key} is in row {known.row} already")
-            again.setdefault(name, []).append(number)
-    for name, numbers in again.items():
-        told = f"in the roster again in row {listing(map(str, numbers))}"
-        problem = "; ".join(part for part in (students[name].problem, told) if part)
-        students[name] = replace(students[name], problem=problem)
+            again = f"in the roster again in row {number}"
+            problem = "; ".join(part for part in (known.problem, again) if part)
+            students[written(student.key)] = replace(known, problem=problem)
     return Roster(tuple(students.values()), tuple(problems))
