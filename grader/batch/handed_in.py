@@ -10,11 +10,10 @@ from pathlib import Path
 from grader.submission.intake.archive import SUFFIXES
 from grader.submission.read.manifest import MANIFEST
 
-# Archives that cannot be read: whoever handed one in is told so, and has a row.
+# Archives that cannot be read; they are rows all the same, with this as their reason.
 FOREIGN = (".rar", ".7z")
 
 _IGNORED = ("__MACOSX",)
-BARE = "is a bare git repository; give a clone of it, or name it as file://… in a roster"
 
 
 @dataclass(frozen=True)
@@ -50,9 +49,8 @@ class Entry:
 
 def row_of(entry: Entry) -> HandedIn:
     """The row of an entry, before a roster says whose it is."""
-    fault = entry.fault or (BARE if is_bare(entry.path) else "")
-    path = None if fault else _archive_in(entry.path) or entry.path
-    return HandedIn(entry.key, path, entry.name, entry.late, fault=fault)
+    path = None if entry.fault else _archive_in(entry.path) or entry.path
+    return HandedIn(entry.key, path, entry.name, entry.late, fault=entry.fault)
 
 
 def stem_of(item: Path) -> str:
@@ -67,15 +65,6 @@ def with_problem(row: HandedIn, problem: str) -> HandedIn:
     return replace(row, problem="; ".join(part for part in (problem, row.problem) if part))
 
 
-def is_bare(path: Path) -> bool:
-    """Whether it is a repository without its files: what git itself looks for."""
-    try:
-        return all((path / part).exists() for part in ("HEAD", "objects", "refs"))
-    except OSError:
-        # Why it cannot be read is told by whoever reads it.
-        return False
-
-
 def _archive_in(folder: Path) -> Path | None:
     """What was handed in where a platform has made a folder for it, as Moodle does, or None."""
     try:
@@ -85,7 +74,7 @@ def _archive_in(folder: Path) -> Path | None:
             return None
         return only_archive({item.name: item for item in inside if not is_ignored(item)})
     except OSError:
-        # Why it cannot be read is told by whoever reads it.
+        # Reading it fails later, with its reason.
         return None
 
 

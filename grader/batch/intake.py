@@ -14,11 +14,9 @@ import yaml
 
 from grader.batch.clone import clone
 from grader.batch.handed_in import (
-    BARE,
     FOREIGN,
     Entry,
     HandedIn,
-    is_bare,
     is_ignored,
     only_archive,
     row_of,
@@ -124,13 +122,13 @@ def _from_roster(student: Student, base: Path, staging: Path, cloned: HandedIn |
     path = base / student.submission
     try:
         path.stat()
-        fault = BARE if is_bare(path) else ""
+        return replace(row, path=path)
     except (FileNotFoundError, ValueError):
         # A ValueError where no file can have that name: there is a NUL in it.
         fault = f"{shown(str(path))} does not exist"
     except OSError as error:
         fault = f"{shown(student.submission)} cannot be read: {error.strerror}"
-    return replace(row, fault=fault) if fault else replace(row, path=path)
+    return replace(row, fault=fault)
 
 
 def _opened(source: Path, staging: Path) -> Path:

@@ -515,41 +515,12 @@ def repository(path: Path, branch: str) -> Path:
     return path
 
 
-def test_a_repository_whose_head_names_no_branch_is_not_taken_for_empty(
-    tmp_path: Path, staging: Path
-) -> None:
-    one = repository(tmp_path / "one.git", "refs/heads/main")
-    two = repository(tmp_path / "two.git", "refs/heads/main")
-    git = ["git", "-C", str(two)]
-    subprocess.run([*git, "branch", "draft", "main"], check=True)
-    subprocess.run(["git", "init", "-q", "--bare", str(tmp_path / "none.git")], check=True)
-    roster = parse_roster(
-        f"login,submission\nana,file://{one}\nben,file://{two}\ncai,file://{tmp_path}/none.git\n",
-        "roster.csv",
-    )
-    ana, ben, cai = take_in_roster(roster, tmp_path, staging)
-    assert ana.path is not None and (ana.path / "pkg" / "package.xml").is_file()
-    assert ben.path is None and ben.fault.endswith("of its branches, which are draft, main")
-    assert cai.path is not None and not cai.fault
-
-
 def test_a_team_s_repository_is_fetched_once(tmp_path: Path, staging: Path) -> None:
     url = f"file://{repository(tmp_path / 'one.git', 'refs/heads/main')}"
     roster = parse_roster(f"login,submission\nana,{url}\nben,{url}\ncai,\n", "roster.csv")
     ana, ben, cai = take_in_roster(roster, tmp_path, staging)
     assert ana.path is not None and ana.path == ben.path
     assert [row.problem for row in (ana, ben, cai)] == ["", "", "handed in nothing"]
-
-
-def test_a_bare_repository_is_told_and_not_graded_as_a_folder(
-    course: Path, tmp_path: Path, staging: Path
-) -> None:
-    repository(course / "ana.git", "refs/heads/main")
-    rows = {row.key: row for row in take_in(course, staging)}
-    roster = parse_roster("login,submission\nana,ana.git\n", "roster.csv")
-    (named,) = take_in_roster(roster, course, staging)
-    for row in (rows["ana.git"], named):
-        assert row.path is None and row.fault.startswith("is a bare git repository")
 
 
 def test_a_path_that_no_file_can_have_is_told_on_its_row(tmp_path: Path, staging: Path) -> None:
