@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import queue
+import contextlib
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from queue import SimpleQueue
+from typing import Any, Protocol, TypeVar
 
 from watchfiles import Change, watch
 
@@ -21,6 +23,8 @@ _SETTLED_MS = 50
 """An editor writes, renames and deletes to save one file: all of it is one change."""
 _LONGEST_MS = 400
 """Of a stream of changes, the first are acted on after this time."""
+
+T = TypeVar("T")
 
 
 class Worker(Protocol):
@@ -63,48 +67,21 @@ class Ended:
     problem: RosgradeError | None = None
 
 
-@dataclass(frozen=True)
-class _State:
-    """What is there, as hashes."""
-
-    submission: str
-    assignment: str
-
-
-@dataclass(frozen=True)
-class _Saved:
-    """A file was saved."""
-
-
-@dataclass(frozen=True)
-class _Blind:
-    """The files cannot be watched any more."""
-
-    error: Exception
-
-
-@dataclass(frozen=True)
-class _Done:
-    """The grading is over."""
-
-    graded: Graded | None = None
-    error: BaseException | None = None
-
-
 class Watching:
-    """Grades at first and then at every change, until the one who iterates has enough."""
+    """Grades at first and then at every change, as long as its events are asked for."""
 
     def __init__(
         self, submission: Path, report: Path, worker: Worker, assignment: Path | None = None
     ) -> None:
         """Set up; nothing is watched yet."""
-        self._submission = submission
+        self._submission = submission.resolve()
         self._report = report.resolve()
         self._assignment = assignment.resolve() if assignment is not None else None
         self._worker = worker
-        self._told: queue.SimpleQueue[_Saved | _Blind | _Done] = queue.SimpleQueue()
+        # A future that is done, or None for a file that was saved.
+        self._news: SimpleQueue[Future[Any] | None] = SimpleQueue()
+        self._watches: list[Future[None]] = []
         self._stop = threading.Event()
-        self._grading: threading.Thread | None = None
 
     def events(self) -> Iterator[Began | Cancelled | Ended]:
         """Watch and grade.
@@ -112,128 +89,102 @@ class Watching:
         Raises:
             GraderFault: The files cannot be watched.
         """
-        watching = [
-            threading.Thread(target=look, name="watch", daemon=True)
-            for look in (self._watch_submission, self._watch_assignment)
-        ]
-        for thread in watching:
-            thread.start()
-        try:
-            while True:
-                state = self._fingerprint()
-                yield Began()
-                self._begin()
-                event = self._await_end(state)
-                yield event
-                if isinstance(event, Ended):
-                    # It may have been saved between the look at it and the copy that was graded.
-                    graded = event.graded
-                    sha256 = graded.prepared.record.sha256 if graded else state.submission
-                    self._await_other(replace(state, submission=sha256))
-        finally:
-            self._stop.set()
-            self._cancel()
-            for thread in watching:
-                thread.join()
+        with ThreadPoolExecutor(3, "watch") as pool:
+            for look in (self._watch_submission, self._watch_assignment):
+                self._watches.append(self._start(pool, look))
+            grading: Future[Graded] | None = None
+            try:
+                while True:
+                    state = self._state()
+                    yield Began()
+                    self._worker.begin()
+                    grading = self._start(pool, self._worker.grade)
+                    while not (finished := self._next() is grading) and self._state() == state:
+                        pass
+                    if finished:
+                        ended, grading = _ended(grading), None
+                        yield ended
+                        # A save between this look and the copy that was graded counts as one.
+                        graded = ended.graded
+                        sha256 = graded.prepared.record.sha256 if graded else state[0]
+                        while self._state() == (sha256, state[1]):
+                            self._next()
+                    else:
+                        self._cancel(grading)
+                        yield Cancelled()
+            finally:
+                self._stop.set()
+                if grading is not None:
+                    self._cancel(grading)
 
-    def _begin(self) -> None:
-        self._worker.begin()
-        self._grading = threading.Thread(target=self._grade, name="grade")
-        self._grading.start()
+    def _start(self, pool: ThreadPoolExecutor, work: Callable[[], T]) -> Future[T]:
+        future = pool.submit(work)
+        future.add_done_callback(self._news.put)
+        return future
 
-    def _grade(self) -> None:
-        try:
-            self._told.put(_Done(graded=self._worker.grade()))
-        except BaseException as error:
-            self._told.put(_Done(error=error))
+    def _next(self) -> Future[Any] | None:
+        """Wait for a save, or for the end of the grading."""
+        news = self._news.get()
+        if news in self._watches and (error := news.exception()):
+            raise GraderFault(f"the files cannot be watched: {error}")
+        return news
 
-    def _await_end(self, state: _State) -> Cancelled | Ended:
-        """Wait for the end of the grading, or for another content, which ends it."""
-        assert self._grading is not None
-        while True:
-            told = self._next()
-            if isinstance(told, _Done):
-                self._grading.join()
-                self._grading = None
-                if told.error is not None and not isinstance(told.error, RosgradeError):
-                    raise told.error
-                return Ended(told.graded, told.error)
-            if self._fingerprint() != state:
-                self._cancel()
-                return Cancelled()
-
-    def _await_other(self, state: _State) -> None:
-        while self._fingerprint() == state:
-            self._next()
-
-    def _next(self) -> _Saved | _Done:
-        told = self._told.get()
-        if isinstance(told, _Blind):
-            raise GraderFault(f"the files cannot be watched: {told.error}")
-        return told
-
-    def _cancel(self) -> None:
-        """End the grading; what it says at its end is nobody's concern."""
-        grading, self._grading = self._grading, None
-        if grading is None:
-            return
+    def _cancel(self, grading: Future[Graded]) -> None:
+        """End a grading, however it ends."""
         self._worker.cancel()
-        grading.join()
-        while not self._told.empty():
-            self._told.get()
+        wait([grading])
+        while not self._news.empty():
+            self._news.get()
 
-    def _fingerprint(self) -> _State:
-        """What is there now; nothing where it cannot be read, as in the middle of a save."""
-        try:
+    def _state(self) -> tuple[str, str]:
+        """Hashes of submission and assignment, empty where one cannot be read, as during a save."""
+        submission = assignment = ""
+        with contextlib.suppress(RosgradeError):
             submission = fingerprint(self._submission)
-        except RosgradeError:
-            submission = ""
-        try:
-            folder = self._assignment
-            assignment = folder_sha256(folder, self._report) if folder is not None else ""
-        except RosgradeError:
-            assignment = ""
-        return _State(submission, assignment)
+        with contextlib.suppress(RosgradeError):
+            if self._assignment is not None:
+                assignment = folder_sha256(self._assignment, self._report)
+        return submission, assignment
 
     def _watch_assignment(self) -> None:
-        folder = self._assignment
-        if folder is None:
-            return
-
-        def concerns(_: Change, path: str) -> bool:
-            changed = Path(path)
-            return not changed.is_relative_to(self._report)
-
-        self._watch(folder, concerns, recursive=True)
+        if self._assignment is not None:
+            self._watch(self._assignment, lambda _: True, recursive=True)
 
     def _watch_submission(self) -> None:
-        is_folder = self._submission.is_dir()
-        root = self._submission.resolve() if is_folder else self._submission.resolve().parent
-        name = self._submission.resolve().name
+        watched = self._submission
+        if watched.is_dir():
+            self._watch(
+                watched,
+                lambda path: not is_left_out(path.relative_to(watched).as_posix()),
+                recursive=True,
+            )
+        else:
+            # The file itself may be replaced.
+            self._watch(watched.parent, lambda path: path.name == watched.name, recursive=False)
 
+    def _watch(self, root: Path, matters: Callable[[Path], bool], *, recursive: bool) -> None:
         def concerns(_: Change, path: str) -> bool:
-            changed = Path(path)
-            if changed.is_relative_to(self._report):
-                return False
-            if not is_folder:
-                return changed.name == name
-            return not is_left_out(changed.relative_to(root).as_posix())
+            return not Path(path).is_relative_to(self._report) and matters(Path(path))
 
-        self._watch(root, concerns, recursive=is_folder)
+        for _ in watch(
+            root,
+            watch_filter=concerns,
+            debounce=_LONGEST_MS,
+            step=_SETTLED_MS,
+            stop_event=self._stop,
+            recursive=recursive,
+            raise_interrupt=False,
+        ):
+            self._news.put(None)
 
-    def _watch(
-        self, root: Path, concerns: Callable[[Change, str], bool], *, recursive: bool
-    ) -> None:
-        try:
-            for _ in watch(
-                root,
-                watch_filter=concerns,
-                debounce=_LONGEST_MS,
-                step=_SETTLED_MS,
-                stop_event=self._stop,
-                recursive=recursive,
-                raise_interrupt=False,
-            ):
-                self._told.put(_Saved())
-        except OSError as error:
-            self._told.put(_Blind(error))
+
+def _ended(grading: Future[Graded]) -> Ended:
+    """How a grading ended.
+
+    Raises:
+        Exception: It was a bug.
+    """
+    try:
+        return Ended(grading.result())
+    except RosgradeError as problem:
+        return Ended(problem=problem)
