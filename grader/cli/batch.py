@@ -16,7 +16,7 @@ import typer
 from grader.cli.options import AssignmentName, Quiet, Seed, assignment_places
 from grader.cli.sandbox import Choice, SandboxChoice
 from grader.cli.screen.console import output_console
-from grader.cli.screen.progress import ClassProgress
+from grader.cli.screen.progress import Progress
 from grader.errors import UsageError
 from grader.scratch import Scratch
 
@@ -87,9 +87,9 @@ def batch(
     # Before anything is read or written: without a sandbox there is no batch.
     grading = make_grading(order, loaded, admission) if scheduler is None else None
     began_s = time.monotonic()
-    with Scratch("batch") as staging, ClassProgress(quiet) as progress:
-        if grading is not None:
-            progress.say(f"sandbox: {grading.process_sandbox}")
+    with Scratch("batch") as staging, Progress(quiet).shown() as progress:
+        if grading is not None and not quiet:
+            progress.note(f"sandbox: {grading.process_sandbox}")
         names, rows = _rows(submissions, roster, out, staging, progress)
         problems = names.problems if names else ()
         for problem in problems[:_MOST_PROBLEMS]:
@@ -149,7 +149,7 @@ def _undisturbed() -> Iterator[None]:
 
 
 def _rows(
-    submissions: Path, roster: Path | None, out: Path, staging: Path, progress: ClassProgress
+    submissions: Path, roster: Path | None, out: Path, staging: Path, progress: Progress
 ) -> tuple[Roster | None, list[HandedIn]]:
     from grader.batch.intake import take_in, take_in_roster
     from grader.batch.roster import read_roster

@@ -33,7 +33,7 @@ from grader.cli.options import (
 )
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.cli.screen.console import output_console
-from grader.cli.screen.live import GradingProgress
+from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
 
 FULL_POINTS, POINTS_LOST, NOT_GRADED = 0, 1, 3
@@ -84,7 +84,7 @@ def check(
         (*assignment_places(assignment), submission, gradescope_metadata),
     )
     with formats.grading():
-        progress = GradingProgress(quiet, verbose)
+        progress = Progress(quiet, verbose)
         installation = ros.find()
         runner = Runner(
             installation,

@@ -10,7 +10,7 @@ import typer
 
 from grader.cli.options import Quiet
 from grader.cli.screen.console import output_console
-from grader.cli.screen.progress import ClassProgress
+from grader.cli.screen.progress import Progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -128,7 +128,7 @@ def _class(path: Path, assignment: str | None, quiet: bool) -> None:
     console = output_console()
     began_s = time.monotonic()
     rows = []
-    with Ledger(path).opened() as ledger, ClassProgress(quiet) as progress:
+    with Ledger(path).opened() as ledger, Progress(quiet).shown() as progress:
         name, entries = ledger.read()
         stored = assignment or stored_assignment(
             path, name, ledger.location(), "regrade", str(path)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from grader.cli.options import Quiet
-from grader.cli.screen.live import GradingProgress
+from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
 from grader.scratch import Scratch
 
@@ -50,7 +50,7 @@ def replay(
         assignment or stored_assignment(recording, found.assignment, found.location, *words)
     )
     check_path(submission)
-    progress = GradingProgress(quiet)
+    progress = Progress(quiet)
     installation = ros.find()
     with progress.shown():
         prepared = prepare(submission, installation, cache=cache_folder(), on_progress=progress.say)

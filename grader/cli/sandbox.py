@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from grader.cli.screen.console import Progress
+from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
 from grader.sandbox.choice import Choice
 

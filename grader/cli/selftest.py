@@ -10,7 +10,8 @@ import typer
 
 from grader.cli.options import Quiet
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
-from grader.cli.screen.console import Progress, output_console
+from grader.cli.screen.console import output_console
+from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
 
 if TYPE_CHECKING:

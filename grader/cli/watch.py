@@ -24,7 +24,7 @@ from grader.cli.options import (
 )
 from grader.cli.sandbox import Choice, SandboxChoice, chosen_sandbox
 from grader.cli.screen.console import output_console, print_error
-from grader.cli.screen.live import GradingProgress
+from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def watch(
     check_path(submission)
     check_folder(report)
     refuse_foreign(report, keep=False)
-    progress = GradingProgress(quiet, verbose)
+    progress = Progress(quiet, verbose)
     runner = Runner(
         ros.find(),
         progress=progress.narrate,
@@ -125,7 +125,7 @@ class _Work:
     submission: Path
     report: Path
     seed: int | None
-    progress: GradingProgress
+    progress: Progress
     runner: Runner
     grading: Grading | None = None
     problem: RosgradeError | None = None

@@ -1,102 +1,176 @@
-"""How far a long piece of work is: a bar on a terminal, else plain lines."""
+"""What a command does at the moment: lines that change on a terminal, else plain lines."""
 
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from grader.checks.wording import counted
+from grader.safe_text import one_line
 
 if TYPE_CHECKING:
-    from rich.progress import Progress as Bar
+    from rich.progress import Progress as Bars
     from rich.progress import TaskID
 
 _LEAST_FOR_RATE = 3
+_DOING = {
+    "launching": "starting {process}",
+    "waiting": "waiting for {what}",
+    "matched": "recording",
+    "recording": "recording, {elapsed_s:.1f} of at most {limit_s:.1f} s, {counted}",
+    "stopping": "stopping",
+    "recorded": "recorded",
+}
+"""Event of a cell (see :mod:`grader.run.cell.progress_events`) -> what its scenario does."""
+_PLAIN = frozenset({"launching", "matched", "recorded"})
+"""Events that are worth a line of their own where lines stay."""
 
 
-class ClassProgress:
-    """Counts, rate and time left of the work on a class, on standard error."""
+class Progress:
+    """Shows on standard error what a command does."""
 
-    def __init__(self, quiet: bool = False) -> None:
+    def __init__(self, quiet: bool = False, verbose: bool = False) -> None:
         """Prepare.
 
         Args:
             quiet: Say only what must be known.
+            verbose: Show what the build and the student's processes print.
         """
         self._quiet = quiet
-        self._bar: Bar | None = None
-        self._task: TaskID | None = None
-        self._count = self._total = self._fresh = 0
+        self._verbose = verbose
+        self._bars: Bars | None = None
+        self._tasks: dict[str, TaskID] = {}
+        self._said = ""
+        self._lock = threading.Lock()
+        self._work, self._count, self._total, self._fresh = "", 0, 0, 0
         self._began_s = 0.0
 
-    def __enter__(self) -> ClassProgress:
-        """Show the bar, on a terminal."""
-        if not self._quiet and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-            self._bar = Progress(
-                TextColumn("{task.description}"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TextColumn("{task.fields[pace]}"),
-                console=Console(stderr=True, highlight=False, emoji=False),
-                transient=True,
-            )
-            self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Take the bar away."""
-        if self._bar is not None:
-            self._bar.stop()
-
-    def begin(self, work: str, total: int, already: int = 0) -> None:
-        """Begin a piece of work.
-
-        Args:
-            already: How many of them were done before; they say nothing of the pace.
-        """
-        self._total, self._count, self._fresh = total, 0, 0
-        self._began_s = time.monotonic()
-        if self._bar is not None:
-            if self._task is not None:
-                self._bar.remove_task(self._task)
-            self._task = self._bar.add_task(work, total=total, pace="")
-        elif not self._quiet:
-            before = f", {already} of them by an earlier run" if already else ""
-            print(f"rosgrade: {work} {total}{before}", file=sys.stderr, flush=True)
-
-    def advance(self, name: str, said: str = "", *, fresh: bool = True) -> None:
-        """One more is done."""
-        self._count += 1
-        self._fresh += fresh
-        if self._bar is not None and self._task is not None:
-            self._bar.update(self._task, completed=self._count, pace=self.pace())
-        elif said and fresh and not self._quiet:
-            told = f"{self._count} of {self._total}: {name}: {said}"
-            pace = self.pace()
-            print(f"rosgrade: {told}{f' ({pace})' if pace else ''}", file=sys.stderr, flush=True)
+    @contextmanager
+    def shown(self) -> Iterator[Progress]:
+        """Show what happens while the block runs; it begins with nothing."""
+        if self._quiet or not sys.stderr.isatty():
+            yield self
+            return
+        self._tasks = {}
+        with _make_bars() as bars:
+            self._bars = bars
+            try:
+                yield self
+            finally:
+                self._bars = None
 
     def say(self, text: str) -> None:
-        """Say something that is good to know."""
-        if not self._quiet:
-            self.note(text)
+        """Say in a few words what happens now, besides the scenarios."""
+        if self._quiet or text == self._said:
+            return
+        self._said = text
+        if self._bars is not None:
+            self._show("", text)
+        else:
+            _print(text)
 
     def note(self, text: str) -> None:
         """Say something that must not be missed."""
-        if self._bar is not None:
+        if self._bars is not None:
             from rich.text import Text
 
-            self._bar.console.print(Text(f"rosgrade: {text}"))
+            self._bars.console.print(Text(f"rosgrade: {text}"))
         else:
-            print(f"rosgrade: {text}", file=sys.stderr, flush=True)
+            _print(text)
 
-    def pace(self) -> str:
-        """Rate and time left, once there is something to tell them from."""
+    def begin(self, work: str, total: int, already: int = 0) -> None:
+        """Begin to count a piece of work.
+
+        Args:
+            already: How many were done by an earlier run; they say nothing of the rate.
+        """
+        self._work, self._count, self._total, self._fresh = work, 0, total, 0
+        self._began_s = time.monotonic()
+        if self._bars is not None:
+            self._show("", work, completed=0, total=total)
+        elif not self._quiet:
+            _print(
+                f"{work} {total}" + (f", {already} of them by an earlier run" if already else "")
+            )
+
+    def advance(self, name: str, said: str = "", *, fresh: bool = True) -> None:
+        """Count one that is done."""
+        self._count += 1
+        self._fresh += fresh
+        rate = self._rate()
+        if self._bars is not None:
+            text = f"{self._work}, {self._count} of {self._total}{rate and f', {rate}'}"
+            self._show("", text, completed=self._count, total=self._total)
+        elif said and fresh and not self._quiet:
+            _print(f"{self._count} of {self._total}: {name}: {said}{rate and f' ({rate})'}")
+
+    def narrate(self, scenario: str, event: Mapping[str, Any]) -> None:
+        """Tell what the cell of a scenario does."""
+        kind = event["event"]
+        if kind == "printed":
+            self.output(f"{scenario} {event['process']}", event["text"])
+        elif kind in _DOING:
+            messages = counted(event.get("messages", 0), "message")
+            text = f"{scenario}: {_DOING[kind].format_map({**event, 'counted': messages})}"
+            if self._bars is not None:
+                self._show(scenario, text, completed=int(kind == "recorded"), total=1)
+            elif kind in _PLAIN and not self._quiet:
+                _print(text)
+
+    def output(self, source: str, line: str) -> None:
+        """Show a line that the build or a process of the student printed, where that is wanted."""
+        if not self._verbose or self._quiet:
+            return
+        from rich.console import Console
+        from rich.text import Text
+
+        bars = self._bars
+        console = bars.console if bars is not None else Console(stderr=True, highlight=False)
+        console.print(Text.assemble((f"{source} | ", "dim"), one_line(line)), soft_wrap=True)
+
+    def _show(
+        self, name: str, text: str, *, completed: int | None = None, total: int | None = None
+    ) -> None:
+        """Set the line of a scenario, or of all else the first one."""
+        with self._lock:
+            if self._bars is None:
+                return
+            if name and "" in self._tasks:
+                self._bars.remove_task(self._tasks.pop(""))
+            if name not in self._tasks:
+                self._tasks[name] = self._bars.add_task(text, total=None)
+            self._bars.update(self._tasks[name], description=text, completed=completed, total=total)
+
+    def _rate(self) -> str:
+        """Rate and time left, once a few are done."""
         if self._fresh < _LEAST_FOR_RATE:
             return ""
         each_s = (time.monotonic() - self._began_s) / self._fresh
         return f"{60 / each_s:.0f} a minute, {_span((self._total - self._count) * each_s)} left"
+
+
+def _make_bars() -> Bars:
+    """A line for each task, with a sign that turns until it is done."""
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn
+    from rich.table import Column
+
+    description = Column(no_wrap=True, overflow="ellipsis", ratio=1)
+    return Progress(
+        SpinnerColumn(finished_text=" "),
+        TextColumn("{task.description}", markup=False, table_column=description),
+        console=Console(stderr=True, highlight=False, emoji=False, markup=False),
+        transient=True,
+        expand=True,
+    )
+
+
+def _print(text: str) -> None:
+    print(f"rosgrade: {text}", file=sys.stderr, flush=True)
 
 
 def _span(seconds: float) -> str:
