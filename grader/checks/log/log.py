@@ -14,6 +14,7 @@ from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import endpoints_seen
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.process.blocked_executor import why_slow
@@ -109,20 +110,36 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         )
     within_ns = round(parameters.within * NS)
     found = echoes(recording, wanted, parameters.decimals, within_ns)
-    if len(found) >= parameters.at_least:
-        finding = _too_seldom(recording, parameters, expected, wanted, found)
-        if finding is not None:
-            return finding
-        return _passed(recording, parameters, expected, found, len(messages))
-    return why_not_logged(
-        recording,
-        parameters.topic,
-        wanted,
-        found,
-        needed=parameters.at_least,
-        decimals=parameters.decimals,
-        within_ns=within_ns,
-    ).finding(expected)
+    if len(found) < parameters.at_least:
+        return why_not_logged(
+            recording,
+            parameters.topic,
+            wanted,
+            found,
+            needed=parameters.at_least,
+            decimals=parameters.decimals,
+            within_ns=within_ns,
+        ).finding(expected)
+    seldom = _too_seldom(recording, parameters, wanted, found)
+    if seldom is not None:
+        longest = format_duration(parameters.every or 0.0)
+        return seldom.finding(f"{expected}, and never longer than {longest} without one")
+    lines = [line for echo in found for line in echo.lines]
+    number = counted(len(messages), "message")
+    return Finding.passed(
+        expected,
+        f"log lines follow {len(found)} of {number}: {quote(lines[-1].text)}",
+        Evidence(
+            moments=tuple(
+                Moment(
+                    f"logged a message on {parameters.topic}",
+                    recording.since_launch_s(echo.lines[-1].time_ns),
+                )
+                for echo in (found[0], found[-1])
+            ),
+            log=tuple(line.text for line in lines[:_SHOWN_LINES]),
+        ),
+    )
 
 
 def _words(parameters: Follows, messages: Sequence[Message]) -> str:
@@ -141,44 +158,35 @@ def _words(parameters: Follows, messages: Sequence[Message]) -> str:
 
 
 def _too_seldom(
-    recording: Recording,
-    parameters: Follows,
-    expected: str,
-    wanted: Sequence[Wanted],
-    found: Sequence[Echo],
-) -> Finding | None:
-    """The finding of a time without a line, while messages came, that is too long; or None."""
+    recording: Recording, parameters: Follows, wanted: Sequence[Wanted], found: Sequence[Echo]
+) -> Cause | None:
+    """Why there was no line for too long while messages came, or None."""
     if parameters.every is None:
         return None
     begin_ns, end_ns = wanted[0].due_ns, wanted[-1].due_ns
-    written = sorted(echo.lines[-1].time_ns for echo in found)
-    gaps = list(pairwise([begin_ns, *(min(time_ns, end_ns) for time_ns in written), end_ns]))
-    begin_ns, end_ns = max(gaps, key=lambda gap: _own_s(recording, gap))
-    excused = _own_s(recording, (begin_ns, end_ns)) <= parameters.every
+    written = sorted(min(echo.lines[-1].time_ns, end_ns) for echo in found)
+    gaps = list(pairwise([begin_ns, *written, end_ns]))
+    gap = max(gaps, key=lambda one: _own_s(recording, one))
+    excused = _own_s(recording, gap) <= parameters.every
     if excused:
-        begin_ns, end_ns = max(gaps, key=lambda gap: gap[1] - gap[0])
-    gap_s = (end_ns - begin_ns) / NS
+        gap = max(gaps, key=lambda one: one[1] - one[0])
+    gap_s = (gap[1] - gap[0]) / NS
     if gap_s <= parameters.every:
         return None
-    begin_s = recording.since_launch_s(begin_ns)
-    expected += f", and never longer than {format_duration(parameters.every)} without one"
+    begin_s = recording.since_launch_s(gap[0])
     observed = f"no such line for {format_duration(gap_s)}, from {begin_s:.2f} s after launch on"
     if excused:
-        return Finding.to_repeat(
-            expected, f"{observed}, but the machine took the time from the process"
-        )
+        return Cause.to_repeat(f"{observed}, but the machine took the time from the process")
     observed += f", although messages came on {code(parameters.topic)}"
     nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, parameters.topic)}
-    cause = why_unsubscribed(recording, parameters.topic, observed) or why_slow(
-        recording, observed, nodes
-    )
-    if cause is not None:
-        return cause.finding(expected)
-    return Finding.failed(
-        expected,
-        observed,
-        "Log in every call of the callback, or at least once in a second.",
-        Evidence(moments=(Moment("no line from here on", begin_s),)),
+    return (
+        why_unsubscribed(recording, parameters.topic, observed)
+        or why_slow(recording, observed, nodes)
+        or Cause(
+            observed,
+            "Log in every call of the callback, or at least once in a second.",
+            Evidence(moments=(Moment("no line from here on", begin_s),)),
+        )
     )
 
 
@@ -186,27 +194,3 @@ def _own_s(recording: Recording, gap: tuple[int, int]) -> float:
     """How long a gap is without what the machine took in it, and shortly before."""
     begin_ns, end_ns = gap
     return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns - _BACKLOG_NS, end_ns)
-
-
-def _passed(
-    recording: Recording,
-    parameters: Follows,
-    expected: str,
-    found: tuple[Echo, ...],
-    number: int,
-) -> Finding:
-    lines = [line for echo in found for line in echo.lines]
-    return Finding.passed(
-        expected,
-        f"log lines follow {len(found)} of {counted(number, 'message')}: " + quote(lines[-1].text),
-        Evidence(
-            moments=tuple(
-                Moment(
-                    f"logged a message on {parameters.topic}",
-                    recording.since_launch_s(echo.lines[-1].time_ns),
-                )
-                for echo in (found[0], found[-1])
-            ),
-            log=tuple(line.text for line in lines[:_SHOWN_LINES]),
-        ),
-    )

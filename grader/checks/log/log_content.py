@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -11,12 +11,13 @@ from pydantic import AfterValidator, Field, model_validator
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
-from grader.checks.log.logged import LEVELS, Logged, logged, logger_of, printed
+from grader.checks.log.logged import LEVELS, Logged, logged, printed
 from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
-from grader.diagnosis.process.blocked_executor import why_not_called
+from grader.diagnosis.process.blocked_executor import left_s, why_not_called
 from grader.diagnosis.process.process_exit import why_ended
+from grader.diagnosis.wrong_rhythm import why_paused
 from grader.measure.printed import quote
 from grader.recording.model import NS, Recording
 from grader.spec.name import QualifiedNodeName
@@ -29,7 +30,6 @@ Level = Literal["DEBUG", "INFO", "WARN", "ERROR", "FATAL"]
 _SHOWN = 5
 # At the end of a run one record may be due, and one on its way.
 _SILENT_PERIODS = 2.0
-_METHODS = {"DEBUG": "debug", "INFO": "info", "WARN": "warning", "ERROR": "error", "FATAL": "fatal"}
 
 
 def _pattern(text: str) -> str:
@@ -46,6 +46,20 @@ class Records(Parameters):
     node: QualifiedNodeName | None = Field(
         None, description="Node whose logger is meant; by default every logger."
     )
+
+    def of(self, recording: Recording) -> list[Logged]:
+        """The records of that logger, and of its child loggers, get_child('x')."""
+        name = None if self.node is None else self.node.strip("/").replace("/", ".")
+        return [
+            item
+            for item in logged(recording)
+            if name is None or item.logger == name or item.logger.startswith(f"{name}.")
+        ]
+
+    def why_no_node(self, recording: Recording) -> Cause | None:
+        """Why nothing can be logged: the node is not there."""
+        missing = why_not_node(recording, self.node) if self.node else None
+        return missing or why_no_node(recording)
 
 
 class Matching(Records):
@@ -74,15 +88,13 @@ class Matching(Records):
             return False
         return self.pattern is None or re.search(self.pattern, text) is not None
 
-
-def _of(recording: Recording, node: str | None) -> list[Logged]:
-    wanted = None if node is None else logger_of(node)
-    return [
-        item
-        for item in logged(recording)
-        # A child logger, get_child('x'), is the node's as well.
-        if wanted is None or item.logger == wanted or item.logger.startswith(f"{wanted}.")
-    ]
+    def found(self, recording: Recording) -> list[Logged]:
+        """The records that are meant."""
+        return [
+            item
+            for item in self.of(recording)
+            if self.says(item.text) and self.level in (None, item.level)
+        ]
 
 
 class Contains(Matching):
@@ -110,43 +122,35 @@ def contains(recording: Recording, parameters: Contains) -> Finding:
     low, high = parameters.at_least, parameters.at_most
     bounds = f"{low} or more" if high is None else f"{low} to {high}" if low < high else str(low)
     expected = f"{bounds} {parameters.words}"
-    records = _of(recording, parameters.node)
-    saying = [item for item in records if parameters.says(item.text)]
-    found = [item for item in saying if parameters.level in (None, item.level)]
-    shown = _evidence(recording, found)
+    found = parameters.found(recording)
     if len(found) < low:
-        return _why_lacking(recording, parameters, records, saying, found).finding(expected)
+        return _why_lacking(recording, parameters, found).finding(expected)
     if high is not None and len(found) > high:
         return Finding.failed(
             expected,
             f"{len(found)} of them, such as {quote(found[-1].text)}",
             "Log once where it happens, not in every call of a callback: "
             "self.get_logger().info(..., once=True), or throttle_duration_sec=1.0.",
-            shown,
+            _evidence(recording, found),
         )
     what = f"{len(found)}, such as {quote(found[0].text)}" if found else "none"
-    return Finding.passed(expected, what, shown)
+    return Finding.passed(expected, what, _evidence(recording, found))
 
 
-def _why_lacking(
-    recording: Recording,
-    parameters: Matching,
-    records: list[Logged],
-    saying: list[Logged],
-    found: list[Logged],
-) -> Cause:
-    missing = why_not_node(recording, parameters.node) if parameters.node else None
-    missing = missing or why_no_node(recording)
+def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]) -> Cause:
+    missing = parameters.why_no_node(recording)
     if missing is not None:
         return missing
-    method = _METHODS[parameters.level or "INFO"]
-    hint = f"Is the line reached that calls self.get_logger().{method}('...') with such a text?"
-    other = [item for item in saying if item not in found]
+    method = {"WARN": "warning"}.get(
+        parameters.level or "INFO", (parameters.level or "INFO").lower()
+    )
+    call = f"self.get_logger().{method}('...')"
+    records = parameters.of(recording)
+    other = [item for item in records if parameters.says(item.text) and item not in found]
     if other:
-        level = other[0].level
         return Cause(
-            f"{quote(other[0].text)} is logged as {level}, not as {parameters.level}",
-            f"Call self.get_logger().{method}('...').",
+            f"{quote(other[0].text)} is logged as {other[0].level}, not as {parameters.level}",
+            f"Call {call}.",
             _evidence(recording, other),
         )
     seen = f"only {len(found)} of them" if found else "none"
@@ -159,29 +163,25 @@ def _why_lacking(
     idle = why_not_called(recording, seen, {node.name for node in recording.student_nodes})
     if idle is not None:
         return idle
-    if found:
-        return Cause(seen, hint, _evidence(recording, found))
     lines = [line for line in printed(recording) if parameters.says(line.text)]
-    if lines:
+    if lines and not found:
         return Cause(
             f"{quote(lines[0].text)} is printed, not logged",
-            f"Write self.get_logger().{method}('...') in place of print().",
+            f"Write {call} in place of print().",
             Evidence(
                 moments=(Moment("printed", recording.since_launch_s(lines[0].time_ns)),),
                 log=tuple(line.text for line in lines[:_SHOWN]),
             ),
         )
+    hint = f"Is the line reached that calls {call} with such a text?"
     if not records:
         nothing = until_the_end(recording, "nothing logged when the observation ended")
         return Cause("the node logs nothing", hint, Evidence(moments=(nothing,)))
+    if not found:
+        seen = f"{counted(len(records), 'log message')}, but none of these"
     near = nearest(parameters.text or "", [item.text for item in records])
-    like = quote(near if near is not None else records[-1].text)
-    return Cause(
-        f"{counted(len(records), 'log message')}, but none of these; "
-        f"{'similar is' if near else 'the last is'} {like}",
-        hint,
-        _evidence(recording, records[-_SHOWN:]),
-    )
+    seen += f"; similar is {quote(near)}" if near and not found else ""
+    return Cause(seen, hint, _evidence(recording, found or records[-_SHOWN:]))
 
 
 class Worst(Records):
@@ -199,13 +199,12 @@ def level(recording: Recording, parameters: Worst) -> Finding:
     """
     whose = f" by {code(parameters.node)}" if parameters.node else ""
     expected = f"nothing logged{whose} above {parameters.at_most}"
-    missing = why_not_node(recording, parameters.node) if parameters.node else None
-    missing = missing or why_no_node(recording)
+    missing = parameters.why_no_node(recording)
     if missing is not None:
         return missing.finding(expected)
-    allowed = LEVELS.index(parameters.at_most)
-    records = _of(recording, parameters.node)
-    severe = [item for item in records if item.level in LEVELS[allowed + 1 :]]
+    records = parameters.of(recording)
+    above = LEVELS[LEVELS.index(parameters.at_most) + 1 :]
+    severe = [item for item in records if item.level in above]
     if not severe:
         return Finding.passed(expected, f"{counted(len(records), 'log message')}, none above it")
     first = severe[0]
@@ -260,56 +259,41 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         parts += [f"at most {high_hz:g} Hz"] if parameters.at_most is not None else []
         often = " and ".join(parts)
     expected = f"{parameters.words} at {often}"
-    records = _of(recording, parameters.node)
-    saying = [item for item in records if parameters.says(item.text)]
-    found = [item for item in saying if parameters.level in (None, item.level)]
-    begin_ns = recording.matched_ns or recording.launched_ns
-    watched_s = (recording.stop_ns - begin_ns) / NS
+    found = parameters.found(recording)
+    begin_ns, end_ns = recording.matched_ns or recording.launched_ns, recording.stop_ns
+    periods = float(len(found))
     if len(found) >= 3:
         begin_ns, end_ns = found[0].time_ns, found[-1].time_ns
-        rate_hz = (len(found) - 1) * NS / max(end_ns - begin_ns, 1)
-    else:
-        end_ns = recording.stop_ns
-        rate_hz = len(found) / watched_s if watched_s > 0.0 else 0.0
+        periods -= 1.0
+    rate_hz = periods * NS / max(end_ns - begin_ns, 1)
+    seen = f"{counted(len(found), 'log message')}, {rate_hz:.3g} Hz"
     if low_hz <= rate_hz <= high_hz:
-        silent = _fell_silent(recording, found, low_hz)
+        last_ns = found[-1].time_ns if found else recording.stop_ns
+        silent = why_paused(
+            recording,
+            (last_ns, recording.stop_ns),
+            _SILENT_PERIODS / low_hz if low_hz else math.inf,
+            f"{counted(len(found), 'log message')}, but none in the last "
+            f"{format_duration((recording.stop_ns - last_ns) / NS)}",
+            "The node must go on logging: look for a counter or a condition that ends it, for a "
+            "timer that is cancelled, and for a callback that does not return.",
+        )
         if silent is not None:
             return silent.finding(expected)
         return Finding.passed(expected, f"{rate_hz:.3g} Hz", _evidence(recording, found))
     if not found:
-        return _why_lacking(recording, parameters, records, saying, found).finding(expected)
-    seen = f"{counted(len(found), 'log message')}, {rate_hz:.3g} Hz"
-    stolen_s = recording.stolen_s(begin_ns, end_ns)
-    if rate_hz < low_hz and (end_ns - begin_ns) / NS - stolen_s <= len(found) / low_hz:
+        return _why_lacking(recording, parameters, found).finding(expected)
+    if rate_hz < low_hz and left_s(recording, begin_ns, end_ns) <= len(found) / low_hz:
+        stolen_s = recording.stolen_s(begin_ns, end_ns)
         return Finding.to_repeat(
             expected, f"{seen}, but the machine took {format_duration(stolen_s)}"
         )
-    hint = (
-        "Log in a timer of that period, or with throttle_duration_sec=1.0 in a faster callback: "
-        "self.get_logger().info('...', throttle_duration_sec=1.0)."
-    )
-    return Finding.failed(expected, seen, hint, _evidence(recording, found))
-
-
-def _fell_silent(recording: Recording, found: Sequence[Logged], low_hz: float) -> Cause | None:
-    """Why the lowest rate is missed after the last record; None if it is not."""
-    if not found or low_hz <= 0.0:
-        return None
-    last_ns = found[-1].time_ns
-    silent_s = (recording.stop_ns - last_ns) / NS
-    seen = f"{counted(len(found), 'log message')}, but none in the last {format_duration(silent_s)}"
-    allowed_s = _SILENT_PERIODS / low_hz
-    if silent_s <= allowed_s:
-        return None
-    stolen_s = recording.stolen_s(last_ns, recording.stop_ns)
-    cause = why_ended(recording, seen)
-    if cause is None and silent_s - stolen_s <= allowed_s:
-        cause = Cause.to_repeat(f"{seen}: the machine took {format_duration(stolen_s)}")
-    return cause or Cause(
+    return Finding.failed(
+        expected,
         seen,
-        "The node must go on logging: look for a counter or a condition that ends it, for a timer "
-        "that is cancelled, and for a callback that does not return.",
-        Evidence(moments=(Moment("last of them", recording.since_launch_s(last_ns)),)),
+        "Log in a timer of that period, or with throttle_duration_sec=1.0 in a faster callback: "
+        "self.get_logger().info('...', throttle_duration_sec=1.0).",
+        _evidence(recording, found),
     )
 
 

@@ -41,19 +41,15 @@ def logged(recording: Recording) -> tuple[Logged, ...]:
     ]
     known = {(item.time_ns, item.logger) for item in found}
     for line in recording.log:
-        record = _record(line) if line.stream != "rosout" else None
-        if record is not None and (record.time_ns, record.logger) not in known:
-            found.append(record)
+        match = _LINE.match(line.text) if line.stream != "rosout" else None
+        if match is None or match["level"] not in LEVELS:
+            continue
+        time_ns = int(match["s"]) * 10**9 + int(match["ns"])
+        if (time_ns, match["logger"]) not in known:
+            text = line.text[match.end() :]
+            found.append(Logged(time_ns, match["logger"], match["level"], text))
     kept = (item for item in found if item.time_ns <= recording.stop_ns)
     return tuple(sorted(kept, key=lambda item: item.time_ns))
-
-
-def _record(line: LogLine) -> Logged | None:
-    match = _LINE.match(line.text)
-    if match is None or match["level"] not in LEVELS:
-        return None
-    time_ns = int(match["s"]) * 10**9 + int(match["ns"])
-    return Logged(time_ns, match["logger"], match["level"], line.text[match.end() :])
 
 
 def printed(recording: Recording) -> tuple[LogLine, ...]:
@@ -63,8 +59,3 @@ def printed(recording: Recording) -> tuple[LogLine, ...]:
         for line in recording.log
         if line.stream != "rosout" and logged_text(line.text) == line.text
     )
-
-
-def logger_of(node: str) -> str:
-    """The name of a node's logger: ``/robot/bot`` has ``robot.bot``."""
-    return node.strip("/").replace("/", ".")
