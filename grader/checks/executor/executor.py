@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 
 from pydantic import Field, field_validator
@@ -16,12 +16,12 @@ from grader.checks.node.target_nodes import target_nodes
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
-from grader.diagnosis.process.blocked_executor import why_not_given
+from grader.diagnosis.process.blocked_executor import left_s, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
 from grader.measure import declarations
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
-from grader.recording.model import NS, Call, Kind, Process, Recording
+from grader.recording.model import NS, Call, Kind, Recording
 from grader.spec.name import QualifiedNodeName
 from grader.spec.quantity import Duration, Ratio
 from grader.spec.unit import format_duration
@@ -65,7 +65,7 @@ class Responsive(Parameters):
 
 @dataclass(frozen=True)
 class _Answers:
-    """Calls to one node."""
+    """Calls to one node, and those of them that were not answered in time."""
 
     node: str
     judged: tuple[Call, ...]
@@ -108,24 +108,28 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
         return _unasked(recording, names, expected)
     bad = [group for group in groups if not group.enough(parameters.share, len(group.late))]
     if not bad:
-        return _judge_median(recording, parameters, groups, expected) or Finding.passed(
-            expected, _summary(groups, parameters), _evidence(recording, groups)
-        )
-    if all(_excused(recording, group, parameters) for group in bad):
+        if parameters.typically is not None:
+            expected += f", the median within {format_duration(parameters.typically)}"
+        busy = _why_mostly_late(recording, parameters, groups)
+        if busy is not None:
+            return busy.finding(expected)
+        return Finding.passed(expected, _summary(groups, parameters), _evidence(recording, groups))
+    if all(
+        group.enough(parameters.share, _unexcused(recording, group, parameters)) for group in bad
+    ):
         return Finding.to_repeat(
             expected, f"{_summary(bad, parameters)}, but the machine took the time from the process"
         )
     worst = max(bad, key=lambda group: len(group.late) / len(group.judged))
-    return _blocked(recording, worst, parameters).finding(expected)
+    return _why_late(recording, worst, parameters).finding(expected)
 
 
 def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answers:
     within_ns = int(parameters.within * NS)
     begin_ns = _working_from(recording, node)
     judged, late = [], []
-    others = {item.name for item in recording.services if item.node != node} - {
-        item.name for item in recording.services if item.node == node
-    }
+    own = {item.name for item in recording.services if item.node == node}
+    others = {item.name for item in recording.services if item.node != node} - own
     for call in recording.calls:
         # An answer in its place, by a service of another node's, says nothing of this one.
         if call.service not in executor_services(node) or call.service in others:
@@ -151,100 +155,71 @@ def _working_from(recording: Recording, node: str) -> int:
         return min(stamps)
     appeared = [item.appeared_ns for item in recording.student_nodes if item.name == node]
     begin_ns = min(appeared or [recording.launched_ns])
-    begin_ns = max(begin_ns, _spun_from(recording, node))
-    # Its first publisher was held by us until it had matched, in vain if its type is another one.
     process = declarations.process_of(recording, node)
-    held = [
-        item.time_ns
-        for item in recording.declared("held")
-        if process is not None and item.process == process.name
-    ]
-    return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
-
-
-def _spun_from(recording: Recording, node: str) -> int:
-    """When a node's process said that an executor spins, but not after the first answer; or 0.
-
-    Before that its constructor may wait for something, and a node that never answers does not
-    spin, whatever its process says.
-    """
-    process = declarations.process_of(recording, node)
-    spun = [
-        item.time_ns
-        for item in recording.declared("spin")
-        if process is not None and item.process == process.name
-    ]
+    if process is None:
+        return begin_ns
+    # Before an executor spins the constructor may wait for something. A node that never answers
+    # does not spin, whatever its process declares.
+    spun = [item.time_ns for item in recording.declared("spin") if item.process == process.name]
     answered = [
         call.answered_ns
         for call in recording.calls
         if call.service in executor_services(node) and call.answered_ns is not None
     ]
-    return min(*spun, *answered) if spun and answered else 0
+    if spun and answered:
+        begin_ns = max(begin_ns, min(*spun, *answered))
+    # The tracer held its first publisher until it had matched, in vain if its type is another one.
+    held = [item.time_ns for item in recording.declared("held") if item.process == process.name]
+    return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
 
 
-def _excused(recording: Recording, group: _Answers, parameters: Responsive) -> bool:
-    """Whether few enough calls were late for another reason than what the host took."""
-    unexcused = sum(
-        _wait_s(recording, call, excused=True) > parameters.within for call in group.late
-    )
-    return group.enough(parameters.share, unexcused)
+def _unexcused(recording: Recording, group: _Answers, parameters: Responsive) -> int:
+    """How many calls were late for another reason than what the host took."""
+    return sum(_own_s(recording, call) > parameters.within for call in group.late)
 
 
-def _judge_median(
-    recording: Recording, parameters: Responsive, groups: list[_Answers], expected: str
-) -> Finding | None:
-    """The finding of nodes that answer in time, but mostly late; or None."""
+def _wait_s(recording: Recording, call: Call) -> float:
+    """How long a call waited for its answer."""
+    return ((call.answered_ns or recording.stop_ns) - call.requested_ns) / NS
+
+
+def _own_s(recording: Recording, call: Call) -> float:
+    """The same without what the machine took meanwhile."""
+    return left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns)
+
+
+def _why_mostly_late(
+    recording: Recording, parameters: Responsive, groups: list[_Answers]
+) -> Cause | None:
+    """Why a node answers in time, but mostly late; or None."""
     allowed_s = parameters.typically
-    if allowed_s is None:
-        return None
-    expected += f", the median within {format_duration(allowed_s)}"
     for group in groups:
         median_s = median(_wait_s(recording, call) for call in group.judged)
-        if median_s <= allowed_s:
+        if allowed_s is None or median_s <= allowed_s:
             continue
         observed = f"{code(group.node)} answered after {format_duration(median_s)} (median)"
-        own_s = median(_wait_s(recording, call, excused=True) for call in group.judged)
-        if own_s <= allowed_s:
-            return Finding.to_repeat(
-                expected, f"{observed}, but the machine took the time from the process"
-            )
-        return Finding.failed(
-            expected,
+        if median(_own_s(recording, call) for call in group.judged) <= allowed_s:
+            return Cause.to_repeat(f"{observed}, but the machine took the time from the process")
+        late = tuple(call for call in group.judged if _wait_s(recording, call) > allowed_s)
+        return Cause(
             f"{observed}: callbacks keep the executor busy most of the time",
             "A callback does its work and returns at once: no time.sleep() in it. The timer calls "
             "it again when its period is over.",
-            Evidence(
-                moments=tuple(
-                    Moment("call answered late", recording.since_launch_s(call.requested_ns))
-                    for call in group.judged
-                    if _wait_s(recording, call) > allowed_s
-                )[:_MOST_MOMENTS],
-                plots=_evidence(recording, groups).plots,
-            ),
+            _evidence(recording, [_Answers(group.node, group.judged, late)]),
         )
     return None
 
 
-def _wait_s(recording: Recording, call: Call, *, excused: bool = False) -> float:
-    """How long a call waited for its answer, perhaps without what the machine took meanwhile."""
-    end_ns = call.answered_ns or recording.stop_ns
-    stolen_s = recording.stolen_s(call.requested_ns, end_ns) if excused else 0.0
-    return (end_ns - call.requested_ns) / NS - stolen_s
-
-
-def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> Cause:
+def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> Cause:
+    """Why a node does not answer, or too late."""
     process = declarations.process_of(recording, group.node)
     seen = _summary([group], parameters)
     if process is not None and ended_early(recording, process):
         return why_it_exited(recording, process).after(seen)
-    evidence = _evidence(recording, [group])
-    place = interrupted_place(recording, process.name) if process is not None else None
-    if place is not None:
-        evidence = Evidence(moments=evidence.moments, places=(place,), plots=evidence.plots)
-    where = f" ({place.file}:{place.line})" if place else ""
     number = sum(len(found) for found in recording.messages.values())
     meanwhile = f" while {counted(number, 'message was', 'messages were')} published"
     seen += meanwhile if number else ""
+    evidence = _evidence(recording, [group])
     servers = max(call.servers for call in group.late)
     if servers > 1:
         return Cause(
@@ -253,14 +228,13 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
             "The name of a node must be its own: give every node another one, and spin each.",
             evidence,
         )
-    if _never_spun(recording, process):
-        return Cause(
-            f"{seen}: rclpy.spin() was never called{where}",
-            "A loop such as `while True: publish(); time.sleep(0.3)` never gives way to the "
-            "executor, and rate.sleep() waits for ever where none spins. Create a timer with "
-            "self.create_timer(0.3, self.callback), and call rclpy.spin(node) in main().",
-            evidence,
-        )
+    processes = () if process is None else (process,)
+    never_spun = why_never_spun(recording, seen, (group.node,), processes, evidence.moments)
+    if never_spun is not None:
+        return never_spun
+    place = interrupted_place(recording, process.name) if process is not None else None
+    where = f" ({place.file}:{place.line})" if place else ""
+    evidence = replace(evidence, places=(place,) if place else ())
     if declarations.timer_of_zero(recording):
         return Cause(
             f"{seen}: the process declared a timer of 0 s, whose callbacks take all of the "
@@ -269,7 +243,7 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
             "numbers, as in 300 // 1000 or int(0.3).",
             evidence,
         )
-    return why_not_given(recording, seen, (group.node,), evidence.moments) or Cause(
+    return Cause(
         f"{seen}: something blocks the executor{where}",
         "A callback must return soon. Look for `while True`, time.sleep() or input() in a "
         "callback, in the constructor or in a loop around spin_once(), and let a timer call again "
@@ -278,18 +252,14 @@ def _blocked(recording: Recording, group: _Answers, parameters: Responsive) -> C
     )
 
 
-def _never_spun(recording: Recording, process: Process | None) -> bool:
-    return declarations.never_spun(recording, process.name if process else None)
-
-
 def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
-    """No call that counts: what the process declared must do."""
+    """The finding where no call counts: what the process declared must do."""
     ended = why_ended(recording)
     if ended is not None:
         return ended.finding(expected)
-    lacking = [name for name in names if _without_services(recording, name)]
+    lacking = [name for name in names if _is_without_services(recording, name)]
     if lacking:
-        # What a process says of itself would be all that there is, and it can say anything.
+        # What a process declares would be all that there is, and it can declare anything.
         busy = was_held_up(recording)
         return Cause(
             f"{codes(lacking)} has none of the services "
@@ -314,7 +284,7 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
     )
 
 
-def _without_services(recording: Recording, name: str) -> bool:
+def _is_without_services(recording: Recording, name: str) -> bool:
     """Whether a node was there for long, and offered nothing that its executor answers."""
     offered = {service.name for service in recording.services if service.node == name}
     appeared = [node.appeared_ns for node in recording.student_nodes if node.name == name]
@@ -338,7 +308,7 @@ def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
         x_label="time since launch (s)",
         y_label="time to the answer (s)",
         x=tuple(recording.since_launch_s(call.requested_ns) for call in answered),
-        y=tuple(((call.answered_ns or 0) - call.requested_ns) / NS for call in answered),
+        y=tuple(_wait_s(recording, call) for call in answered),
     )
     return Evidence(
         moments=tuple(

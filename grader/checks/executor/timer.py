@@ -51,30 +51,25 @@ def timer(recording: Recording, parameters: Timer) -> Finding:
         cause = why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
         return cause.finding(expected)
     timers = declarations.timers(recording)
-    if declarations.not_in_callback(recording, parameters.topic):
-        return Finding.failed(
-            expected,
-            f"{counted(len(messages), 'message was', 'messages were')} published, outside of "
-            "every callback: a thread or a loop calls publish()",
-            _HINT,
-            Evidence(moments=first_seen(recording, messages)),
-        )
     calling = [item for item in timers if item.callback != _NOTHING]
-    if calling or declarations.timer_of_zero(recording):
-        first = calling[0] if calling else None
-        period = f" of {format_duration(first.period_s)}" if first else ""
-        name = f", which calls {code(first.callback)}" if first and first.callback else ""
-        when_s = [recording.since_launch_s(first.declared_ns)] if first else []
+    number = f"{counted(len(messages), 'message was', 'messages were')} published"
+    if declarations.not_in_callback(recording, parameters.topic):
+        observed = f"{number}, outside of every callback: a thread or a loop calls publish()"
+    elif calling:
+        name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
+        created_s = recording.since_launch_s(calling[0].declared_ns)
         return Finding.passed(
             expected,
-            f"the process declared a timer{period}{name}",
-            Evidence(moments=tuple(Moment("timer created", item) for item in when_s)),
+            f"the process declared a timer of {format_duration(calling[0].period_s)}{name}",
+            Evidence(moments=(Moment("timer created", created_s),)),
         )
-    rate = " but that of a rate, which calls nothing" if timers else ""
-    return Finding.failed(
-        expected,
-        f"{counted(len(messages), 'message was', 'messages were')} published, but the process "
-        f"declared no timer{rate}: something else calls publish(), such as a thread or a loop",
-        _HINT,
-        Evidence(moments=first_seen(recording, messages)),
-    )
+    elif declarations.timer_of_zero(recording):
+        return Finding.passed(expected, "the process declared a timer")
+    else:
+        rate = " but that of a rate, which calls nothing" if timers else ""
+        observed = (
+            f"{number}, but the process declared no timer{rate}: something else calls publish(), "
+            "such as a thread or a loop"
+        )
+    evidence = Evidence(moments=first_seen(recording, messages))
+    return Finding.failed(expected, observed, _HINT, evidence)
