@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from mcap.reader import make_reader
@@ -12,32 +13,18 @@ from grader.recording.model import Recording
 
 
 def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
-    """Read the messages that the probe or the simulator published.
-
-    Raises:
-        UsageError: The file cannot be read.
-    """
+    """The messages that the probe or the simulator published, in that order."""
     simulated = simulated_topics(recording)
     found: list[RawMessage] = []
     try:
         with file.open("rb") as stream:
             for schema, channel, message in make_reader(stream).iter_messages():
-                if channel.message_encoding != "cdr" or schema is None:
-                    continue
-                sent = SENT in channel.metadata
-                if not sent and channel.topic not in simulated:
-                    continue
-                found.append(
-                    RawMessage(
-                        topic=channel.topic,
-                        type=schema.name,
-                        cdr=message.data,
-                        stamp_ns=message.publish_time,
-                        received_ns=message.log_time,
-                        sequence=message.sequence,
-                        is_sent=sent,
-                    )
-                )
+                is_sent = SENT in channel.metadata
+                is_ours = is_sent or channel.topic in simulated
+                if is_ours and schema is not None and channel.message_encoding == "cdr":
+                    times = message.publish_time, message.log_time, message.sequence
+                    raw = RawMessage(channel.topic, schema.name, message.data, *times)
+                    found.append(replace(raw, is_sent=is_sent))
     except OSError as error:
         raise UsageError(f"{file}: {error.strerror or error}") from error
     return tuple(sorted(found, key=lambda message: message.stamp_ns))

@@ -1,12 +1,15 @@
 """What an interface is made of: fields and constants, from the text of its definition.
 
-Source: https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html
+Sources: https://docs.ros.org/en/jazzy/Concepts/Basic/About-Interfaces.html,
+https://mcap.dev/spec/registry, "ros2msg"
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 INTEGERS: dict[str, tuple[int, int]] = {
     "byte": (0, 255),
@@ -27,14 +30,10 @@ _SEPARATOR = "---"
 
 
 class DefinitionError(ValueError):
-    """A line of a definition is neither a field nor a constant.
-
-    Attributes:
-        line: Its number, from 1.
-    """
+    """A line of a definition is neither a field nor a constant."""
 
     def __init__(self, line: int, text: str) -> None:
-        """Keep the line."""
+        """Keep the number of the line, from 1."""
         self.line = line
         super().__init__(f"line {line}: {text!r} is neither `type name` nor `type NAME=value`")
 
@@ -81,12 +80,7 @@ class Field:
 
 @dataclass(frozen=True)
 class Constant:
-    """One constant of a message.
-
-    Attributes:
-        type: ``uint8``, ``string``, ...
-        value: What stands behind the equals sign; a number as Python writes it.
-    """
+    """One constant of a message; a number as its value is as Python writes it."""
 
     name: str
     type: str
@@ -116,11 +110,7 @@ class Section:
 
 
 def sections_of(interface: str, text: str) -> tuple[Section, ...]:
-    """The parts of a definition: one of a message, two of a service, three of an action.
-
-    Raises:
-        DefinitionError: A line of it cannot be read.
-    """
+    """The parts of a definition: one of a message, two of a service, three of an action."""
     package = interface.partition("/")[0]
     parts: list[list[tuple[int, Field | Constant]]] = [[]]
     for number, line in enumerate(text.splitlines(), start=1):
@@ -186,3 +176,41 @@ def _full_type(name: str, package: str) -> str:
         return name
     parts = name.split("/")
     return f"{parts[0] if len(parts) > 1 else package}/msg/{parts[-1]}"
+
+
+def definition_finder(prefixes: Iterable[Path]) -> Callable[[str], str]:
+    """Make a function that reads definitions from install prefixes.
+
+    Returns:
+        A function from ``package/msg/Name`` (or ``srv``, ``action``) to the file's text; KeyError
+        if there is none.
+    """
+    folders = tuple(prefixes)
+
+    def find(interface: str) -> str:
+        for prefix in folders:
+            file = prefix / "share" / f"{interface}.{interface.split('/')[1]}"
+            if file.is_file():
+                return file.read_text(encoding="utf-8")
+        raise KeyError(interface)
+
+    return find
+
+
+def concatenated_definition(interface: str, find: Callable[[str], str]) -> str:
+    """A definition with those of all messages that it contains, as a ``ros2msg`` schema has them.
+
+    Raises:
+        KeyError: A definition is missing.
+    """
+    texts: dict[str, str] = {}
+    queue = [interface]
+    while queue:
+        name = queue.pop(0)
+        if name not in texts:
+            texts[name] = find(name)
+            inner = fields_of(name, texts[name]).values()
+            queue += [field.type for field in inner if field.is_message]
+    main, *others = texts.items()
+    parts = [f"{'=' * 80}\nMSG: {name.replace('/msg/', '/')}\n{text}" for name, text in others]
+    return "\n".join([main[1], *parts])

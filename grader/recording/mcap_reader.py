@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from pathlib import Path
@@ -22,8 +23,8 @@ from grader.submission.record import SubmissionRecord
 
 _FIELDS = get_type_hints(Recording)
 _FACTS: dict[str, type] = {name: get_args(_FIELDS[name])[0] for name in CHANNELS}
+# Types of the primitive fields, and of an array of bytes.
 _PLAIN = frozenset({bool, int, float, str, bytes})
-"""Types of the primitive fields, and of an array of bytes."""
 
 
 @cache
@@ -38,11 +39,7 @@ def get_ready() -> None:
 
 
 def read_recording(file: Path) -> Recording:
-    """Read a recording.
-
-    Raises:
-        UsageError: The file is missing, damaged, or not a recording of rosgrade.
-    """
+    """Read a recording; a UsageError says that it is missing, damaged, or another file."""
     try:
         with file.open("rb") as stream:
             return _read(stream)
@@ -51,9 +48,12 @@ def read_recording(file: Path) -> Recording:
     except _NotARecording as error:
         raise UsageError(f"{file}: {error}") from error
     except Exception as error:
-        # The readers of MCAP, its compressions and CDR raise whatever damage makes them raise.
-        reason = str(error).partition("\n")[0] or type(error).__name__
-        raise UsageError(f"{file}: damaged recording: {reason}") from error
+        raise UsageError(f"{file}: damaged recording: {_reason(error)}") from error
+
+
+def _reason(error: Exception) -> str:
+    # The readers of MCAP, its compressions and CDR raise whatever damage makes them raise.
+    return str(error).partition("\n")[0] or type(error).__name__
 
 
 class _NotARecording(Exception):
@@ -65,11 +65,11 @@ def _read(stream: Any) -> Recording:
     submission: SubmissionRecord | None = None
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
-    facts: dict[str, list[Any]] = {name: [] for name in CHANNELS}
-    messages: dict[str, list[Message]] = {}
-    sent: dict[str, list[Message]] = {}
-    joined: dict[str, list[Message]] = {}
-    unreadable: dict[str, int] = {}
+    facts: dict[str, list[tuple[int, Any]]] = {name: [] for name in CHANNELS}
+    messages: defaultdict[str, list[Message]] = defaultdict(list)
+    sent: defaultdict[str, list[Message]] = defaultdict(list)
+    joined: defaultdict[str, list[Message]] = defaultdict(list)
+    unreadable: Counter[str] = Counter()
     has_ended = False
     # All of it, once, with its checksums: a flipped bit must not become another grade.
     for record in StreamReader(stream, validate_crcs=True).records:
@@ -85,62 +85,64 @@ def _read(stream: Any) -> Recording:
             submission = _adapter(SubmissionRecord).validate_json(record.data)
         elif isinstance(record, Record):
             channel = channels[record.channel_id]
+            name = channel.topic.removeprefix("/rosgrade/")
+            if channel.message_encoding == "json" and name in facts:
+                fact = _adapter(_FACTS[name]).validate_json(record.data)
+                facts[name].append((record.sequence, fact))
             if channel.message_encoding == "json":
-                name = channel.topic.removeprefix("/rosgrade/")
-                if name in facts:
-                    fact = _adapter(_FACTS[name]).validate_json(record.data)
-                    facts[name].append((record.sequence, fact))
                 continue
             if has_ended:
                 # What follows has no checksum: a flipped bit makes a message of a summary.
                 raise ValueError("a message after the end of the data")
-            decode = _decoder_of(schemas[channel.schema_id])
             try:
-                value = _fields(decode(record.data))
-            except NotImplementedError as error:
-                # A type that the library cannot read is no fault of who published it.
-                raise ValueError(f"{channel.topic}: {error}") from error
-            except Exception:
-                # The checksums agree: so it was published, as rclpy publishes any bytes. What
-                # decodes CDR raises whatever comes of such bytes.
-                name = channel.metadata.get(TOPIC, channel.topic)
-                unreadable[name] = unreadable.get(name, 0) + 1
+                found = _message(schemas[channel.schema_id], channel, record)
+            except _Unreadable:
+                unreadable[channel.metadata.get(TOPIC, channel.topic)] += 1
                 continue
-            found = _message(record, channel, schemas[channel.schema_id], value)
-            join = channel.metadata.get(JOIN)
-            if join is not None:
-                joined.setdefault(join, []).append(found)
+            if JOIN in channel.metadata:
+                joined[channel.metadata[JOIN]].append(found)
             else:
-                topics = sent if SENT in channel.metadata else messages
-                topics.setdefault(found.topic, []).append(found)
+                (sent if SENT in channel.metadata else messages)[found.topic].append(found)
     if frame is None:
         raise _NotARecording("an MCAP file, but not a recording of rosgrade")
     if submission is None:
         raise _NotARecording("the facts of the submission are missing")
-    ordered = {
-        name: tuple(fact for _, fact in sorted(items, key=lambda item: item[0]))
-        for name, items in facts.items()
-    }
     unmatched: dict[str, list[Message]] = {topic: [] for topic in frame.pop("sent", ())}
     recording: Recording = _adapter(Recording).validate_python(
         {
             **frame,
-            **ordered,
+            **{
+                name: [fact for _, fact in sorted(items, key=_number)]
+                for name, items in facts.items()
+            },
             "submission": submission,
             "messages": _in_order(messages),
             "sent": _in_order(unmatched | sent),
-            "joined": {name: tuple(items) for name, items in joined.items()},
-            "unreadable": unreadable,
+            "joined": dict(joined),
+            "unreadable": dict(unreadable),
         }
     )
     return recording
 
 
-def _decoder_of(schema: Schema) -> Callable[[bytes], Any]:
-    return _decoder(schema.name, schema.encoding, schema.data)
+def _number(fact: tuple[int, Any]) -> int:
+    return fact[0]
 
 
-def _message(record: Record, channel: Channel, schema: Schema, value: Any) -> Message:
+class _Unreadable(Exception):
+    """A message of other bytes than its type has: rclpy publishes any bytes."""
+
+
+def _message(schema: Schema, channel: Channel, record: Record) -> Message:
+    decode = _decoder(schema.name, schema.encoding, schema.data)
+    try:
+        value = _fields(decode(record.data))
+    except NotImplementedError as error:
+        # A type that the library cannot read is no fault of who published it.
+        raise ValueError(f"{channel.topic}: {error}") from error
+    except Exception as error:
+        # What decodes CDR raises whatever comes of such bytes.
+        raise _Unreadable from error
     return Message(
         topic=channel.metadata.get(TOPIC, channel.topic),
         type=schema.name,
@@ -169,39 +171,23 @@ def _in_order(messages: Mapping[str, list[Message]]) -> dict[str, tuple[Message,
 
 
 def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, ...]]:
-    """Read the messages on one topic of any MCAP file with messages of ROS 2.
+    """The messages on one topic of any MCAP file with messages of ROS 2, and its topics.
 
     Raises:
         OSError: The file cannot be read.
         ValueError: It is damaged, or no MCAP file.
     """
-    factory = DecoderFactory()
     found = []
+    topics = set()
     with file.open("rb") as stream:
         try:
-            reader = make_reader(stream)
-            summary = reader.get_summary()
-            channels = summary.channels.values() if summary else ()
-            topics = tuple(sorted({channel.topic for channel in channels}))
-            for schema, channel, message in reader.iter_messages(topics=[topic]):
-                decode = factory.decoder_for(channel.message_encoding, schema)
-                if decode is None or schema is None:
-                    continue
-                found.append(
-                    Message(
-                        topic,
-                        schema.name,
-                        _fields(decode(message.data)),
-                        message.publish_time,
-                        message.log_time,
-                        message.sequence,
-                    )
-                )
+            for schema, channel, record in make_reader(stream).iter_messages():
+                topics.add(channel.topic)
+                if channel.topic == topic and schema is not None:
+                    found.append(_message(schema, channel, record))
         except Exception as error:
-            # As in read_recording: damage has many faces.
-            reason = str(error).partition("\n")[0] or type(error).__name__
-            raise ValueError(f"no MCAP file that can be read: {reason}") from error
-    return tuple(found), topics
+            raise ValueError(f"no MCAP file that can be read: {_reason(error)}") from error
+    return tuple(found), tuple(sorted(topics))
 
 
 def _frame(record: Metadata) -> dict[str, Any]:

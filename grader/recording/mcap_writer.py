@@ -13,7 +13,6 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
@@ -80,49 +79,32 @@ def write_recording(
         submission: The submission's facts as JSON, where the recording itself does not have
             them (a cell passes them on unread).
     """
+    facts = submission or to_json(recording.submission)
     temporary = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         with temporary.open("wb") as stream:
-            _write(
-                stream,
-                recording,
-                messages,
-                definitions,
-                submission or to_json(recording.submission),
-            )
+            writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
+            writer.start(profile="ros2", library="rosgrade")
+            writer.add_metadata("rosgrade", _frame(recording))
+            _write_messages(writer, messages, definitions)
+            _write_facts(writer, recording)
+            at_ns = recording.launched_ns
+            writer.add_attachment(at_ns, at_ns, "submission.json", "application/json", facts)
+            writer.finish()  # type: ignore[no-untyped-call]
         temporary.replace(file)
     finally:
         temporary.unlink(missing_ok=True)
 
 
-def _write(
-    stream: BinaryIO,
-    recording: Recording,
-    messages: Iterable[RawMessage],
-    definitions: Mapping[str, str],
-    submission: bytes,
-) -> None:
-    writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
-    writer.start(profile="ros2", library="rosgrade")
-    writer.add_metadata("rosgrade", _frame(recording))
-    _write_messages(writer, messages, definitions)
+def _write_facts(writer: Writer, recording: Recording) -> None:
     schema = writer.register_schema("rosgrade", "jsonschema", b'{"type": "object"}')
     for name, dated in CHANNELS.items():
         facts = getattr(recording, name)
-        if not facts:
-            continue
-        channel = writer.register_channel(f"/rosgrade/{name}", "json", schema)
+        if facts:
+            channel = writer.register_channel(f"/rosgrade/{name}", "json", schema)
         for number, fact in enumerate(facts):
             time_ns = getattr(fact, dated)
             writer.add_message(channel, time_ns, to_json(fact), time_ns, number)
-    writer.add_attachment(
-        recording.launched_ns,
-        recording.launched_ns,
-        "submission.json",
-        "application/json",
-        submission,
-    )
-    writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _write_messages(
@@ -130,26 +112,18 @@ def _write_messages(
 ) -> None:
     channels: dict[tuple[str, str, str, bool], int] = {}
     schemas: dict[str, int] = {}
-    for message in messages:
-        key = (message.topic, message.type, message.join, message.is_sent)
+    for one in messages:
+        key = (one.topic, one.type, one.join, one.is_sent)
+        if one.type not in schemas:
+            definition = definitions[one.type].encode()
+            schemas[one.type] = writer.register_schema(one.type, "ros2msg", definition)
         if key not in channels:
-            if message.type not in schemas:
-                schemas[message.type] = writer.register_schema(
-                    message.type, "ros2msg", definitions[message.type].encode()
-                )
-            channels[key] = writer.register_channel(
-                f"/rosgrade/joins/{message.join}" if message.join else message.topic,
-                "cdr",
-                schemas[message.type],
-                {JOIN: message.join, TOPIC: message.topic}
-                if message.join
-                else {SENT: "true"}
-                if message.is_sent
-                else {},
-            )
-        writer.add_message(
-            channels[key], message.received_ns, message.cdr, message.stamp_ns, message.sequence
-        )
+            topic = f"/rosgrade/joins/{one.join}" if one.join else one.topic
+            metadata = {SENT: "true"} if one.is_sent else {}
+            metadata = {JOIN: one.join, TOPIC: one.topic} if one.join else metadata
+            schema = schemas[one.type]
+            channels[key] = writer.register_channel(topic, "cdr", schema, metadata)
+        writer.add_message(channels[key], one.received_ns, one.cdr, one.stamp_ns, one.sequence)
 
 
 def _frame(recording: Recording) -> dict[str, str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
-from grader.recording.definition import definition_finder
+from grader.recording.interface import definition_finder
 from grader.run.order import ProcessCommand
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.recording.definition import concatenated_definition
+from grader.recording.interface import concatenated_definition
 
 FILES = {
     "nav_msgs/msg/Odometry": "std_msgs/Header header\nstring child # name\nPose[2] poses\n",

@@ -14,7 +14,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.recording.definition import concatenated_definition, definition_finder
+from grader.recording.interface import concatenated_definition, definition_finder
 from grader.recording.mcap_writer import write_recording
 from grader.run.cell.cell import Abandoned, Cell
 from grader.run.cell.domain import DomainLock, lock_domain
