@@ -23,7 +23,7 @@ from statistics import median
 
 from grader import ros
 from grader.assignment.load import load_assignment
-from grader.assignment.mutation import reference_of
+from grader.assignment.mutant import reference_of
 from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, Grading
 from grader.batch.regrading import find, regrade

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from grader.assignment.load import load_assignment
-from grader.assignment.mutation import apply, load_mutants
+from grader.assignment.mutant import apply, load_mutants
 
 ASSIGNMENT = "timed_publisher"
 BROKEN = "sleeps_in_main"

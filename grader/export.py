@@ -12,7 +12,7 @@ from pathlib import Path
 
 from grader import resources
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.mutation import MUTANTS_FILE, REFERENCE_FOLDER
+from grader.assignment.mutant import MUTANTS_FILE, REFERENCE_FOLDER
 from grader.assignment.selection import visible_part
 from grader.errors import UsageError
 from grader.report.files import refuse_inputs, refuse_part, write_whole

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grader.assignment.load import ASSIGNMENT_FILE
 from grader.assignment.model import Package
-from grader.assignment.mutation import MUTANTS_FILE, REFERENCE_FOLDER
+from grader.assignment.mutant import MUTANTS_FILE, REFERENCE_FOLDER
 from grader.errors import UsageError
 from grader.report.files import write_folders
 from grader.report.html.handout import HANDOUT_FILE

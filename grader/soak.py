@@ -22,7 +22,7 @@ from pathlib import Path
 
 from grader import ros
 from grader.assignment.load import LoadedAssignment, load_assignment
-from grader.assignment.mutation import reference_of
+from grader.assignment.mutant import reference_of
 from grader.batch.grading import Grading
 from grader.batch.selftest import Role, Trial, TrialResult, run_trial, trials
 from grader.report.model.grade_part import differences

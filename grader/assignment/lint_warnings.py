@@ -7,9 +7,7 @@ from collections.abc import Iterator, Sequence
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Assignment, Visibility
 from grader.assignment.mutant import Mutant
-from grader.checks.need import Recorded
 from grader.spec.nearest_name import did_you_mean
-from grader.spec.unit import format_duration
 from grader.submission.read.dependencies import is_known, meant
 
 
@@ -21,7 +19,6 @@ def lint_warnings(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) ->
     """
     yield from _unknown_topics(loaded)
     yield from _shown_runs(loaded)
-    yield from _short_runs(loaded)
     yield from _dependencies(loaded.assignment)
     if mutants is None:
         yield "there is no mutants.yaml: nothing shows that the checks notice mistakes"
@@ -49,29 +46,6 @@ def _unknown_topics(loaded: LoadedAssignment) -> Iterator[str]:
                         f"the check {bound.spec.id!r} is about {topic!r}, which the scenario "
                         f"{scenario.id!r} neither records nor sends.{did_you_mean(topic, known)}"
                     )
-
-
-def _short_runs(loaded: LoadedAssignment) -> Iterator[str]:
-    """Runs that end before there can be as many messages as a check needs."""
-    for bound in loaded.checks:
-        number = next((n for n in bound.parameters.needs if isinstance(n, Recorded)), Recorded())
-        if number.at_least is None:
-            continue
-        needed = getattr(bound.parameters, number.at_least)
-        period_s = getattr(bound.parameters, number.period) if number.period else 0.0
-        for scenario in loaded.scenarios_of(bound):
-            ends = ""
-            if scenario.until.model_fields_set == {"messages"} and len(scenario.record) == 1:
-                most = scenario.until.messages or needed
-                ends = f"{most} messages" if most < needed else ""
-            if needed * period_s > scenario.timeout:
-                ends = format_duration(scenario.timeout)
-            if ends:
-                every = f", one every {format_duration(period_s)}" if period_s else ""
-                yield (
-                    f"the check {bound.spec.id!r} needs {needed} messages{every}, but the scenario "
-                    f"{scenario.id!r} ends after {ends}"
-                )
 
 
 def _dependencies(assignment: Assignment) -> Iterator[str]:

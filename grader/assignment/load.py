@@ -12,9 +12,7 @@ from grader import resources
 from grader.assignment import expected, interfaces, rules, simulation
 from grader.assignment.binding import BoundCheck, bind, tell_apart
 from grader.assignment.lesson_checks import lesson_checks
-from grader.assignment.model import Assignment, Scenario
-from grader.assignment.stimuli import stimulus_rules as stimulation
-from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
+from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, Problem, UsageError
@@ -22,8 +20,6 @@ from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Source, in_order, read_source
 
 ASSIGNMENT_FILE = "assignment.yaml"
-_TELLING = frozenset({"id", "title", "packages", "checks"})
-"""Keys that no other YAML of ours has."""
 
 
 @dataclass(frozen=True)
@@ -120,11 +116,6 @@ def load_assignment(
     """
     file = find_assignment(name, folder)
     source = read_source(file)
-    if file.name != ASSIGNMENT_FILE and _TELLING.isdisjoint(source.data):
-        raise UsageError(
-            f"{file}: is no assignment: it has no {', '.join(sorted(_TELLING))}. Worlds and "
-            f"mutants are read with the {ASSIGNMENT_FILE} that they belong to: name that one"
-        )
     assignment = source.read(Assignment)
     try:
         own = lesson_checks(file.parent)
@@ -135,10 +126,9 @@ def load_assignment(
     found += _folder_name(source, assignment)
     bound = [check for check in checks if check is not None]
     if not found:
-        found += simulation.problems(source, assignment)
         known = interfaces.Interfaces.of(file.parent)
+        found += simulation.problems(source, assignment, known)
         found += interfaces.problems(source, assignment, bound, known)
-        found += stimulation.problems(source, assignment, known)
         found += expected.problems(source, assignment, bound, known)
     if found:
         raise AssignmentError(file, in_order(found))

@@ -6,6 +6,7 @@ renders them.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Literal
 
@@ -71,6 +72,25 @@ class Visibility(str, Enum):
     AFTER_DUE_DATE = "after_due_date"
     AFTER_PUBLISHED = "after_published"
     HIDDEN = "hidden"
+
+
+SHOWN_FROM = tuple(Visibility)
+"""Earliest first; the order in which students get to see checks."""
+
+
+@dataclass(frozen=True)
+class Withheld:
+    """What a student is told of checks that are not shown yet: number and points."""
+
+    checks: int = 0
+    points: float = 0.0
+
+    def __add__(self, other: Withheld) -> Withheld:
+        """Both together."""
+        return Withheld(self.checks + other.checks, self.points + other.points)
+
+
+NOTHING_WITHHELD = Withheld()
 
 
 class Package(Model):

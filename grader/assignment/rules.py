@@ -7,9 +7,8 @@ from collections.abc import Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 from grader.assignment.binding import BoundCheck
-from grader.assignment.model import Assignment, CheckSpec, Launch, Scenario
+from grader.assignment.model import SHOWN_FROM, Assignment, CheckSpec, Launch, Scenario
 from grader.assignment.needs import need_problems, no_executable, no_package
-from grader.assignment.withheld import SHOWN_FROM
 from grader.checks.check import Subject
 from grader.errors import Problem
 from grader.spec.document import Place

@@ -7,9 +7,8 @@ import math
 from collections.abc import Collection
 
 from grader.assignment.load import LoadedAssignment
-from grader.assignment.model import Visibility
+from grader.assignment.model import Visibility, Withheld
 from grader.assignment.mutant import required_by
-from grader.assignment.withheld import Withheld
 from grader.checks.check import Subject
 from grader.errors import UsageError
 from grader.spec.nearest_name import nearest_or_all

@@ -1,43 +1,66 @@
-"""What must fit in scenarios with a simulated robot: world files, random values, the start."""
+"""What must fit in scenarios as they are run: worlds, random values, stimuli."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
 
+from grader.assignment.interfaces import Interfaces
 from grader.assignment.model import Assignment, Scenario
 from grader.assignment.random_values import draw_values, fill_in, world_values
+from grader.assignment.stimuli.stimulus_model import Making
 from grader.errors import AssignmentError, Problem, UsageError
 from grader.spec.document import Place
 from grader.spec.source import Source, read_source
+from grader.spec.unit import format_duration
+from sim.robot import MODELS
 from sim.world import World, read_world
 
 _TRIED_SEEDS = range(20)
 
 
 def read_scenario_world(file: Path, values: dict[str, str]) -> World:
-    """Read a world; a scenario may have random values that its world does not use.
-
-    Raises:
-        UsageError: The file cannot be read.
-        AssignmentError: It says something that it must not.
-    """
+    """Read a world; a scenario may have random values that its world does not use."""
     used = read_source(file).data.get("values", {})
     return read_world(file, {name: value for name, value in values.items() if name in used})
 
 
-def problems(source: Source, assignment: Assignment) -> Iterator[Problem]:
-    """Find what does not fit; worlds are tried with the values of several seeds."""
+def problems(source: Source, assignment: Assignment, known: Interfaces) -> Iterator[Problem]:
+    """Find what does not fit.
+
+    Worlds are tried with the values of several seeds, functions with the seed 0. Fields of
+    messages are checked where the definitions are at hand.
+    """
     told: set[str] = set()
+    default = assignment.packages[0].name
     for index, scenario in enumerate(assignment.scenarios):
         place: Place = ("scenarios", index)
-        yield from _parameters(source, place, scenario)
+        values = draw_values(scenario, 0)
+        launched = [f"{one.package or default}/{one.program}" for one in scenario.launch]
+        making = Making(source.file.parent, known.find, 0, values, launched)
+        yield from _parameters(source, place, scenario, values)
         if scenario.world is not None:
             yield from _world(source, place, scenario, told)
+        for inside, text in _stimuli(scenario, making):
+            yield source.problem((*place, *inside), text)
 
 
-def _parameters(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem]:
-    values = draw_values(scenario, 0)
+def _stimuli(scenario: Scenario, making: Making) -> Iterator[tuple[Place, str]]:
+    for number, item in enumerate(scenario.stimuli):
+        for inside, text in item.mistakes(making, scenario):
+            yield ("stimuli", number, *inside), text
+        after = getattr(item, "after", None)
+        if after is not None and after >= scenario.timeout:
+            shown, timeout = format_duration(after), format_duration(scenario.timeout)
+            text = f"{shown} is not before the timeout of {timeout} ends the scenario"
+            yield ("stimuli", number, "after"), text
+    if scenario.until.stimuli is not None and not any(one.has_end for one in scenario.stimuli):
+        yield ("until", "stimuli"), "no stimulus of the scenario has an end"
+
+
+def _parameters(
+    source: Source, place: Place, scenario: Scenario, values: dict[str, float]
+) -> Iterator[Problem]:
     for number, launch in enumerate(scenario.launch):
         for name, value in launch.parameters.items():
             try:
@@ -54,7 +77,7 @@ def _world(source: Source, place: Place, scenario: Scenario, told: set[str]) -> 
         try:
             world = read_scenario_world(file, world_values(scenario, values))
             start = scenario.robot.pose if scenario.robot.pose is not None else world.start
-            world.check_start(start, _radius_m(scenario))
+            world.check_start(start, scenario.robot.radius or MODELS[scenario.robot.model].radius_m)
         except (AssignmentError, UsageError) as error:
             if str(error) in told:
                 return
@@ -62,11 +85,3 @@ def _world(source: Source, place: Place, scenario: Scenario, told: set[str]) -> 
             drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
             yield source.problem((*place, "world"), f"{error}{f' (with {drawn})' if drawn else ''}")
             return
-
-
-def _radius_m(scenario: Scenario) -> float:
-    from sim.robot import MODELS
-
-    if scenario.robot.radius is not None:
-        return scenario.robot.radius
-    return MODELS[scenario.robot.model].radius_m

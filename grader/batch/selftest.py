@@ -20,10 +20,11 @@ from grader.assignment.mutant import (
     Difference,
     Mutant,
     MutantVerdict,
+    apply,
     expected_statuses,
+    load_mutants,
     verdict,
 )
-from grader.assignment.mutation import apply, load_mutants
 from grader.batch.grading import Graded, Grading
 from grader.checks.finding import Status
 from grader.grade.model import Grade

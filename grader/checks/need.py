@@ -43,10 +43,6 @@ class Recorded(Need):
     """Parameter with its type, if the check expects one."""
     kind: str | None = None
     """Parameter with the student's end: messages to a subscription need not be recorded."""
-    at_least: str | None = None
-    """Attribute with the number of messages that the check needs."""
-    period: str | None = None
-    """Parameter with the time between them, in seconds."""
 
 
 @dataclass(frozen=True)

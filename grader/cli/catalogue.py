@@ -32,18 +32,13 @@ def validate(
     """
     from grader.assignment.lint_warnings import lint_warnings
     from grader.assignment.load import load_assignment
-    from grader.assignment.mutation import MUTANTS_FILE, load_mutants
-    from grader.assignment.reference import reference_problems
-    from grader.errors import AssignmentError
+    from grader.assignment.mutant import MUTANTS_FILE, load_mutants
     from grader.sandbox.python_tree import not_installed
 
     broken = 0
     for name in files:
         try:
             loaded = load_assignment(name)
-            lacking = list(reference_problems(loaded))
-            if lacking:
-                raise AssignmentError(loaded.file, lacking)
             has_mutants = (loaded.folder / MUTANTS_FILE).exists()
             mutants = load_mutants(loaded.assignment, loaded.folder) if has_mutants else None
         except RosgradeError as error:

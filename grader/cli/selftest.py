@@ -51,7 +51,7 @@ def selftest(
     """
     from grader import ros
     from grader.assignment.load import list_assignments, load_assignment
-    from grader.assignment.mutation import reference_of
+    from grader.assignment.mutant import reference_of
     from grader.batch.grading import Grading
     from grader.batch.selftest import Role, Trial, mutation_score, trials
     from grader.batch.selftest import selftest as run_selftest

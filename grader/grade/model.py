@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from grader.assignment.model import Assignment, Visibility
-from grader.assignment.withheld import NOTHING_WITHHELD, Withheld
+from grader.assignment.model import NOTHING_WITHHELD, Assignment, Visibility, Withheld
 from grader.checks.finding import Finding, Status
 from grader.grade.first import every_point_judged, first_to_fix, reason
 from grader.grade.points import total

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -17,7 +18,7 @@ from mcap_ros2.decoder import DecoderFactory
 from pydantic import TypeAdapter
 
 from grader.errors import UsageError
-from grader.recording.mcap_writer import CHANNELS, FORMAT, JOIN, SENT, TOPIC
+from grader.recording.mcap_writer import CHANNELS, FORMAT, JOIN, SENT, TOPIC, RawMessage
 from grader.recording.model import Message, Recording
 from grader.submission.record import SubmissionRecord
 
@@ -188,6 +189,30 @@ def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, 
         except Exception as error:
             raise ValueError(f"no MCAP file that can be read: {_reason(error)}") from error
     return tuple(found), tuple(sorted(topics))
+
+
+def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
+    """The messages that the probe or the simulator published, in that order."""
+    simulated = simulated_topics(recording)
+    found: list[RawMessage] = []
+    try:
+        with file.open("rb") as stream:
+            for schema, channel, message in make_reader(stream).iter_messages():
+                is_sent = SENT in channel.metadata
+                is_ours = is_sent or channel.topic in simulated
+                if is_ours and schema is not None and channel.message_encoding == "cdr":
+                    times = message.publish_time, message.log_time, message.sequence
+                    raw = RawMessage(channel.topic, schema.name, message.data, *times)
+                    found.append(replace(raw, is_sent=is_sent))
+    except OSError as error:
+        raise UsageError(f"{file}: {error.strerror or error}") from error
+    return tuple(sorted(found, key=lambda message: message.stamp_ns))
+
+
+def simulated_topics(recording: Recording) -> frozenset[str]:
+    """Topics on which the simulator published."""
+    scene = recording.scene
+    return frozenset({scene.odometry_topic, scene.scan_topic} if scene else ())
 
 
 def _frame(record: Metadata) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.errors import UsageError
-from grader.recording.inputs import read_inputs
+from grader.recording.mcap_reader import read_inputs
 from grader.recording.model import NS, Kind, Owner, Qos, Recording
 from grader.ros import RosInstallation
 from grader.run.environment import cell_environment, student_environment

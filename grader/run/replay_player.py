@@ -25,8 +25,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from grader.recording.inputs import read_inputs
-from grader.recording.mcap_reader import read_recording
+from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import NS
 from grader.run.cell.domain import lock_domain

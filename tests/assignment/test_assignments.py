@@ -10,7 +10,7 @@ import pytest
 
 from grader import resources
 from grader.assignment.load import LoadedAssignment, list_assignments, load_assignment
-from grader.assignment.mutation import Mutants, apply, load_mutants, reference_of
+from grader.assignment.mutant import Mutants, apply, load_mutants, reference_of
 from grader.checks.check import Subject
 
 PUBLISHERS = ("simple_publisher", "timed_publisher")

@@ -407,13 +407,6 @@ def test_a_file_of_another_name_may_have_any_id(write: Write, catalogue: Catalog
     assert load_assignment(draft, catalogue).sha256 == before
 
 
-@pytest.mark.parametrize("name", ["tests/sim/worlds/room.yaml", "assignments/qos/mutants.yaml"])
-def test_a_file_of_another_kind_is_not_judged_by_the_keys_of_an_assignment(name: str) -> None:
-    file = Path(__file__).parents[2] / name
-    with pytest.raises(UsageError, match=r"yaml: is no assignment: .*: name that one$"):
-        load_assignment(file)
-
-
 def test_an_assignment_is_found_by_id_folder_and_file(
     write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:

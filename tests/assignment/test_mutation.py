@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.assignment.model import Assignment
-from grader.assignment.mutation import apply, load_mutants, reference_of
+from grader.assignment.mutant import apply, load_mutants, reference_of
 from grader.errors import AssignmentError, UsageError
 from grader.spec.source import parse_source
 from tests.assignment.lessons import HEAD

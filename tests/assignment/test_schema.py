@@ -11,7 +11,7 @@ import pytest
 
 from grader import resources
 from grader.assignment.load import load_assignment
-from grader.assignment.mutation import MUTANTS_FILE
+from grader.assignment.mutant import MUTANTS_FILE
 from grader.assignment.schema import assignment_schema, mutants_schema
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check

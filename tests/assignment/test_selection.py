@@ -8,8 +8,8 @@ import pytest
 
 from grader.assignment.lint_warnings import lint_warnings
 from grader.assignment.load import load_assignment
+from grader.assignment.model import Withheld
 from grader.assignment.selection import select, visible_part
-from grader.assignment.withheld import Withheld
 from grader.errors import AssignmentError, UsageError
 from tests.assignment.lessons import HEAD
 

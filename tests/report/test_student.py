@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
+from grader.assignment.model import SHOWN_FROM, Withheld
 from grader.assignment.selection import visible_part
-from grader.assignment.withheld import SHOWN_FROM, Withheld
 from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Status, Table
 from grader.grade import grade

@@ -13,8 +13,7 @@ import pytest
 
 from grader import ros
 from grader.errors import UsageError
-from grader.recording.inputs import read_inputs
-from grader.recording.mcap_reader import read_recording
+from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.model import NS
 from grader.run.replay import ReplayOrder, make_order
 from grader.run.runner import Runner

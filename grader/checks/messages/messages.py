@@ -37,7 +37,7 @@ _MOST_FIELDS = 8
 class Count(Parameters):
     """Parameters of messages.count."""
 
-    needs = (Recorded(at_least="needed"), Published())
+    needs = (Recorded(), Published())
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     exactly: int | None = Field(None, ge=0, description="So many messages, no more, no fewer.")

@@ -41,7 +41,7 @@ _ENDED_PERIODS = 3.0
 class Period(Parameters):
     """Parameters of timing.period."""
 
-    needs = (Recorded(at_least="needed", period="period"),)
+    needs = (Recorded(),)
 
     topic: TopicName = Field(description="Fully qualified topic name.")
     period: Duration = Field(description="Expected time between two messages.")

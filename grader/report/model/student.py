@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from grader.assignment.model import Visibility
-from grader.assignment.withheld import Withheld
+from grader.assignment.model import Visibility, Withheld
 from grader.checks.finding import Status
 from grader.grade.first import every_point_judged, first_to_fix, reason
 from grader.grade.model import CheckResult, Grade

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from grader.assignment.withheld import Withheld
+from grader.assignment.model import Withheld
 from grader.checks.finding import Status
 from grader.grade import first
 from grader.report.model.result_model import CheckPart, FindingPart, PlacePart, Result

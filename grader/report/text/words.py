@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from grader.assignment.model import Visibility
-from grader.assignment.withheld import Withheld
+from grader.assignment.model import Visibility, Withheld
 from grader.checks.finding import Finding, Status
 from grader.checks.wording import counted
 from grader.grade.model import CheckResult, Grade
