@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.checks.finding import Table
-from grader.recording.model import Qos
+from grader.recording.model import Kind, Qos
 from grader.spec.unit import format_duration
 
 # Weaker first: an offer must not be weaker than the request.
@@ -36,32 +36,26 @@ class Comparison:
     rule: str
 
 
+def sides(kind: Kind, own: Qos, other: Qos) -> tuple[Qos, Qos]:
+    """What is offered and what is requested, of an endpoint of a kind and the other end."""
+    return (own, other) if kind is Kind.PUBLISHER else (other, own)
+
+
 def comparisons(offered: Qos, requested: Qos) -> tuple[Comparison, ...]:
     """Compare every policy that decides whether two endpoints match."""
     found = []
     for policy, words in STRENGTH.items():
         offer, request = getattr(offered, policy), getattr(requested, policy)
         known = offer in words and request in words
-        found.append(
-            Comparison(
-                policy,
-                offer,
-                request,
-                words.index(offer) >= words.index(request) if known else None,
-                f"who requests {words[1]} needs an offer of {words[1]}",
-            )
-        )
+        fits = words.index(offer) >= words.index(request) if known else None
+        rule = f"a request for {words[1]} needs an offer of {words[1]}"
+        found.append(Comparison(policy, offer, request, fits, rule))
     for policy, attribute in _DURATIONS.items():
         offer_s, request_s = getattr(offered, attribute), getattr(requested, attribute)
-        found.append(
-            Comparison(
-                policy,
-                duration_words(offer_s),
-                duration_words(request_s),
-                request_s is None or (offer_s is not None and offer_s <= request_s),
-                "the offer must not be longer than the request",
-            )
-        )
+        fits = request_s is None or (offer_s is not None and offer_s <= request_s)
+        rule = "the offer must not be longer than the request"
+        shown = duration_words(offer_s), duration_words(request_s)
+        found.append(Comparison(policy, *shown, fits, rule))
     return tuple(found)
 
 

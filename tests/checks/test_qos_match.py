@@ -63,7 +63,7 @@ def test_the_finding_explains_the_rule_in_a_table():
     assert table.header == ("policy", "offered", "requested", "compatible", "rule")
     assert table.rows[0] == (
         "reliability", "best_effort", "reliable", "no",
-        "who requests reliable needs an offer of reliable",
+        "a request for reliable needs an offer of reliable",
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pydantic import Field
 
@@ -18,7 +18,7 @@ from grader.diagnosis.process.process_exit import why_ended
 from grader.measure import declarations
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.numbering import published
-from grader.recording.model import NS, Join, Kind, Message, Recording
+from grader.recording.model import NS, Endpoint, Join, Kind, Message, Recording
 from grader.spec.name import Id, TopicName
 from grader.spec.unit import format_duration
 
@@ -60,65 +60,30 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     expected = _expected_words(parameters)
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)
     if join is None:
-        return _not_judged(recording, parameters, join, 0, expected)
-    got = recording.joined.get(parameters.joiner, ())
-    history = _before(got, join.joined_ns)
-    heard = recording.on(parameters.topic)
-    before = _Before.heard(heard, join) if heard else _Before.told_by(got, history)
-    if before.number <= parameters.last:
-        if heard or not got:
-            return _not_judged(recording, parameters, join, before.number, expected)
-        return _waited(recording, parameters, join, before, expected)
-    evidence = _evidence(recording, join, before.messages, history)
-    # What is kept arrives with the match, so that what was published later is live.
-    first_ns = min((item.received_ns for item in got), default=join.joined_ns)
-    meanwhile = sum(join.joined_ns < item.stamp_ns <= first_ns for item in heard or got)
-    least = max(0, parameters.last - meanwhile)
-    if least <= len(history) <= parameters.last and _is_newest(history, before.messages):
-        return Finding.passed(expected, _seen(history, before), evidence)
-    publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
-    if len(history) > parameters.last and len(publishers) > 1:
-        return Finding.failed(
-            expected,
-            f"{_seen(history, before)}, of {len(publishers)} publishers, each of which keeps its "
-            "own",
-            _ONE_PUBLISHER_HINT,
-            evidence,
+        return _why_not_judged(recording, parameters, "the run ended before it joined").finding(
+            expected
         )
-    if len(history) > parameters.last:
-        return Finding.failed(
-            expected,
-            _seen(history, before) + _why_many(recording, parameters, history, before),
-            _hint(parameters),
-            evidence,
+    case = _Case.of(recording, parameters, join)
+    if case.number <= parameters.last:
+        heard = recording.on(parameters.topic)
+        if not heard and recording.joined.get(join.name):
+            return _why_unpublished_before(case).finding(expected)
+        seen = (
+            f"when it joined, only {counted(case.number, 'message')} had been published of the "
+            f"{parameters.last + 1} that are needed to judge"
         )
-    if not _is_newest(history, before.messages):
-        return Finding.to_repeat(
-            expected,
-            f"{_seen(history, before)}, but not the newest ones: some were lost on their way",
+        return _why_not_judged(recording, parameters, seen).finding(expected)
+    number = len(case.history)
+    if case.least <= number <= parameters.last and case.is_newest:
+        return Finding.passed(expected, case.seen, case.evidence)
+    if number > parameters.last:
+        return _why_too_many(case).finding(expected)
+    if not case.is_newest:
+        cause = Cause.to_repeat(
+            f"{case.seen}, but not the newest ones: some were lost on their way"
         )
-    return _too_few(recording, parameters, join, history, before, evidence, expected)
-
-
-@dataclass(frozen=True)
-class _Before:
-    """What was published before a late joiner was there."""
-
-    messages: list[Message]
-    number: int
-
-    @classmethod
-    def heard(cls, messages: tuple[Message, ...], join: Join) -> _Before:
-        """Of a topic that was recorded from the start."""
-        found = _before(messages, join.joined_ns)
-        return cls(found, len(found))
-
-    @classmethod
-    def told_by(cls, got: tuple[Message, ...], history: list[Message]) -> _Before:
-        """Of a topic that only the late joiner subscribed to: the messages are numbered."""
-        if history:
-            return cls(history, published(tuple(history)))
-        return cls([], published(got[:1]) - 1 if got else 0)
+        return cause.finding(expected)
+    return _why_too_few(case).finding(expected)
 
 
 def _expected_words(parameters: LateJoiner) -> str:
@@ -130,189 +95,206 @@ def _expected_words(parameters: LateJoiner) -> str:
     )
 
 
-def _before(messages: tuple[Message, ...], time_ns: int) -> list[Message]:
+@dataclass(frozen=True)
+class _Case:
+    """What a late joiner got, and what had been published before it joined.
+
+    Attributes:
+        history: What it got of what was published before.
+        before: What was published before, as far as the recording has it.
+        number: How many messages were published before.
+        least: How many of them it must get. A message that was published while it was matched
+            may count on either side.
+    """
+
+    recording: Recording
+    parameters: LateJoiner
+    join: Join
+    history: list[Message]
+    before: list[Message]
+    number: int
+    least: int
+
+    @classmethod
+    def of(cls, recording: Recording, parameters: LateJoiner, join: Join) -> _Case:
+        """Sort the messages by whether they were published before the join."""
+        got = recording.joined.get(join.name, ())
+        heard = recording.on(parameters.topic)
+        history = _published_until(got, join.joined_ns)
+        before = _published_until(heard, join.joined_ns) if heard else history
+        number = len(before)
+        # Where nothing else was subscribed, the writer's numbers tell.
+        if not heard:
+            number = published(history) if history else published(got[:1]) - 1 if got else 0
+        # What is kept arrives with the match, so that what was published later is live.
+        first_ns = min((item.received_ns for item in got), default=join.joined_ns)
+        meanwhile = sum(join.joined_ns < item.stamp_ns <= first_ns for item in heard or got)
+        least = max(0, parameters.last - meanwhile)
+        return cls(recording, parameters, join, history, before, number, least)
+
+    @property
+    def seen(self) -> str:
+        """What was seen, in words."""
+        return f"it got {len(self.history)} of the {counted(self.number, 'message')} before it"
+
+    @property
+    def is_newest(self) -> bool:
+        """Whether what came is the newest of what was published, without a gap."""
+        newest = self.before[-len(self.history) :] if self.history else []
+        return {item.stamp_ns for item in self.history} == {item.stamp_ns for item in newest}
+
+    @property
+    def publishers(self) -> tuple[Endpoint, ...]:
+        """The student's publishers on the topic."""
+        return self.recording.student_endpoints(Kind.PUBLISHER, self.parameters.topic)
+
+    @property
+    def depths(self) -> list[int]:
+        """The depths of these publishers, as the process declared them."""
+        queues = declarations.queues(self.recording, Kind.PUBLISHER, self.parameters.topic)
+        return [queue.depth for queue in queues if queue.depth is not None]
+
+    @property
+    def destroyed(self) -> int:
+        """How many publishers were destroyed before it joined, while another one was there."""
+        ends = [item.vanished_ns or math.inf for item in self.publishers]
+        gone = sum(end_ns <= self.join.joined_ns for end_ns in ends)
+        return gone if gone < len(ends) else 0
+
+    @property
+    def hint(self) -> str:
+        """The profile that keeps what is asked for."""
+        if self.parameters.last == 0:
+            return "A volatile publisher keeps nothing for late joiners: that is the default."
+        return (
+            "Give create_publisher a profile that keeps messages for late joiners: QoSProfile("
+            f"history=HistoryPolicy.KEEP_LAST, depth={self.parameters.last}, "
+            "durability=DurabilityPolicy.TRANSIENT_LOCAL)."
+        )
+
+    @property
+    def evidence(self) -> Evidence:
+        """When it joined and was matched, and which messages it got."""
+        got = {item.stamp_ns for item in self.history}
+        rows = tuple(
+            (
+                str(number),
+                f"{self.recording.since_launch_s(item.stamp_ns):.2f} s",
+                "yes" if item.stamp_ns in got else "no",
+            )
+            for number, item in enumerate(self.before, start=1)
+        )
+        name = self.join.name
+        times = {"joined": self.join.joined_ns, "matched": self.join.matched_ns}
+        moments = tuple(
+            Moment(f"{name} {what}", self.recording.since_launch_s(time_ns))
+            for what, time_ns in times.items()
+            if time_ns is not None
+        )
+        header = ("message", "published after launch", "got by the late joiner")
+        table = Table(f"Messages before {name} joined", header, rows[-_SHOWN:])
+        return Evidence(moments, tables=(table,))
+
+    def why_destroyed(self, seen: str) -> Cause | None:
+        """The cause if earlier publishers took along what they kept, or nothing."""
+        if not self.destroyed:
+            return None
+        number = counted(self.destroyed, "publisher was", "publishers were")
+        return Cause(
+            f"{seen}: what a publisher keeps is lost with it, and {number} destroyed before it "
+            "joined",
+            _ONE_PUBLISHER_HINT,
+            self.evidence,
+        )
+
+
+def _published_until(messages: tuple[Message, ...], time_ns: int) -> list[Message]:
     return sorted(
         (item for item in messages if item.stamp_ns <= time_ns),
         key=lambda item: (item.stamp_ns, item.sequence),
     )
 
 
-def _is_newest(history: list[Message], before: list[Message]) -> bool:
-    """Whether what came is the newest of what was published, without a gap."""
-    if not history:
-        return True
-    stamps = {item.stamp_ns for item in history}
-    expected = {item.stamp_ns for item in before[-len(history) :]}
-    return stamps == expected
-
-
-def _seen(history: list[Message], before: _Before) -> str:
-    return f"it got {len(history)} of the {counted(before.number, 'message')} before it"
-
-
-def _not_judged(
-    recording: Recording,
-    parameters: LateJoiner,
-    join: Join | None,
-    number: int,
-    expected: str,
-) -> Finding:
-    """Nobody joined, or too little had been published to see what is kept of it."""
+def _why_not_judged(recording: Recording, parameters: LateJoiner, seen: str) -> Cause:
+    """Why it did not join, or too little had been published to see what is kept of it."""
     needed = parameters.last + 1
     if len(recording.on(parameters.topic)) < needed:
-        return why_few(recording, parameters.topic, needed).finding(expected)
-    seen = (
-        "the run ended before it joined"
-        if join is None
-        else f"when it joined, only {counted(number, 'message')} had been published of the "
-        f"{needed} that are needed to judge"
-    )
-    return (why_ended(recording, seen) or Cause(seen, ours=True)).finding(expected)
+        return why_few(recording, parameters.topic, needed)
+    return why_ended(recording, seen) or Cause(seen, ours=True)
 
 
-def _waited(
-    recording: Recording, parameters: LateJoiner, join: Join, before: _Before, expected: str
-) -> Finding:
-    """Until the late joiner was there, little or nothing was published to no subscription."""
-    seen = f"before it, {counted(before.number, 'message')} had been published to no subscription"
-    evidence = _evidence(recording, join, before.messages, before.messages)
+def _why_unpublished_before(case: _Case) -> Cause:
+    """Why little or nothing was published before the late joiner, the only subscription."""
+    recording, join = case.recording, case.join
+    seen = f"before it, {counted(case.number, 'message')} had been published to no subscription"
+    destroyed = case.why_destroyed(seen)
+    if destroyed is not None:
+        return destroyed
     begin_ns = recording.matched_ns or recording.launched_ns
     span_s = (join.joined_ns - begin_ns) / NS
     stolen_s = recording.stolen_s(begin_ns, join.joined_ns)
-    made_anew = _made_anew(recording, parameters, join)
-    if made_anew:
-        return Finding.failed(expected, f"{seen}: {made_anew}", _ONE_PUBLISHER_HINT, evidence)
     # With the time that was taken from it, the node may have come to as many as are needed.
-    if before.number * span_s > parameters.last * (span_s - stolen_s):
-        return Finding.to_repeat(expected, f"{seen}; the machine took {format_duration(stolen_s)}")
-    return Finding.failed(
-        expected,
+    if case.number * span_s > case.parameters.last * (span_s - stolen_s):
+        return Cause.to_repeat(f"{seen}; the machine took {format_duration(stolen_s)}")
+    return Cause(
         f"{seen} in {format_duration(span_s)}",
         "Publish from the start, whether or not there is a subscription: leave out conditions such "
         "as get_subscription_count() > 0. What comes before the late joiner is kept for it.",
-        evidence,
+        case.evidence,
     )
 
 
-def _made_anew(recording: Recording, parameters: LateJoiner, join: Join) -> str:
-    """That earlier publishers took along what they kept, or nothing."""
-    publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
-    gone = [item for item in publishers if (item.vanished_ns or math.inf) <= join.joined_ns]
-    if not gone or len(gone) == len(publishers):
-        return ""
-    return (
-        "what a publisher keeps is lost with it, and "
-        f"{counted(len(gone), 'publisher was', 'publishers were')} destroyed before it joined"
-    )
-
-
-def _why_many(
-    recording: Recording, parameters: LateJoiner, history: list[Message], before: _Before
-) -> str:
-    queues = declarations.queues(recording, Kind.PUBLISHER, parameters.topic)
+def _why_too_many(case: _Case) -> Cause:
+    if len(case.publishers) > 1:
+        each = f"of {len(case.publishers)} publishers, each of which keeps its own"
+        return Cause(f"{case.seen}, {each}", _ONE_PUBLISHER_HINT, case.evidence)
+    queues = declarations.queues(case.recording, Kind.PUBLISHER, case.parameters.topic)
     if any(queue.history == "keep_all" for queue in queues):
-        return ": the publisher's history is keep_all, declared by the process"
-    depths = [queue.depth for queue in queues if queue.depth is not None]
-    if depths and depths[0] != parameters.last:
-        return f": the publisher's depth is {depths[0]}, declared by the process"
-    if len(history) == before.number:
-        return ": all that there were"
-    return f": the publisher keeps {len(history)}"
+        why = "the publisher's history is keep_all, declared by the process"
+    elif case.depths and case.depths[0] != case.parameters.last:
+        why = f"the publisher's depth is {case.depths[0]}, declared by the process"
+    else:
+        why = f"the publisher keeps {len(case.history)}"
+    return Cause(f"{case.seen}: {why}", case.hint, case.evidence)
 
 
-def _too_few(
-    recording: Recording,
-    parameters: LateJoiner,
-    join: Join,
-    history: list[Message],
-    before: _Before,
-    evidence: Evidence,
-    expected: str,
-) -> Finding:
-    publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.topic)
-    for publisher in publishers:
+def _why_too_few(case: _Case) -> Cause:
+    recording, join, last = case.recording, case.join, case.parameters.last
+    for publisher in case.publishers:
         refused = refusals(publisher.qos, join.qos)
         if refused:
-            return Finding.failed(
-                expected,
+            table = compatibility_table(publisher.qos, join.qos)
+            return Cause(
                 f"it got nothing at all: {', '.join(refused)}",
-                f"{_hint(parameters)} A subscription receives nothing from a publisher that offers "
-                "less than it requests.",
-                Evidence(
-                    evidence.moments,
-                    tables=(compatibility_table(publisher.qos, join.qos), *evidence.tables),
-                ),
+                f"{case.hint} A subscription receives nothing from a publisher that offers less "
+                "than it requests.",
+                replace(case.evidence, tables=(table, *case.evidence.tables)),
             )
-    lifespans = [item.qos.lifespan_s for item in publishers if item.qos.lifespan_s is not None]
-    known = len(before.messages) >= parameters.last
-    oldest_ns = before.messages[-parameters.last].stamp_ns if known else recording.launched_ns
-    age_s = (join.joined_ns - oldest_ns) / NS
-    if lifespans and min(lifespans) < age_s:
-        return Finding.failed(
-            expected,
-            f"{_seen(history, before)}: the publisher's lifespan is "
-            f"{format_duration(min(lifespans))}, and what is older is thrown away",
+    lifespans = [item.qos.lifespan_s for item in case.publishers if item.qos.lifespan_s is not None]
+    known = len(case.before) >= last
+    oldest_ns = case.before[-last].stamp_ns if known else recording.launched_ns
+    if lifespans and min(lifespans) < (join.joined_ns - oldest_ns) / NS:
+        return Cause(
+            f"{case.seen}: the publisher's lifespan is {format_duration(min(lifespans))}, and what "
+            "is older is thrown away",
             "Leave `lifespan` out of the QoSProfile: then a message stays until newer ones take "
             "its place in the queue.",
-            evidence,
+            case.evidence,
         )
-    if join.matched_ns is None:
-        destroyed = why_unpublished(recording, parameters.topic, _seen(history, before))
-        if destroyed is not None:
-            return destroyed.finding(expected)
-    stolen_s = recording.stolen_s(join.joined_ns, recording.stop_ns)
-    if join.matched_ns is None and publishers:
-        return Finding.to_repeat(
-            expected,
-            f"the late joiner was not matched within "
-            f"{format_duration((recording.stop_ns - join.joined_ns) / NS)}"
-            + (f"; the machine took {format_duration(stolen_s)} meanwhile" if stolen_s else ""),
+    if join.matched_ns is None and case.publishers:
+        waited_s = format_duration((recording.stop_ns - join.joined_ns) / NS)
+        return why_unpublished(recording, case.parameters.topic, case.seen) or Cause.to_repeat(
+            f"the late joiner was not matched within {waited_s}"
         )
-    depths = [
-        queue.depth
-        for queue in declarations.queues(recording, Kind.PUBLISHER, parameters.topic)
-        if queue.depth is not None
-    ]
-    why = f": the publisher's depth is {depths[0]}, declared by the process" if depths else ""
-    made_anew = _made_anew(recording, parameters, join)
-    if made_anew:
-        return Finding.failed(
-            expected, f"{_seen(history, before)}: {made_anew}", _ONE_PUBLISHER_HINT, evidence
+    destroyed = case.why_destroyed(case.seen)
+    if destroyed is not None:
+        return destroyed
+    depth = case.depths[0] if case.depths else None
+    if depth is None:
+        return Cause(case.seen, case.hint, case.evidence)
+    if depth >= last:
+        return Cause.to_repeat(
+            f"{case.seen}, although the publisher's depth is {depth}: the rest was lost on its way"
         )
-    if depths and depths[0] >= parameters.last:
-        return Finding.to_repeat(
-            expected,
-            f"{_seen(history, before)}, although the publisher's depth is {depths[0]}: the rest "
-            "was lost on its way",
-        )
-    return Finding.failed(expected, _seen(history, before) + why, _hint(parameters), evidence)
-
-
-def _hint(parameters: LateJoiner) -> str:
-    if parameters.last == 0:
-        return "A volatile publisher keeps nothing for late joiners: that is the default."
-    return (
-        "Give create_publisher a profile that keeps messages for late joiners: QoSProfile("
-        f"history=HistoryPolicy.KEEP_LAST, depth={parameters.last}, "
-        "durability=DurabilityPolicy.TRANSIENT_LOCAL)."
-    )
-
-
-def _evidence(
-    recording: Recording, join: Join, before: list[Message], history: list[Message]
-) -> Evidence:
-    got = {item.stamp_ns for item in history}
-    rows = tuple(
-        (
-            str(number),
-            f"{recording.since_launch_s(item.stamp_ns):.2f} s",
-            "yes" if item.stamp_ns in got else "no",
-        )
-        for number, item in enumerate(before, start=1)
-    )
-    title = f"Messages before {join.name} joined"
-    moments = [Moment(f"{join.name} joined", recording.since_launch_s(join.joined_ns))]
-    if join.matched_ns is not None:
-        moments.append(Moment(f"{join.name} matched", recording.since_launch_s(join.matched_ns)))
-    header = ("message", "published after launch", "got by the late joiner")
-    return Evidence(tuple(moments), tables=(Table(title, header, rows[-_SHOWN:]),))
+    why = f"the publisher's depth is {depth}, declared by the process"
+    return Cause(f"{case.seen}: {why}", case.hint, case.evidence)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Collection
 from typing import Any, Literal
 
 from pydantic import Field, model_validator
@@ -16,7 +15,7 @@ from grader.checks.wording import code, counted
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.undeclared import why_undeclared
 from grader.measure import declarations
-from grader.measure.compatibility import Comparison, comparisons, duration_words
+from grader.measure.compatibility import duration_words, refusals, sides
 from grader.recording.model import NS, Kind, Qos, Recording
 from grader.spec.name import Durability, Reliability, TopicName
 from grader.spec.quantity import Duration
@@ -25,18 +24,20 @@ from grader.spec.quantity import Duration
 _FEWEST = 5
 # DDS carries durations as seconds and a fraction of 2**32.
 _SAME_DURATION = 1e-3
-_ARGUMENTS = {"lease": "liveliness_lease_duration"}
-_POLICIES = {"lease": "liveliness lease"}
-"""Key of the YAML -> name of the policy, where they differ."""
-_WORD_POLICIES = ("reliability", "durability", "liveliness")
+_WORD_POLICIES = {"reliability": "reliable", "durability": "volatile", "liveliness": "automatic"}
+"""Policy -> its default."""
 _DURATION_POLICIES = {
-    "deadline": "deadline_s",
-    "lifespan": "lifespan_s",
-    "lease": "liveliness_lease_s",
+    "deadline": ("deadline_s", "deadline"),
+    "lifespan": ("lifespan_s", "lifespan"),
+    "lease": ("liveliness_lease_s", "liveliness_lease_duration"),
 }
-"""Key of the YAML -> attribute of the profile."""
+"""Key of the YAML -> attribute of our profile, argument of rclpy's QoSProfile."""
 _DECLARED_POLICIES = {"reliability", "durability"}
 """What a process declares of an endpoint."""
+_WORDS = {
+    Kind.PUBLISHER: ("offers", "offered", "subscription that requests"),
+    Kind.SUBSCRIPTION: ("requests", "requested", "publisher that offers"),
+}
 
 
 class Profile(Parameters):
@@ -77,39 +78,6 @@ class Profile(Parameters):
         )
 
 
-@dataclass(frozen=True)
-class _Side:
-    """The words and the rule for one end.
-
-    Attributes:
-        has: ``offers`` or ``requests``.
-        did: ``offered`` or ``requested``.
-        comparisons: (found, expected) -> how a partner with the expected profile fits.
-    """
-
-    kind: Kind
-    has: str
-    did: str
-    partner: str
-    comparisons: Callable[[Qos, Qos], tuple[Comparison, ...]]
-
-
-_PUBLISHER = _Side(
-    Kind.PUBLISHER,
-    "offers",
-    "offered",
-    "subscription that requests",
-    lambda found, expected: comparisons(offered=found, requested=expected),
-)
-_SUBSCRIPTION = _Side(
-    Kind.SUBSCRIPTION,
-    "requests",
-    "requested",
-    "publisher that offers",
-    lambda found, expected: comparisons(offered=expected, requested=found),
-)
-
-
 @check("qos.offered", Subject.RECORDING, Profile)
 def offered(recording: Recording, parameters: Profile) -> Finding:
     """Publishers on the topic offer the expected QoS.
@@ -117,7 +85,7 @@ def offered(recording: Recording, parameters: Profile) -> Finding:
     Judged by what DDS discovered of every publisher of the student's on the topic; only the
     policies that are named in the parameters count. Queue depth is judged by qos.depth.
     """
-    return _judge(recording, parameters, _PUBLISHER)
+    return _judge(recording, parameters, Kind.PUBLISHER)
 
 
 @check("qos.requested", Subject.RECORDING, Profile)
@@ -127,31 +95,30 @@ def requested(recording: Recording, parameters: Profile) -> Finding:
     Judged by what DDS discovered of every subscription of the student's to the topic; only the
     policies that are named in the parameters count.
     """
-    return _judge(recording, parameters, _SUBSCRIPTION)
+    return _judge(recording, parameters, Kind.SUBSCRIPTION)
 
 
-def _judge(recording: Recording, parameters: Profile, side: _Side) -> Finding:
-    words = ", ".join(f"{name} {_words(item)}" for name, item in parameters.policies.items())
-    expected = f"the {side.kind.value} on {code(parameters.topic)} {side.has} {words}"
-    cause = why_no_endpoint(recording, side.kind, parameters.topic)
+def _judge(recording: Recording, parameters: Profile, kind: Kind) -> Finding:
+    has, did, _ = _WORDS[kind]
+    wanted = ", ".join(f"{name} {_words(item)}" for name, item in parameters.policies.items())
+    expected = f"the {kind.value} on {code(parameters.topic)} {has} {wanted}"
+    cause = why_no_endpoint(recording, kind, parameters.topic)
     if cause is not None:
         return cause.finding(expected)
-    endpoints = recording.student_endpoints(side.kind, parameters.topic)
+    endpoints = recording.student_endpoints(kind, parameters.topic)
     profiles = [(item.node, item.qos) for item in endpoints]
     source = ""
     if not endpoints and set(parameters.policies) <= _DECLARED_POLICIES:
-        # One that published and was destroyed before anybody could look at it.
-        profiles += declarations.profiles(recording, side.kind, parameters.topic)
+        # One that published and was destroyed before it could be discovered.
+        profiles += declarations.profiles(recording, kind, parameters.topic)
         source = ", declared by the process"
     for node, qos in profiles:
         wrong = _wrong(qos, parameters)
         if wrong:
-            at = endpoints_seen(recording, [item for item in endpoints if item.qos is qos])
-            at = at or tuple(
-                Moment("message published", recording.since_launch_s(item.stamp_ns))
-                for item in recording.on(parameters.topic)[:1]
-            )
-            return _mismatch(node, qos, wrong, parameters, expected, side, source, at)
+            own = [item for item in endpoints if item.qos is qos]
+            messages = recording.on(parameters.topic)
+            seen = endpoints_seen(recording, own) or first_seen(recording, messages)
+            return _mismatch(parameters, kind, (node, qos), wrong, source, expected, seen)
     hidden = [
         name
         for name in parameters.policies
@@ -160,10 +127,8 @@ def _judge(recording: Recording, parameters: Profile, side: _Side) -> Finding:
     ]
     if hidden or not profiles:
         names = ", ".join(hidden) or "QoS"
-        return Finding.error(expected, f"{names} of the {side.kind.value} was not discovered")
-    return Finding.passed(
-        expected, f"{side.did} by {counted(len(profiles), side.kind.value)}{source}"
-    )
+        return Finding.error(expected, f"{names} of the {kind.value} was not discovered")
+    return Finding.passed(expected, f"{did} by {counted(len(profiles), kind.value)}{source}")
 
 
 def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
@@ -172,63 +137,45 @@ def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
     for name, wanted in parameters.policies.items():
         if name in _WORD_POLICIES:
             actual = getattr(qos, name)
-            if actual not in (wanted, "unknown"):
-                found[name] = wanted, actual
+            right = actual in (wanted, "unknown")
         else:
-            actual_s = getattr(qos, _DURATION_POLICIES[name])
-            if actual_s is None or not math.isclose(actual_s, wanted, rel_tol=_SAME_DURATION):
-                found[name] = wanted, actual_s
+            actual = getattr(qos, _DURATION_POLICIES[name][0])
+            right = actual is not None and math.isclose(actual, wanted, rel_tol=_SAME_DURATION)
+        if not right:
+            found[name] = wanted, actual
     return found
 
 
 def _mismatch(
-    node: str,
-    qos: Qos,
-    wrong: dict[str, tuple[Any, Any]],
     parameters: Profile,
-    expected: str,
-    side: _Side,
+    kind: Kind,
+    found: tuple[str, Qos],
+    wrong: dict[str, tuple[Any, Any]],
     source: str,
+    expected: str,
     moments: tuple[Moment, ...],
 ) -> Finding:
-    found = side.comparisons(qos, parameters.qos)
-    refused = {item.policy for item in found if item.compatible is False}
-    observed = f"the {side.kind.value} of {code(node)} {side.has} " + ", ".join(
+    node, qos = found
+    has, did, other_end = _WORDS[kind]
+    refused = refusals(*sides(kind, qos, parameters.qos))
+    differences = ", ".join(
         f"{name} {_words(actual)} instead of {_words(wanted)}"
         for name, (wanted, actual) in wrong.items()
     )
-    observed += source
+    observed = f"the {kind.value} of {code(node)} {has} {differences}{source}"
     if refused:
-        observed += f": a {side.partner} the expected profile does not match it"
+        observed += f": a {other_end} the expected profile does not match it"
     else:
-        observed += f"; a {side.partner} the expected profile would still match it"
-    rows = tuple(
-        (
-            name,
-            _words(wanted),
-            _words(actual),
-            "no" if _POLICIES.get(name, name) in refused else "yes",
-        )
-        for name, (wanted, actual) in wrong.items()
-    )
-    header = ("policy", "expected", side.did, "compatible")
-    return Finding.failed(
-        expected,
-        observed,
-        _hint(parameters, side, wrong),
-        Evidence(
-            moments=moments,
-            tables=(Table("Requested against offered", header, rows),),
-        ),
-    )
+        observed += f"; a {other_end} the expected profile would still match it"
+    rows = tuple((name, _words(wanted), _words(actual)) for name, (wanted, actual) in wrong.items())
+    table = Table("Requested against offered", ("policy", "expected", did), rows)
+    evidence = Evidence(moments=moments, tables=(table,))
+    return Finding.failed(expected, observed, _hint(parameters, kind, wrong), evidence)
 
 
-def _hint(parameters: Profile, side: _Side, wrong: Collection[str]) -> str:
-    asked = {name: item for name, item in parameters.policies.items() if name in _WORD_POLICIES}
-    default = {"reliability": "reliable", "durability": "volatile", "liveliness": "automatic"}
-    if len(asked) == len(parameters.policies) and all(
-        default[name] == item for name, item in asked.items()
-    ):
+def _hint(parameters: Profile, kind: Kind, wrong: Collection[str]) -> str:
+    asked = parameters.policies
+    if all(_WORD_POLICIES.get(name) == item for name, item in asked.items()):
         hint = "A number as QoS, such as 10, is the default profile: reliable and volatile."
         if "reliability" in wrong:
             hint += " qos_profile_sensor_data is best_effort."
@@ -238,11 +185,10 @@ def _hint(parameters: Profile, side: _Side, wrong: Collection[str]) -> str:
     arguments = ", ".join(
         f"{name}={name.capitalize()}Policy.{item.upper()}"
         if name in _WORD_POLICIES
-        else f"{_ARGUMENTS.get(name, name)}=Duration(seconds={item:g})"
-        for name, item in parameters.policies.items()
+        else f"{_DURATION_POLICIES[name][1]}=Duration(seconds={item:g})"
+        for name, item in asked.items()
     )
-    create = "create_publisher" if side.kind is Kind.PUBLISHER else "create_subscription"
-    return f"Give {create} a profile: QoSProfile(depth=10, {arguments}), from rclpy.qos."
+    return f"Give create_{kind.value} a profile: QoSProfile(depth=10, {arguments}), from rclpy.qos."
 
 
 def _words(value: Any) -> str:
@@ -273,32 +219,19 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
     if cause is not None:
         return cause.finding(expected)
     declared = declarations.queues(recording, kind, parameters.topic)
-    own = recording.student_endpoints(kind, parameters.topic)
-    seen = endpoints_seen(recording, own) or first_seen(recording, recording.on(parameters.topic))
-    evidence = Evidence(moments=seen)
-    for queue in declared:
-        if queue.history == "keep_all":
-            return Finding.failed(
-                expected,
-                "history keep_all, declared by the process: the depth has no meaning then",
-                _depth_hint(parameters),
-                evidence,
-            )
-        if queue.depth is not None and queue.depth != parameters.depth:
-            return Finding.failed(
-                expected,
-                f"depth {queue.depth}, declared by the process",
-                _depth_hint(parameters),
-                evidence,
-            )
     shown = _kept(recording, parameters)
-    if shown not in (None, parameters.depth):
-        but = f"depth {parameters.depth} is declared, but " if declared else ""
+    observed = _wrong_depth(parameters, declared, shown)
+    if observed:
+        own = recording.student_endpoints(kind, parameters.topic)
+        messages = recording.on(parameters.topic)
+        seen = endpoints_seen(recording, own) or first_seen(recording, messages)
+        third = "third" if kind is Kind.PUBLISHER else "fourth"
         return Finding.failed(
             expected,
-            f"{but}the heartbeats of the publisher show that it keeps {counted(shown, 'message')}",
-            _depth_hint(parameters),
-            evidence,
+            observed,
+            f"The {third} argument of create_{kind.value} is the depth, or a QoSProfile that has "
+            f"it beside the other policies: QoSProfile(depth={parameters.depth}, ...).",
+            Evidence(moments=seen),
         )
     if any(queue.depth is None for queue in declared):
         return Finding.error(expected, "the depth cannot be seen: the process declared no number")
@@ -307,6 +240,22 @@ def depth(recording: Recording, parameters: Depth) -> Finding:
         return why_undeclared(recording, what).finding(expected)
     source = "declared by the process" if declared else "as the heartbeats of the publisher show"
     return Finding.passed(expected, f"depth {parameters.depth}, {source}")
+
+
+def _wrong_depth(
+    parameters: Depth, declared: tuple[declarations.DeclaredQueue, ...], shown: int | None
+) -> str:
+    """What shows another depth than the expected one, or nothing."""
+    for queue in declared:
+        if queue.history == "keep_all":
+            return "history keep_all, declared by the process: the depth has no meaning then"
+        if queue.depth not in (None, parameters.depth):
+            return f"depth {queue.depth}, declared by the process"
+    if shown is None or shown == parameters.depth:
+        return ""
+    but = f"depth {parameters.depth} is declared, but " if declared else ""
+    keeps = f"it keeps {counted(shown, 'message')}"
+    return f"{but}the heartbeats of the publisher show that {keeps}"
 
 
 def _kept(recording: Recording, parameters: Depth) -> int | None:
@@ -328,11 +277,3 @@ def _kept(recording: Recording, parameters: Depth) -> int | None:
         if item.kept > parameters.depth or (full and 2 * item.kept < parameters.depth):
             return item.kept
     return parameters.depth if {item.kept for item in own} == {parameters.depth} else None
-
-
-def _depth_hint(parameters: Depth) -> str:
-    third = "third" if parameters.kind == "publisher" else "fourth"
-    return (
-        f"The {third} argument of create_{parameters.kind} is the depth, or a QoSProfile that has "
-        f"it beside the other policies: QoSProfile(depth={parameters.depth}, ...)."
-    )

@@ -14,12 +14,16 @@ from grader.checks.wording import code
 from grader.diagnosis.destroyed_endpoint import why_unpublished
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.measure import declarations
-from grader.measure.compatibility import comparisons, compatibility_table, refusals
+from grader.measure.compatibility import comparisons, compatibility_table, refusals, sides
 from grader.recording.model import Endpoint, Kind, Qos, Recording
 from grader.spec.name import Durability, Id, Reliability, TopicName
 from grader.spec.quantity import Duration
 
-_DEFAULT = Qos(reliability="reliable", durability="volatile", liveliness="automatic")
+_RULE = "A subscription receives nothing from a publisher that offers less than it requests."
+_HINT = (
+    "Give create_{} a QoSProfile with the policies that are asked for; a number, such as 10, is "
+    "the default: reliable and volatile."
+)
 
 
 class Compatible(Parameters):
@@ -67,10 +71,10 @@ class Compatible(Parameters):
             joins = [item for item in recording.joins if item.name == self.joiner]
             return joins[0].qos if joins else None
         return Qos(
-            reliability=self.reliability or _DEFAULT.reliability,
-            durability=self.durability or _DEFAULT.durability,
+            reliability=self.reliability or "reliable",
+            durability=self.durability or "volatile",
             deadline_s=self.deadline,
-            liveliness=self.liveliness or _DEFAULT.liveliness,
+            liveliness=self.liveliness or "automatic",
             liveliness_lease_s=self.lease,
         )
 
@@ -86,11 +90,11 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     publishers offer that are there when it is created. Only the process can declare that.
     """
     kind = Kind(parameters.kind)
-    who = f"a {'subscription' if kind is Kind.PUBLISHER else 'publisher'}"
+    other = "subscription" if kind is Kind.PUBLISHER else "publisher"
     peer = parameters.peer(recording)
-    wish = "matches" if parameters.expect == "match" else "does not match"
+    verb = "matches" if parameters.expect == "match" else "does not match"
     profile = f" ({_words(peer)})" if peer else ""
-    expected = f"{who}{profile} {wish} the {kind.value} on {code(parameters.topic)}"
+    expected = f"a {other}{profile} {verb} the {kind.value} on {code(parameters.topic)}"
     cause = why_no_endpoint(recording, kind, parameters.topic)
     if cause is not None:
         return cause.finding(expected)
@@ -102,86 +106,62 @@ def compatible(recording: Recording, parameters: Compatible) -> Finding:
     if not endpoints:
         return Finding.error(expected, f"the {kind.value} was not discovered")
     for endpoint in endpoints:
-        offered, requested = _sides(kind, endpoint, peer)
-        refused = refusals(offered, requested)
-        evidence = Evidence(
-            moments=endpoints_seen(recording, (endpoint,)),
-            tables=(compatibility_table(offered, requested),),
-        )
-        if refused and parameters.expect == "refuse":
-            open_ = _left_open(recording, kind, endpoint, peer)
-            if open_:
-                return Finding.failed(
-                    expected, _open_words(endpoint, open_), _profile_hint(kind), evidence
-                )
-        if bool(refused) is (parameters.expect == "refuse"):
-            continue
-        if refused:
-            return Finding.failed(
-                expected,
-                f"the {kind.value} of {code(endpoint.node)} and this peer do not match: "
-                + ", ".join(refused),
-                "A subscription receives nothing from a publisher that offers less than it "
-                f"requests. {_profile_hint(kind)}",
-                evidence,
+        pair = sides(kind, endpoint.qos, peer)
+        refused = refusals(*pair)
+        own = f"the {kind.value} of {code(endpoint.node)}"
+        left_open = _left_open(recording, endpoint, pair)
+        hint = _HINT.format(kind.value)
+        if refused and parameters.expect == "match":
+            observed = f"{own} and this peer do not match: {', '.join(refused)}"
+            hint = f"{_RULE} {hint}"
+        elif refused and left_open:
+            taken = ", ".join(str(getattr(endpoint.qos, policy)) for policy in left_open)
+            observed = (
+                f"{own} asks for the best available {' and '.join(left_open)}, declared by the "
+                "process: it requests what the publishers offer that are there when it is created, "
+                f"here {taken}, and would match this peer alone"
             )
-        return Finding.failed(
-            expected,
-            f"the {kind.value} of {code(endpoint.node)} and this peer match: no policy of what is "
-            "offered is weaker than what is requested",
-            _profile_hint(kind),
-            evidence,
+        elif not refused and parameters.expect == "refuse":
+            observed = (
+                f"{own} and this peer match: no policy of what is offered is weaker than what is "
+                "requested"
+            )
+        else:
+            continue
+        evidence = Evidence(
+            moments=endpoints_seen(recording, (endpoint,)), tables=(compatibility_table(*pair),)
         )
-    offered, requested = _sides(kind, endpoints[0], peer)
-    evidence = Evidence(tables=(compatibility_table(offered, requested),))
-    contradiction = _contradiction(recording, parameters)
-    destroyed = why_unpublished(recording, parameters.topic, "they did not meet")
-    if contradiction and destroyed is not None and parameters.expect == "match":
-        return destroyed.finding(expected)
-    if contradiction:
-        return Finding.to_repeat(expected, contradiction)
-    reasons = refusals(offered, requested)
-    return Finding.passed(expected, ", ".join(reasons) or "no policy stands against it", evidence)
+        return Finding.failed(expected, observed, hint, evidence)
+    join = next((item for item in recording.joins if item.name == parameters.joiner), None)
+    matched = join is not None and join.matched_ns is not None
+    if join is not None and matched is not (parameters.expect == "match"):
+        # What happened to the late joiner is not what the rules say.
+        destroyed = why_unpublished(recording, parameters.topic, "they did not match")
+        if destroyed is not None and not matched:
+            return destroyed.finding(expected)
+        did = "matched" if matched else "was never matched"
+        return Finding.to_repeat(
+            expected, f"by the rules of DDS it is so, but {code(join.name)} {did}"
+        )
+    pair = sides(kind, endpoints[0].qos, peer)
+    return Finding.passed(
+        expected,
+        ", ".join(refusals(*pair)) or "no policy stands against it",
+        Evidence(tables=(compatibility_table(*pair),)),
+    )
 
 
-def _sides(kind: Kind, endpoint: Endpoint, peer: Qos) -> tuple[Qos, Qos]:
-    """What is offered, what is requested."""
-    return (endpoint.qos, peer) if kind is Kind.PUBLISHER else (peer, endpoint.qos)
-
-
-def _left_open(recording: Recording, kind: Kind, endpoint: Endpoint, peer: Qos) -> tuple[str, ...]:
+def _left_open(recording: Recording, endpoint: Endpoint, pair: tuple[Qos, Qos]) -> tuple[str, ...]:
     """Policies by which a subscription refuses the peer only because of others that were there.
 
     None where another policy refuses it all the same. What a publisher offers as the best
     available is always the strongest.
     """
-    if kind is not Kind.SUBSCRIPTION:
+    if endpoint.kind is Kind.PUBLISHER:
         return ()
-    open_ = declarations.left_open(recording, kind, endpoint.topic, endpoint.node)
-    offered, requested = _sides(kind, endpoint, peer)
-    deciding = [item.policy for item in comparisons(offered, requested) if item.compatible is False]
+    open_ = declarations.left_open(recording, endpoint.kind, endpoint.topic, endpoint.node)
+    deciding = [item.policy for item in comparisons(*pair) if item.compatible is False]
     return tuple(deciding) if open_.issuperset(deciding) else ()
-
-
-def _open_words(endpoint: Endpoint, policies: tuple[str, ...]) -> str:
-    names = " and ".join(policies)
-    taken = ", ".join(str(getattr(endpoint.qos, policy)) for policy in policies)
-    return (
-        f"the subscription of {code(endpoint.node)} asks for the best available {names}, declared "
-        "by the process: it requests what the publishers offer that are there when it is made, "
-        f"here {taken}; to this peer alone it would give way"
-    )
-
-
-def _contradiction(recording: Recording, parameters: Compatible) -> str:
-    """What happened to the late joiner is not what the rules say: discovery failed."""
-    for join in recording.joins:
-        if join.name == parameters.joiner:
-            matched = join.matched_ns is not None
-            if matched is not (parameters.expect == "match"):
-                did = "matched" if matched else "was never matched"
-                return f"by the rules of DDS it is so, but {code(join.name)} {did}"
-    return ""
 
 
 def _words(qos: Qos) -> str:
@@ -192,11 +172,3 @@ def _words(qos: Qos) -> str:
     if qos.liveliness_lease_s is not None:
         words.append(f"liveliness lease {qos.liveliness_lease_s:g} s")
     return ", ".join(words)
-
-
-def _profile_hint(kind: Kind) -> str:
-    create = "create_publisher" if kind is Kind.PUBLISHER else "create_subscription"
-    return (
-        f"Give {create} a QoSProfile with the policies that are asked for; a number, such as 10, "
-        "is the default: reliable and volatile."
-    )
