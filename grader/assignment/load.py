@@ -60,27 +60,22 @@ class LoadedAssignment:
         return tuple(one for one in self.assignment.scenarios if not wanted or one.id in wanted)
 
 
-def list_assignments(folder: Path | None = None) -> tuple[str, ...]:
-    """Ids of the assignments in a folder, by default rosgrade's own, sorted."""
-    folder = resources.assignments() if folder is None else folder
-    return tuple(sorted(file.parent.name for file in folder.glob(f"*/{ASSIGNMENT_FILE}")))
+def list_assignments() -> tuple[str, ...]:
+    """Ids of rosgrade's own assignments, sorted."""
+    files = resources.assignments().glob(f"*/{ASSIGNMENT_FILE}")
+    return tuple(sorted(file.parent.name for file in files))
 
 
-def find_assignment(name: str | Path, folder: Path | None = None) -> Path:
-    """Find the YAML file of an assignment.
-
-    Args:
-        folder: Where ids are looked up, by default rosgrade's own assignments.
-    """
+def find_assignment(name: str | Path) -> Path:
+    """Find the YAML file of an assignment by its id, its folder, or itself."""
     given = Path(name)
     if given.is_file():
         return given
     if (given / ASSIGNMENT_FILE).is_file():
         return given / ASSIGNMENT_FILE
-    folder = resources.assignments() if folder is None else folder
-    known = list_assignments(folder)
+    known = list_assignments()
     if str(name) in known:
-        return folder / str(name) / ASSIGNMENT_FILE
+        return resources.assignments() / str(name) / ASSIGNMENT_FILE
     if given.is_dir():
         raise UsageError(f"{given}: there is no {ASSIGNMENT_FILE} in it")
     if given.name != str(name) or given.suffix:
@@ -101,20 +96,17 @@ def refuse_swapped(name: str, submission: Path) -> None:
 
 
 def load_assignment(
-    name: str | Path, catalogue: Mapping[str, Check] = CATALOGUE, folder: Path | None = None
+    name: str | Path, catalogue: Mapping[str, Check] = CATALOGUE
 ) -> LoadedAssignment:
     """Load an assignment.
 
     Mistakes in its form are told first; once there are none, what does not fit together.
 
-    Args:
-        folder: Where ids are looked up, by default rosgrade's own assignments.
-
     Raises:
-        UsageError: There is no such assignment, or it is a file of another kind.
+        UsageError: There is no such assignment.
         AssignmentError: With every mistake in it that was found.
     """
-    file = find_assignment(name, folder)
+    file = find_assignment(name)
     source = read_source(file)
     assignment = source.read(Assignment)
     try:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from grader.spec.document import Place
-from grader.spec.nearest_name import did_you_mean, nearest
+from grader.spec.nearest_name import did_you_mean, nearest, nearest_or_all
 
 
 def mistakes(
@@ -40,9 +40,8 @@ def mistakes(
         elif found["type"] == "extra_forbidden":
             allowed = _keys(model, found["loc"][:-1])
             meant.add((place[:-1], nearest(key, allowed)))
-            listed = f" Allowed here: {', '.join(sorted(allowed))}."
-            listed = listed if allowed else " None are allowed here."
-            unknown.append((place, f"unknown key {key!r}.{did_you_mean(key, allowed) or listed}"))
+            advice = nearest_or_all(key, sorted(allowed), "Allowed here")
+            unknown.append((place, f"unknown key {key!r}.{advice}"))
         elif not _is_echo(dict(found)):
             others.setdefault(place, []).append(_text(found["type"], dict(found)))
     return [
@@ -79,12 +78,6 @@ def _text(kind: str, found: dict[str, Any]) -> str:
         word, key = ("least", "min_length") if kind == "too_short" else ("most", "max_length")
         count = context[key]
         return f"expected at {word} {count} {'entry' if count == 1 else 'entries'}"
-    if kind == "union_tag_not_found":
-        return f"the key {context['discriminator']} is missing: it tells what this entry is"
-    if kind == "union_tag_invalid":
-        allowed = [part.strip("'") for part in context["expected_tags"].split(", ")]
-        advice = did_you_mean(str(context["tag"]), allowed) or f" Allowed: {', '.join(allowed)}."
-        return f"{context['discriminator']} is unknown: {context['tag']!r}.{advice}"
     message = str(found["msg"])
     if kind in ("value_error", "quantity"):
         return message.removeprefix("Value error, ")
@@ -146,7 +139,7 @@ def _keys(model: type[BaseModel], loc: Place) -> set[str]:
             for found in _models_in(field.annotation)
         ]
         # Anything else than a field is the tag of a union, or a key of a mapping of models.
-        tagged = [one for one in current if step in (one.__name__, *_tags(one))]
+        tagged = [one for one in current if step == one.__name__]
         current = inner or tagged or current
     return {field.alias or name for one in current for name, field in one.model_fields.items()}
 
@@ -155,10 +148,3 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [found for part in get_args(annotation) for found in _models_in(part)]
-
-
-def _tags(model: type[BaseModel]) -> set[str]:
-    literals = [
-        f.annotation for f in model.model_fields.values() if get_origin(f.annotation) is Literal
-    ]
-    return {value for one in literals for value in get_args(one) if isinstance(value, str)}

@@ -16,8 +16,6 @@ from grader.spec.mistake import mistakes
 
 M = TypeVar("M", bound=BaseModel)
 
-MAX_BYTES = 256 * 1024
-
 
 class Model(BaseModel):
     """Base of everything read from YAML: frozen, and unknown keys are errors."""
@@ -57,11 +55,6 @@ class Source:
         """A problem at a place of this document."""
         return Problem(message=message, line=self.line(place), where=path(place))
 
-    def entries(self, key: str) -> list[Any]:
-        """The list under a key at the top, or an empty one where there is no list."""
-        value = self.data.get(key)
-        return value if isinstance(value, list) else []
-
     def duplicates(self, name: str, *keys: str) -> Iterator[Problem]:
         """Entries of some lists that have the name of an earlier one.
 
@@ -71,7 +64,7 @@ class Source:
         """
         seen: dict[str, Place] = {}
         for key in keys:
-            for index, entry in enumerate(self.entries(key)):
+            for index, entry in enumerate(self.data.get(key, ())):
                 place: Place = (key, index, name)
                 value = entry.get(name)
                 if seen.setdefault(value, place) != place:
@@ -118,15 +111,12 @@ def read_source(file: Path) -> Source:
 
     Raises:
         UsageError: The file does not exist or cannot be read.
-        AssignmentError: It is not YAML, has a key twice, or is absurdly large.
+        AssignmentError: It is not YAML, has a key twice, or uses types of its own.
     """
     try:
-        with file.open("rb") as stream:
-            raw = stream.read(MAX_BYTES + 1)
+        raw = file.read_bytes()
     except OSError as error:
         raise UsageError(f"{file}: {error.strerror or error}") from error
-    if len(raw) > MAX_BYTES:
-        raise AssignmentError(file, [Problem(f"larger than {MAX_BYTES // 1024} KiB")])
     try:
         text = raw.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -113,7 +113,7 @@ def test_the_title_in_the_yaml_wins(write: Write, catalogue: Catalogue) -> None:
         ),
         (
             "{id: a, points: 1, uses: node.alive, with: {name: bot}}",
-            "checks[0].with.name: unknown key 'name'. None are allowed here.",
+            "checks[0].with.name: unknown key 'name'. Allowed here: none.",
         ),
         (
             "{id: a, points: 1, uses: node.alive, requires: [b]}",
@@ -407,25 +407,24 @@ def test_a_file_of_another_name_may_have_any_id(write: Write, catalogue: Catalog
     assert load_assignment(draft, catalogue).sha256 == before
 
 
+@pytest.fixture
+def lesson(write: Write, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The YAML of the only assignment that rosgrade has."""
+    file = write() / "assignment.yaml"
+    monkeypatch.setattr("grader.resources.assignments", lambda: file.parent.parent)
+    return file
+
+
 def test_an_assignment_is_found_by_id_folder_and_file(
-    write: Write, monkeypatch: pytest.MonkeyPatch
+    lesson: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file = write() / "assignment.yaml"
-    everywhere = file.parent.parent
-    assert find_assignment("lesson", everywhere) == file
-    assert find_assignment(file, everywhere) == file
-    assert find_assignment(file.parent, everywhere) == file
-    monkeypatch.chdir(file.parent)
-    assert find_assignment(".", everywhere).resolve() == file
-
-
-def test_a_submission_in_a_folder_called_like_the_assignment_does_not_hide_it(
-    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file = write() / "assignment.yaml"
+    assert {find_assignment(name) for name in ("lesson", lesson, lesson.parent)} == {lesson}
+    # A submission in a folder called like the assignment does not hide it.
     (tmp_path / "work" / "lesson").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "work")
-    assert find_assignment("lesson", file.parent.parent) == file
+    assert find_assignment("lesson") == lesson
+    monkeypatch.chdir(lesson.parent)
+    assert find_assignment(".").resolve() == lesson
 
 
 @pytest.mark.parametrize(
@@ -439,24 +438,18 @@ def test_a_submission_in_a_folder_called_like_the_assignment_does_not_hide_it(
         ),
         ("no/such/folder", "no/such/folder: no such file or folder"),
         ("missing.yaml", "missing.yaml: no such file or folder"),
+        (Path(__file__).parent, "there is no assignment.yaml in it"),
     ],
 )
-def test_an_unknown_assignment_names_the_nearest(write: Write, name: str, said: str) -> None:
+@pytest.mark.usefixtures("lesson")
+def test_an_unknown_assignment_names_the_nearest(name: str | Path, said: str) -> None:
     with pytest.raises(UsageError, match=re.escape(said)):
-        find_assignment(name, write().parent)
+        find_assignment(name)
 
 
-def test_a_folder_without_an_assignment_is_told(write: Write, tmp_path: Path) -> None:
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    with pytest.raises(UsageError, match=r"empty: there is no assignment\.yaml in it"):
-        find_assignment(empty, write().parent)
-
-
-def test_only_folders_with_an_assignment_are_listed(write: Write, tmp_path: Path) -> None:
-    write()
-    (tmp_path / "notes").mkdir()
-    assert list_assignments(tmp_path) == ("lesson",)
+def test_only_folders_with_an_assignment_are_listed(lesson: Path) -> None:
+    (lesson.parent.parent / "notes").mkdir()
+    assert list_assignments() == ("lesson",)
 
 
 def test_the_hash_tells_every_change_of_the_folder_but_caches(

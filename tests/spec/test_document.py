@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from grader.errors import AssignmentError, UsageError
 from grader.spec.document import path
-from grader.spec.source import MAX_BYTES, parse_source, read_source
+from grader.spec.source import parse_source, read_source
 
 FILE = Path("assignment.yaml")
 
@@ -181,27 +181,9 @@ def test_all_double_keys_are_told_at_once() -> None:
     assert len(error("a: 1\na: 2\nb: 1\nb: 2").splitlines()) == 2
 
 
-def test_aliases_that_multiply_are_refused_at_once() -> None:
-    bomb = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n"
-    for old, new in zip("abcdefgh", "bcdefghi", strict=True):
-        bomb += f"{new}: &{new} [{', '.join([f'*{old}'] * 10)}]\n"
-    assert "more than 20000 values" in error(bomb)
-
-
-def test_an_alias_of_itself_is_refused() -> None:
-    assert "does an alias contain itself?" in error("a: &a\n  - 1\n  - [*a]\n")
-
-
-@pytest.mark.parametrize("depth", [60, 3_000, 100_000])
-def test_deep_nesting_is_refused(depth: int) -> None:
-    assert "deep" in error("a: " + "[" * depth + "]" * depth)
-
-
-def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
-    file = tmp_path / "assignment.yaml"
-    file.write_bytes(b"# " + b"x" * MAX_BYTES)
-    with pytest.raises(AssignmentError, match="larger than 256 KiB"):
-        read_source(file)
+@pytest.mark.parametrize("text", ["a: &a\n  - 1\n  - [*a]\n", "a: " + "[" * 3_000 + "]" * 3_000])
+def test_endless_or_deep_nesting_is_refused(text: str) -> None:
+    assert "nested too deeply (does an alias contain itself?)" in error(text)
 
 
 def test_another_encoding_is_named_with_its_line(tmp_path: Path) -> None:
