@@ -27,11 +27,7 @@ _ZERO = {"bool": False, **dict.fromkeys(FLOATS, 0.0), **dict.fromkeys(TEXTS, "")
 def problems(
     source: Source, assignment: Assignment, checks: Sequence[BoundCheck], known: Interfaces
 ) -> Iterator[Problem]:
-    """Find fields that the messages do not have; where a definition is not at hand, none.
-
-    Args:
-        checks: Its checks, in order.
-    """
+    """Find fields that the messages do not have; where a definition is not at hand, none."""
     for index, bound in enumerate(checks):
         for named in bound.parameters.named_fields():
             for interface in _types(assignment, bound, named.endpoint):
@@ -77,11 +73,7 @@ def _lack(named: NamedFields, message: dict[str, Any]) -> str:
 
 
 def _sample(interface: str, find: Find, around: tuple[str, ...]) -> dict[str, Any]:
-    """A message of a type, with one value in each of its arrays.
-
-    Raises:
-        KeyError: A definition is missing, or the message holds itself.
-    """
+    """A message of a type, with one value in each of its arrays."""
     if interface in around:
         raise KeyError(interface)
     found: dict[str, Any] = {}

@@ -80,9 +80,6 @@ def problems(
 
     A package of Jazzy that is not installed here, and one that the solution ``depends`` on, may
     well have it: another machine will tell.
-
-    Args:
-        checks: Its checks, in order.
     """
     handed_in = {package.name for package in assignment.packages}
     elsewhere = {name for package in assignment.packages for name in package.depends} | PACKAGES

@@ -12,11 +12,7 @@ from grader.submission.read.dependencies import is_known, meant
 
 
 def lint_warnings(loaded: LoadedAssignment, mutants: Sequence[Mutant] | None) -> Iterator[str]:
-    """Find what an author should look at once more.
-
-    Args:
-        mutants: Its mutants, or None where it has no such file.
-    """
+    """Find what an author should look at once more."""
     yield from _unknown_topics(loaded)
     yield from _shown_runs(loaded)
     yield from _dependencies(loaded.assignment)

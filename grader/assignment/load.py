@@ -101,10 +101,6 @@ def load_assignment(
     """Load an assignment.
 
     Mistakes in its form are told first; once there are none, what does not fit together.
-
-    Raises:
-        UsageError: There is no such assignment.
-        AssignmentError: With every mistake in it that was found.
     """
     file = find_assignment(name)
     source = read_source(file)

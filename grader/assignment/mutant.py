@@ -203,11 +203,6 @@ class MutantVerdict:
         """Write what is wrong in one line; nothing if all is well."""
         return "; ".join([*map(str, self.differences), *([self.problem] if self.problem else [])])
 
-    @property
-    def judged(self) -> bool:
-        """Whether no check ended as ``error``: otherwise the machine failed, not a check."""
-        return all(one.actual is not Status.ERROR for one in self.differences)
-
 
 def verdict(expected: Mapping[str, Status], actual: Mapping[str, Status]) -> MutantVerdict:
     """Compare how checks ended with how they must end, by id of the check."""
@@ -231,11 +226,7 @@ class Mutants:
 
 
 def reference_of(assignment: str, folder: Path | None = None) -> Path:
-    """The folder of an assignment's reference solution.
-
-    Args:
-        folder: Of the assignment.
-    """
+    """The folder of an assignment's reference solution: beside it, or rosgrade's own."""
     beside = folder / REFERENCE_FOLDER if folder is not None else None
     if beside is not None and beside.is_dir():
         return beside
@@ -247,12 +238,7 @@ def reference_of(assignment: str, folder: Path | None = None) -> Path:
 
 
 def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = None) -> Mutants:
-    """Read and check the mutants of an assignment.
-
-    Args:
-        reference: Folder of the reference solution, by default the one in the assignment's
-            folder or rosgrade's own.
-    """
+    """Read and check the mutants of an assignment, for :func:`reference_of` by default."""
     reference = reference_of(assignment.id, folder) if reference is None else reference
     source = read_source(folder / MUTANTS_FILE)
     content = source.read(MutantFile)
@@ -269,19 +255,12 @@ def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = 
 
 
 def apply(change: Change, reference: Path, target: Path) -> None:
-    """Write a changed copy of the reference.
-
-    Args:
-        target: Folder to write; it may exist, but must be empty.
-    """
+    """Write a changed copy of the reference into an empty folder."""
     files, found = mutate(change, _read(reference))
     if found:
         raise AssignmentError(
             reference, [Problem(f"{change.id!r} does not apply: {text}") for _, text in found]
         )
-    target.mkdir(parents=True, exist_ok=True)
-    if any(target.iterdir()):
-        raise UsageError(f"{target}: is not empty")
     for name, content in files.items():
         file = target / name
         file.parent.mkdir(parents=True, exist_ok=True)

@@ -47,11 +47,7 @@ class _User:
 def need_problems(
     assignment: Assignment, bound: BoundCheck, scenarios: Sequence[Scenario]
 ) -> Iterator[_Lack]:
-    """Find what a check needs and the assignment lacks.
-
-    Args:
-        scenarios: Those that the check judges.
-    """
+    """Find what a check needs and the assignment lacks."""
     user = _User(bound, assignment, scenarios)
     for need in bound.parameters.needs:
         yield from _lacks(need, user)
@@ -195,11 +191,7 @@ def _unnamed(
     does: str,
     wanted: str | None = None,
 ) -> Iterator[_Lack]:
-    """No stimulus is about what a parameter names.
-
-    Args:
-        wanted: What it is about, where the parameter is only a part of that.
-    """
+    """No stimulus is about what a parameter names."""
     wanted = wanted or user.value(key)
     if wanted is not None and wanted not in names:
         text = f"no stimulus of the scenario {scenario.id!r} {does} {wanted!r}."

@@ -35,12 +35,7 @@ _FORM = re.compile(r"([A-Za-z_]\w*\.py):([A-Za-z_]\w*)")
 
 @contextmanager
 def naming_place(folder: Path, prefix: str = "") -> Iterator[None]:
-    """Turn what the author's code raises into a ValueError with its file and line.
-
-    Args:
-        folder: Of the code.
-        prefix: Stands before the name of the file.
-    """
+    """Turn what the author's code raises into a ValueError with its file and line."""
     try:
         yield
     except SyntaxError as error:

@@ -20,11 +20,7 @@ from grader.spec.unit import format_duration
 def problems(
     source: Source, assignment: Assignment, bound: Sequence[BoundCheck | None]
 ) -> Iterator[Problem]:
-    """Find everything that does not fit together.
-
-    Args:
-        bound: One per entry of ``checks``; None where it could not be bound.
-    """
+    """Find everything that does not fit together."""
     for key, name in (("packages", "name"), ("scenarios", "id"), ("checks", "id")):
         yield from source.duplicates(name, key)
     for index, scenario in enumerate(assignment.scenarios):

@@ -23,9 +23,6 @@ def select(
         checks: Judge only these and what they require; none means all.
         scenarios: Run only these; none means all that the checks need. A check whose
             scenarios are all left out is left out itself.
-
-    Raises:
-        UsageError: A name does not exist.
     """
     if not checks and not scenarios:
         return loaded
@@ -71,9 +68,6 @@ def visible_part(loaded: LoadedAssignment) -> LoadedAssignment:
 
     Args:
         loaded: The whole assignment; no visible check requires one that is not.
-
-    Raises:
-        UsageError: No check is visible.
     """
     specs = [bound.spec for bound in loaded.checks]
     visible = [spec for spec in specs if spec.visibility is Visibility.VISIBLE]

@@ -276,7 +276,7 @@ def unknown_type(symptom: NotGenerated) -> Cause | None:
             of_package, _, name = field.type.replace("/msg/", "/").rpartition("/")
             if of_package != interface.package or name in own:
                 continue
-            line = section.line_of(field.name)
+            line = section.lines.get(field.name)
             meant = nearest(name, PRIMITIVES)
             return Cause(
                 f"{definition.file}:{line} names the type {code(name)}, which is neither a type of "

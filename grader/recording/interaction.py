@@ -20,11 +20,7 @@ The first is called; the second where a node was made with ``start_parameter_ser
 
 
 def executor_services(node: str) -> tuple[str, ...]:
-    """The same of one node, by their full names.
-
-    Args:
-        node: Fully qualified name.
-    """
+    """The same of one node, by their full names."""
     return tuple(f"{node}/{name}" for name in EXECUTOR_SERVICES)
 
 

@@ -7,7 +7,7 @@ https://mcap.dev/spec/registry, "ros2msg"
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -97,16 +97,12 @@ class Section:
 
     Attributes:
         fields: In their order, which is the order of the bytes too.
-        lines: Name of each of them -> its line in the definition, from 1.
+        lines: Name of each field and constant -> its line in the definition, from 1.
     """
 
     fields: tuple[Field, ...]
     constants: tuple[Constant, ...]
-    lines: tuple[tuple[str, int], ...] = ()
-
-    def line_of(self, name: str) -> int | None:
-        """Line of a field or a constant."""
-        return dict(self.lines).get(name)
+    lines: Mapping[str, int]
 
 
 def sections_of(interface: str, text: str) -> tuple[Section, ...]:
@@ -126,7 +122,7 @@ def sections_of(interface: str, text: str) -> tuple[Section, ...]:
         Section(
             tuple(item for _, item in part if isinstance(item, Field)),
             tuple(item for _, item in part if isinstance(item, Constant)),
-            tuple((item.name, number) for number, item in part),
+            {item.name: number for number, item in part},
         )
         for part in parts
     )
@@ -198,11 +194,7 @@ def definition_finder(prefixes: Iterable[Path]) -> Callable[[str], str]:
 
 
 def concatenated_definition(interface: str, find: Callable[[str], str]) -> str:
-    """A definition with those of all messages that it contains, as a ``ros2msg`` schema has them.
-
-    Raises:
-        KeyError: A definition is missing.
-    """
+    """A definition with those of all messages that it contains, as a ``ros2msg`` schema has them."""
     texts: dict[str, str] = {}
     queue = [interface]
     while queue:

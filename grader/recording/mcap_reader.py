@@ -193,7 +193,8 @@ def read_topic(file: Path, topic: str) -> tuple[tuple[Message, ...], tuple[str, 
 
 def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
     """The messages that the probe or the simulator published, in that order."""
-    simulated = simulated_topics(recording)
+    scene = recording.scene
+    simulated = {scene.odometry_topic, scene.scan_topic} if scene else set()
     found: list[RawMessage] = []
     try:
         with file.open("rb") as stream:
@@ -207,12 +208,6 @@ def read_inputs(file: Path, recording: Recording) -> tuple[RawMessage, ...]:
     except OSError as error:
         raise UsageError(f"{file}: {error.strerror or error}") from error
     return tuple(sorted(found, key=lambda message: message.stamp_ns))
-
-
-def simulated_topics(recording: Recording) -> frozenset[str]:
-    """Topics on which the simulator published."""
-    scene = recording.scene
-    return frozenset({scene.odometry_topic, scene.scan_topic} if scene else ())
 
 
 def _frame(record: Metadata) -> dict[str, Any]:

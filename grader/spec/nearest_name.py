@@ -7,14 +7,7 @@ from difflib import get_close_matches
 
 
 def nearest(name: str, candidates: Iterable[str], *, cutoff: float = 0.6) -> str | None:
-    """Find the candidate that is most like ``name``.
-
-    Args:
-        cutoff: Least similarity in [0, 1], as in :func:`difflib.get_close_matches`.
-
-    Returns:
-        The nearest candidate, the alphabetically first of equals, or None.
-    """
+    """Find the candidate that is most like ``name``."""
     matches = get_close_matches(name, sorted(set(candidates)), n=1, cutoff=cutoff)
     return matches[0] if matches else None
 

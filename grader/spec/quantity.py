@@ -24,11 +24,7 @@ def refusal(text: str) -> PydanticCustomError:
 
 
 def written_as_read(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> CoreSchema:
-    """A schema for a value with a form of its own in YAML.
-
-    Args:
-        read: Makes the value from what the YAML has; raises a :func:`refusal`.
-    """
+    """A schema for a value with a form of its own in YAML."""
     return core_schema.no_info_plain_validator_function(
         read,
         serialization=core_schema.plain_serializer_function_ser_schema(

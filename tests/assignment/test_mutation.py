@@ -149,11 +149,3 @@ def test_a_reference_that_changed_since_is_told(tmp_path: Path, reference: Path)
     with pytest.raises(AssignmentError, match="'cmdvel' does not apply: the text stands 0 times"):
         apply(mutants.mutants[0], reference, tmp_path / "one")
     assert not (tmp_path / "one").exists()
-
-
-def test_a_mutant_is_never_mixed_with_something_else(tmp_path: Path, reference: Path) -> None:
-    mutants = load_mutants(LESSON, write(tmp_path, GOOD), reference)
-    (tmp_path / "one").mkdir()
-    (tmp_path / "one" / "notes").write_text("x")
-    with pytest.raises(UsageError, match="is not empty"):
-        apply(mutants.mutants[0], reference, tmp_path / "one")

@@ -104,7 +104,7 @@ FORM = [
     (publish("message: {}\nmessages: [{}]"), f"{ONE_WAY}, not message and messages"),
     (publish("messages: [{}, {}]"), "several messages need a pace: give 'every' or 'answer'"),
     (publish("from: cases.csv"), "several messages need a pace"),
-    (publish("message: {}\ncount: 3"), "'count' needs a pace"),
+    (publish("message: {}\ncount: 3"), "several messages need a pace"),
     (publish("messages: [{}]\ncount: 3"), "'count' says how often one 'message'"),
     (publish("message: {}\nbefore_launch: 1"), "unless the durability is transient_local"),
     (publish("message: {}\nwithin: 5"), "17: .*within: '5' has no unit|17: .*within: 5 has no"),

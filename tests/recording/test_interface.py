@@ -35,7 +35,7 @@ def test_fields_and_constants_of_a_message() -> None:
         Field("velocities", "float64", is_array=True, count=2),
     )
     assert found.constants == (Constant("BURGER", "uint8", "1"), Constant("WAFFLE", "uint8", "2"))
-    assert [found.line_of(name) for name in ("BURGER", "velocities", "speed")] == [2, 6, None]
+    assert [found.lines.get(name) for name in ("BURGER", "velocities", "speed")] == [2, 6, None]
 
 
 @pytest.mark.parametrize(

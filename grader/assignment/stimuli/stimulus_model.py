@@ -36,11 +36,7 @@ class Making:
     processes: Sequence[str]
 
     def process(self, key: str, executable: str, package: str | None) -> str:
-        """The launched process of an executable, of any package by default.
-
-        Args:
-            key: Of the stimulus, for errors.
-        """
+        """The launched process of an executable, of any package by default."""
         launched = [process.partition("/") for process in self.processes]
         fitting = [
             f"{its_package}/{name}"

@@ -157,7 +157,7 @@ def _compared(
     if not found:
         return Finding.passed(expected, f"so says {code(definition.file)}")
     places = [
-        SourceError(definition.file, section.line_of(item.name), item.text.replace("`", ""))
+        SourceError(definition.file, section.lines.get(item.name), item.text.replace("`", ""))
         for item, section in found
     ]
     return Finding.failed(

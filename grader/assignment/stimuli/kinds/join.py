@@ -41,16 +41,8 @@ class Join(StimulusModel):
 
     def order(self, making: Making) -> dict[str, Any]:
         """The subscription."""
-        return {
-            "kind": "JoinOrder",
-            "name": self.name,
-            "topic": self.join,
-            "type": self.type,
-            "reliability": self.reliability,
-            "durability": self.durability,
-            "depth": self.depth,
-            "after_s": self.after,
-        }
+        same = self.model_dump(include={"name", "type", "reliability", "durability", "depth"})
+        return {"kind": "JoinOrder", "topic": self.join, "after_s": self.after, **same}
 
     def mistakes(self, making: Making, scenario: Scenario) -> Iterator[tuple[Place, str]]:
         """Its name is another's, or it would hear the probe itself."""

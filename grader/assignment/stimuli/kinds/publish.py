@@ -96,11 +96,8 @@ class Publish(StimulusModel):
         if len(names) != 1:
             told = f"not {' and '.join(names)}" if names else "but none of them is there"
             raise ValueError(f"give the messages in one way of {', '.join(given)}, {told}")
-        if self.count is not None:
-            if self.message is None:
-                raise ValueError("'count' says how often one 'message' is published")
-            if self.count > max(1, self.before_launch) and not self._is_paced:
-                raise ValueError("'count' needs a pace: give 'every' or 'answer'")
+        if self.count is not None and self.message is None:
+            raise ValueError("'count' says how often one 'message' is published")
         if self.before_launch and self.durability == "volatile":
             raise ValueError(
                 "what is published 'before_launch' is lost for later subscriptions unless the "
@@ -116,6 +113,8 @@ class Publish(StimulusModel):
         read = self.from_ is not None and not self.from_.endswith(MCAP_SUFFIX)
         if read or self.python is not None:
             return not self.before_launch
+        if self.count is not None:
+            return self.count > max(1, self.before_launch)
         return len(self.messages) > self.before_launch + 1
 
     @property
@@ -139,10 +138,7 @@ class Publish(StimulusModel):
         return {
             "kind": "PublishOrder",
             "topic": self.publish,
-            "type": self.type,
-            "reliability": self.reliability,
-            "durability": self.durability,
-            "depth": self.depth,
+            **self.model_dump(include={"type", "reliability", "durability", "depth"}),
             "messages": [value for value, _ in due],
             "times_s": [time_s for _, time_s in due],
             "before_launch": self.before_launch,

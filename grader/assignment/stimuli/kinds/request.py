@@ -107,11 +107,6 @@ class CallService(StimulusModel):
         """Every request, in order."""
         return self.requests or ((self.request or {},) * (self.count or 1))
 
-    @classmethod
-    def accepts(cls, value: Mapping[str, Any]) -> bool:
-        """Whether it names a service in full."""
-        return str(value.get("call", "")).startswith("/")
-
     @property
     def exchanged(self) -> tuple[str, str]:
         """The service and its type."""
