@@ -6,11 +6,12 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, ClassVar
+from functools import wraps
+from typing import Any, ClassVar, Protocol
 
 from grader.checks.finding import Finding
 from grader.checks.need import Doubt, Need
-from grader.checks.value import EXACT, Tolerance
+from grader.checks.value import EXACT, NoSuchField, Tolerance
 from grader.spec.source import Model
 
 
@@ -47,6 +48,11 @@ class Parameters(Model):
     doubt: ClassVar[Doubt | None] = None
     """A failure in a run that was disturbed so must happen twice to count."""
 
+    @property
+    def asked_for(self) -> str:
+        """What is asked for, in the words of the handout."""
+        return ""
+
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields that the check names, so that a misspelt one is found before any run."""
         yield from ()
@@ -58,13 +64,7 @@ class NoParameters(Parameters):
 
 @dataclass(frozen=True)
 class Check:
-    """One entry of the catalogue.
-
-    Attributes:
-        name: ``family.noun`` as in YAML's ``uses``.
-        parameters: Model of the YAML's ``with``.
-        judge: The pure function: (subject, parameters) -> Finding.
-    """
+    """One entry of the catalogue: ``family.noun``, as in YAML's ``uses``, and what judges."""
 
     name: str
     subject: Subject
@@ -87,12 +87,43 @@ class Check:
         return self.documentation.partition("\n")[0].rstrip(".")
 
 
+class Reason(Protocol):
+    """Why something is not as expected: a :class:`~grader.diagnosis.cause.Cause`."""
+
+    def finding(self, expected: str) -> Finding:
+        """The finding of a check that expected something else."""
+
+
+class Unmet(Exception):
+    """What a check asks for is not there."""
+
+    def __init__(self, reason: Reason) -> None:
+        super().__init__()
+        self.reason = reason
+
+
+def stop_if(reason: Reason | None) -> None:
+    """End a check here if there is a reason: its finding says what is expected, and the reason."""
+    if reason is not None:
+        raise Unmet(reason)
+
+
 def check(
     name: str, subject: Subject, parameters: type[Parameters] = NoParameters
 ) -> Callable[[Callable[[Any, Any], Finding]], Check]:
     """Make a :class:`Check` of a function; its docstring becomes the catalogue's text."""
 
     def decorate(judge: Callable[[Any, Any], Finding]) -> Check:
-        return Check(name, subject, parameters, judge)
+        @wraps(judge)
+        def judged(subject: Any, parameters: Any) -> Finding:
+            try:
+                return judge(subject, parameters)
+            except Unmet as unmet:
+                return unmet.reason.finding(parameters.asked_for)
+            except NoSuchField as error:
+                text = f"the assignment expects what cannot be: {error}"
+                return Finding.error(parameters.asked_for, text)
+
+        return Check(name, subject, parameters, judged)
 
     return decorate

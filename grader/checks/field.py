@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator
 
-from grader.checks.value import NoSuchField
-from grader.spec.nearest_name import did_you_mean
+from grader.checks.value import NoSuchField, field_of
 
 _NAME = r"[A-Za-z][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*"
 _PATH = re.compile(rf"{_NAME}(?:\.{_NAME})*")
@@ -37,19 +36,12 @@ def value_at(message: Mapping[str, Any], path: str) -> Any:
     here: Any = message
     done = "the message"
     for step in _STEP.findall(path):
-        if isinstance(here, Mapping):
-            if step not in here:
-                raise NoSuchField(
-                    f"{done} has no field {step!r}; it has {', '.join(sorted(here)) or 'none'}."
-                    + did_you_mean(step, here)
-                )
-            here = here[step]
-        elif isinstance(here, Sequence) and not isinstance(here, str) and step.isdigit():
+        if isinstance(here, Sequence) and not isinstance(here, str) and step.isdigit():
             if int(step) >= len(here):
                 raise NoSuchField(f"{done} has {len(here)} items, so there is no [{step}]")
             here = here[int(step)]
         else:
-            raise NoSuchField(f"{done} has no field {step!r}: it is a plain value")
+            here = field_of(here, step, done)
         done = step
     if isinstance(here, Mapping):
         raise NoSuchField(f"{path} is a message: name one of its fields ({', '.join(here)})")

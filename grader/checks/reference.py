@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
 from grader.spec.name import ID
 from grader.spec.nearest_name import did_you_mean
-from grader.spec.quantity import refusal, written_as_read
+from grader.spec.quantity import refusal
 from grader.spec.unit import Dimension, parse_quantity, write_quantity
 from sim.coordinates import metres
 from sim.motion import Pose, wrap_angle
@@ -22,24 +21,10 @@ class UnknownValue(ValueError):
     """A check names a random value that its scenario does not have."""
 
     def __init__(self, name: str, values: Mapping[str, float]) -> None:
-        """Name the value, and the nearest that there is."""
         listed = f" There are: {', '.join(sorted(values))}." if values else " It has none."
         super().__init__(
             f"the scenario has no random value {name!r}." + (did_you_mean(name, values) or listed)
         )
-
-
-def resolve(reference: float | str, values: Mapping[str, float]) -> float:
-    """The number that a parameter stands for.
-
-    Raises:
-        UnknownValue: There is no value of this name.
-    """
-    if not isinstance(reference, str):
-        return reference
-    if reference not in values:
-        raise UnknownValue(reference, values)
-    return values[reference]
 
 
 @dataclass(frozen=True)
@@ -47,8 +32,7 @@ class Goal:
     """Where the robot shall end, as the YAML gives it.
 
     Attributes:
-        x: Metres, or the name of a random value.
-        y: Metres, or the name of a random value.
+        x: Metres, or the name of a random value; so is ``y``.
         theta: Radians, or the name of a random value.
     """
 
@@ -62,76 +46,50 @@ class Goal:
         Raises:
             UnknownValue: It names a value that is not among them.
         """
-        x_m, y_m, theta_rad = (resolve(item, values) for item in (self.x, self.y, self.theta))
+        for name in astuple(self):
+            if isinstance(name, str) and name not in values:
+                raise UnknownValue(name, values)
+        x_m, y_m, theta_rad = (
+            values[item] if isinstance(item, str) else item for item in astuple(self)
+        )
         return Pose(x_m, y_m, wrap_angle(theta_rad))
 
 
-@dataclass(frozen=True)
-class _Reference:
-    """Pydantic annotation: a quantity or a name."""
-
-    dimension: Dimension
-    bare: bool = False
-
-    def read(self, value: Any) -> float | str:
-        """Read what the YAML has.
-
-        Raises:
-            PydanticCustomError: It is neither.
-        """
-        if isinstance(value, str) and re.fullmatch(ID, value):
-            return value
-        if isinstance(value, str) and value.startswith("$"):
-            raise refusal(f"checks take the bare name of a random value: write {value[1:]!r}")
-        try:
-            if self.bare:
-                return metres(value)
-            return parse_quantity(value, self.dimension)
-        except ValueError as error:
-            raise refusal(f"{error}, or name a random value") from None
-
-    def write(self, value: float | str) -> float | str:
-        """What :meth:`read` reads again."""
-        return value if isinstance(value, str) else write_quantity(value, self.dimension)
-
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Validate by :meth:`read`."""
-        return written_as_read(self.read, self.write)
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Describe it to an editor."""
-        unit = {Dimension.LENGTH: "0.2 m", Dimension.ANGLE: "5 deg"}[self.dimension]
-        return {
-            "type": ["number", "string"] if self.bare else "string",
-            "x-words": f"{self.dimension.value}, such as `{unit}`, or the name of a random value",
-        }
+def _read(value: Any) -> Goal:
+    if isinstance(value, Goal):
+        return value
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise refusal(f"expected [x, y, theta], not {value!r}")
+    return Goal(*map(_entry, ("x", "y", "theta"), value))
 
 
-_GOAL_ENTRIES = {
-    "x": _Reference(Dimension.LENGTH, bare=True),
-    "y": _Reference(Dimension.LENGTH, bare=True),
-    "theta": _Reference(Dimension.ANGLE),
-}
+def _entry(name: str, value: Any) -> float | str:
+    if isinstance(value, str) and re.fullmatch(ID, value):
+        return value
+    if isinstance(value, str) and value.startswith("$"):
+        text = f"checks take the bare name of a random value: write {value[1:]!r}"
+        raise refusal(f"{name}: {text}")
+    try:
+        return parse_quantity(value, Dimension.ANGLE) if name == "theta" else metres(value)
+    except ValueError as error:
+        raise refusal(f"{name}: {error}, or name a random value") from None
 
 
-class _GoalAnnotation:
-    """Pydantic annotation: a list of x, y and theta."""
+def _write(goal: Goal) -> list[float | str]:
+    return [
+        item if isinstance(item, str) else write_quantity(item, dimension)
+        for item, dimension in zip(
+            astuple(goal), (Dimension.LENGTH, Dimension.LENGTH, Dimension.ANGLE), strict=True
+        )
+    ]
 
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Validate entry by entry; written as it is read."""
-        return written_as_read(self._read, self._write)
 
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Describe it to an editor."""
-        return {
+GoalPose = Annotated[
+    Goal,
+    PlainValidator(_read),
+    PlainSerializer(_write, when_used="json-unless-none"),
+    WithJsonSchema(
+        {
             "type": "array",
             "items": {"type": ["number", "string"]},
             "minItems": 3,
@@ -139,23 +97,5 @@ class _GoalAnnotation:
             "x-words": "[x, y, theta]: metres, and an angle with its unit; or names of random "
             "values",
         }
-
-    def _read(self, value: Any) -> Goal:
-        if isinstance(value, Goal):
-            return value
-        if not isinstance(value, list | tuple) or len(value) != len(_GOAL_ENTRIES):
-            raise refusal(f"expected [x, y, theta], not {value!r}")
-        entries = []
-        for (name, reference), item in zip(_GOAL_ENTRIES.items(), value, strict=True):
-            try:
-                entries.append(reference.read(item))
-            except PydanticCustomError as error:
-                raise refusal(f"{name}: {error}") from None
-        return Goal(*entries)
-
-    def _write(self, goal: Goal) -> list[float | str]:
-        pairs = zip(_GOAL_ENTRIES.values(), (goal.x, goal.y, goal.theta), strict=True)
-        return [reference.write(item) for reference, item in pairs]
-
-
-GoalPose = Annotated[Goal, _GoalAnnotation()]
+    ),
+]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
 
 from grader.checks.wording import percent
 from grader.spec.quantity import refusal
@@ -30,7 +29,6 @@ class TimeTolerance:
         return self.amount * expected_s if self.relative else self.amount
 
     def __str__(self) -> str:
-        """Write ``5 %`` or ``15 ms``."""
         return percent(self.amount) if self.relative else format_duration(self.amount)
 
 
@@ -38,54 +36,30 @@ def parse_time_tolerance(text: Any) -> TimeTolerance:
     """Read a tolerance of a time.
 
     Raises:
-        ValueError: It is negative, or neither a ratio nor a time.
+        PydanticCustomError: It is negative, or neither a ratio nor a time.
     """
     if isinstance(text, TimeTolerance):
         return text
-    try:
-        tolerance = TimeTolerance(parse_quantity(text, Dimension.RATIO), relative=True)
-    except ValueError:
+    for dimension in (Dimension.RATIO, Dimension.TIME):
         try:
-            tolerance = TimeTolerance(parse_quantity(text, Dimension.TIME), relative=False)
+            amount = parse_quantity(text, dimension)
         except ValueError:
-            raise ValueError(
-                f"{text!r} is neither a share such as '5 %' nor a time such as '15 ms'"
-            ) from None
-    if tolerance.amount < 0.0:
-        raise ValueError(f"{text!r} is negative")
-    return tolerance
+            continue
+        if amount < 0.0:
+            raise refusal(f"{text!r} is negative")
+        return TimeTolerance(amount, relative=dimension is Dimension.RATIO)
+    raise refusal(f"{text!r} is neither a share such as '5 %' nor a time such as '15 ms'")
 
 
-class _Annotation:
-    """Pydantic annotation that reads a :class:`TimeTolerance`."""
-
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Validate by :func:`parse_time_tolerance`."""
-
-        def read(value: Any) -> TimeTolerance:
-            try:
-                return parse_time_tolerance(value)
-            except ValueError as error:
-                raise refusal(str(error)) from None
-
-        return core_schema.no_info_plain_validator_function(
-            read, serialization=core_schema.to_string_ser_schema()
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Describe it to an editor."""
-        units = "|".join(["%", *UNITS[Dimension.TIME]])
-        return {
-            "anyOf": [
-                {"type": "string", "pattern": rf"^\s*[0-9.eE+-]+\s*({units})?\s*$"},
-                {"type": "number", "minimum": 0},
-            ],
+_FORM = rf"^\s*[0-9.eE+-]+\s*({'|'.join(['%', *UNITS[Dimension.TIME]])})?\s*$"
+Tolerance = Annotated[
+    TimeTolerance,
+    PlainValidator(parse_time_tolerance),
+    PlainSerializer(str),
+    WithJsonSchema(
+        {
+            "anyOf": [{"type": "string", "pattern": _FORM}, {"type": "number", "minimum": 0}],
             "description": "A share such as 5 % or a time such as 15 ms.",
         }
-
-
-Tolerance = Annotated[TimeTolerance, _Annotation()]
+    ),
+]

@@ -25,11 +25,7 @@ class NoSuchField(ValueError):
 
 @dataclass(frozen=True)
 class Difference:
-    """A field that has not the expected value.
-
-    Attributes:
-        field: Path such as ``linear.x`` or ``data[2]``.
-    """
+    """A field, such as ``linear.x`` or ``data[2]``, that has not the expected value."""
 
     field: str
     expected: Any
@@ -39,17 +35,12 @@ class Difference:
 def leaves(value: Any, path: str = "") -> dict[str, Any]:
     """Flatten a message: path of every leaf -> its value. An empty list is a leaf."""
     if isinstance(value, Mapping):
-        found: dict[str, Any] = {}
-        for name, item in value.items():
-            found.update(leaves(item, f"{path}.{name}" if path else str(name)))
-        return found
-    items = _items(value)
-    if items:
-        found = {}
-        for index, item in enumerate(items):
-            found.update(leaves(item, f"{path}[{index}]"))
-        return found
-    return {path: value}
+        inner = [(f"{path}.{name}" if path else str(name), item) for name, item in value.items()]
+    else:
+        inner = [(f"{path}[{index}]", item) for index, item in enumerate(_items(value) or ())]
+        if not inner:
+            return {path: value}
+    return {place: leaf for name, item in inner for place, leaf in leaves(item, name).items()}
 
 
 def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> dict[str, Any]:
@@ -59,32 +50,39 @@ def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> 
         NoSuchField: A name is not a field of the message, or its value has another kind.
     """
     found: dict[str, Any] = {}
-    for key, item in expected.items():
-        _expect(str(key).split("."), item, message, "", found)
+    _expect([], expected, message, "", found)
     return found
+
+
+def field_of(message: Any, name: str, here: str) -> Any:
+    """The value of a field, of which the message is called ``here`` in errors.
+
+    Raises:
+        NoSuchField: There is no such field.
+    """
+    if not isinstance(message, Mapping):
+        raise NoSuchField(f"{here} has no field {name!r}: it is a plain value")
+    if name not in message:
+        raise NoSuchField(
+            f"{here} has no field {name!r}; it has {', '.join(sorted(message)) or 'none'}."
+            + did_you_mean(name, message)
+        )
+    return message[name]
 
 
 def _expect(names: list[str], item: Any, message: Any, path: str, found: dict[str, Any]) -> None:
     if names:
-        name, here = names[0], path or "the message"
-        if not isinstance(message, Mapping):
-            raise NoSuchField(f"{here} has no field {name!r}: it is a plain value")
-        if name not in message:
-            raise NoSuchField(
-                f"{here} has no field {name!r}; it has {', '.join(sorted(message)) or 'none'}."
-                + did_you_mean(name, message)
-            )
-        _expect(names[1:], item, message[name], f"{path}.{name}" if path else name, found)
-        return
-    if isinstance(item, Mapping):
+        inner = field_of(message, names[0], path or "the message")
+        _expect(names[1:], item, inner, f"{path}.{names[0]}" if path else names[0], found)
+    elif isinstance(item, Mapping):
         for key, inner in item.items():
             _expect(str(key).split("."), inner, message, path, found)
-        return
-    if isinstance(message, Mapping):
+    elif isinstance(message, Mapping):
         raise NoSuchField(f"{path} is a message: name its fields ({', '.join(message)})")
-    if _kind(item) != _kind(message):
+    elif _kind(item) != _kind(message):
         raise NoSuchField(f"{path} {_other_kind(item, message)}")
-    found[path] = item
+    else:
+        found[path] = item
 
 
 def _other_kind(item: Any, value: Any) -> str:
@@ -137,7 +135,8 @@ def differences(
         for path, observed in leaves(message).items():
             named = any(path == known or path.startswith(known + "[") for known in expected)
             if not named and not _is_zero(observed, tolerance_of(tolerance, path)):
-                found.append(Difference(path, zero_of(observed), observed))
+                zero = [] if _items(observed) is not None else type(observed)()
+                found.append(Difference(path, zero, observed))
     return tuple(found)
 
 
@@ -164,24 +163,13 @@ def same(wanted: Any, observed: Any, tolerance: float) -> bool:
         return math.isnan(wanted) and math.isnan(observed)
     if wanted == observed or abs(wanted - observed) <= tolerance:
         return True
-    return observed == _as_float32(wanted)
+    in_range = abs(wanted) <= FLOAT32_MAX
+    return in_range and observed == struct.unpack("f", struct.pack("f", wanted))[0]
 
 
 def same_value(wanted: Any, observed: Any) -> bool:
     """Whether two values of parameters are the same: ``true`` is not 1."""
     return isinstance(wanted, bool) == isinstance(observed, bool) and same(wanted, observed, EXACT)
-
-
-def _as_float32(number: float) -> float:
-    if abs(number) > FLOAT32_MAX:
-        return number
-    nearest: float = struct.unpack("f", struct.pack("f", number))[0]
-    return nearest
-
-
-def zero_of(value: Any) -> Any:
-    """The zero of a value's kind: ``0.0``, ``0``, ``false``, an empty text or list."""
-    return [] if _items(value) is not None else type(value)()
 
 
 def _is_zero(value: Any, tolerance: float) -> bool:

@@ -161,7 +161,7 @@ class TestResponds:
         run = serving(asked(answer_s=None, error="the interface x/srv/Y is not installed"))
         finding = judge("service.responds", run, **TRUE)
         assert finding.status is Status.ERROR
-        assert "could not be called: the interface x/srv/Y is not installed" in finding.observed
+        assert "could not be asked: the interface x/srv/Y is not installed" in finding.observed
 
     def test_a_field_that_the_response_has_not_is_the_authors_mistake(self):
         finding = judge("service.responds", serving(asked()), **ENABLE, response={"sucess": True})

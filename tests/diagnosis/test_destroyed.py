@@ -19,7 +19,6 @@ from tests.checks.builder import (
     join,
     judge,
     messages,
-    node,
     reader,
     recording,
     sent,
@@ -27,7 +26,7 @@ from tests.checks.builder import (
     stimulus,
     taken,
 )
-from tests.checks.requests import acting, action, asked, goal, parameters_read, service, serving
+from tests.checks.requests import acting, action, asked, goal, service, serving
 
 LATCHED = replace(RELIABLE, durability="transient_local")
 LISTENER = endpoint("/chatter", kind=Kind.SUBSCRIPTION, type="std_msgs/msg/String")
@@ -106,19 +105,6 @@ def test_an_action_server_that_was_destroyed_while_it_worked():
     run = acting(goal(end_s=None), services=(gone(action(), 1.2),))
     found = failing("action.result", run, action="/fibonacci", within="2 s")
     assert "the action `/fibonacci` was destroyed 1.20 s after launch" in found
-
-
-def test_a_node_that_was_destroyed_before_its_parameters_were_read():
-    own = [
-        gone(service(f"/bot_publisher/{name}"))
-        for name in ("list_parameters", "describe_parameters", "get_parameters", "set_parameters")
-    ]
-    lost = replace(
-        parameters_read(speed=1.0)[0], answered_ns=None, response=None, error="no server"
-    )
-    run = recording(calls=(lost,), services=tuple(own), nodes=(node(vanished_s=0.9),))
-    found = failing("parameter.declared", run, node="bot_publisher", name="speed")
-    assert f"its parameter service was destroyed with its node {WORDS[14:]}" in found
 
 
 def test_what_vanished_with_its_process_was_not_destroyed():

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks.action.action import OfGoals, cannot, type_of
 from grader.checks.action.goals import (
+    OfGoals,
+    answered_goals,
+    ended_alone,
     evidence,
-    judged_goals,
+    the_goal,
     why_rejected,
-    why_server_gone,
 )
-from grader.checks.check import Subject, check
-from grader.checks.fields import words as fields_words
+from grader.checks.check import Subject, check, stop_if
 from grader.checks.finding import Finding
 from grader.checks.need import GoalSent
-from grader.checks.value import NoSuchField
+from grader.checks.requests import why_late
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_one_cpu, why_raised, why_taken, why_unanswered
 from grader.diagnosis.no_server import ACTION
@@ -30,6 +30,10 @@ _AT_THE_END = 0.8
 _TWO_THREADS = (
     "Spin with a MultiThreadedExecutor, and give the ActionServer a ReentrantCallbackGroup."
 )
+_CANCELED = (
+    "In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
+    "goal_handle.canceled() and return the result."
+)
 
 
 class Cancels(OfGoals):
@@ -43,6 +47,11 @@ class Cancels(OfGoals):
         validate_default=False,
     )
 
+    @property
+    def asked_for(self) -> str:
+        """The end in words."""
+        return f"{self.words} is canceled within {format_duration(self.within)}"
+
 
 @check("action.cancels", Subject.RECORDING, Cancels)
 def cancels(recording: Recording, parameters: Cancels) -> Finding:
@@ -51,39 +60,48 @@ def cancels(recording: Recording, parameters: Cancels) -> Finding:
     Judged by the goals that the probe asked to cancel (`cancel_after`): the server agrees, and
     the goal ends as canceled in time.
     """
-    expected = f"{parameters.words} is canceled within {format_duration(parameters.within)}"
-    try:
-        goals = judged_goals(
-            recording, parameters.action, parameters.goal, lambda g: g.cancel_after_s is not None
-        )
-    except NoSuchField as error:
-        return cannot(type_of(recording, parameters.action), error, expected)
-    if isinstance(goals, Cause):
-        return goals.finding(expected)
+    goals = answered_goals(recording, parameters, lambda goal: goal.cancel_after_s is not None)
     for goal in goals:
-        cause = why_rejected(recording, goal) or _why_not_canceled(
-            recording, goal, parameters.within
-        )
-        if cause is not None:
-            return cause.finding(expected)
+        stop_if(why_rejected(recording, goal))
+        stop_if(_why_not_asked(recording, goal))
+        stop_if(_why_not_canceled(recording, goal, parameters.within))
+    took_s = ((goals[0].result_ns or 0) - (goals[0].canceled_ns or 0)) / NS
     return Finding.passed(
-        expected,
-        f"canceled {format_duration(_end_s(goals[0]))} after it was asked",
+        parameters.asked_for,
+        f"canceled {format_duration(took_s)} after it was asked",
         evidence(recording, goals[0]),
     )
 
 
-def _end_s(goal: Goal) -> float:
-    return ((goal.result_ns or 0) - (goal.canceled_ns or 0)) / NS
+def _why_not_asked(recording: Recording, goal: Goal) -> Cause | None:
+    """Why the goal was not asked to cancel: it ended too early, or the run did."""
+    if goal.canceled_ns is not None:
+        return None
+    if goal.result_ns is None:
+        late = Cause.to_repeat("the run ended before the goal was asked to cancel")
+        return why_ended(recording) or late
+    lasted_s = (goal.result_ns - (goal.answered_ns or goal.sent_ns)) / NS
+    if lasted_s > (goal.cancel_after_s or 0.0):
+        return Cause.to_repeat("the probe was too late to ask for it")
+    return ended_alone(recording, goal)
 
 
 def _why_not_canceled(recording: Recording, goal: Goal, within_s: float) -> Cause | None:
-    shown = evidence(recording, goal)
-    if goal.canceled_ns is None:
-        return _never_asked(recording, goal)
-    asked_ns = goal.canceled_ns
-    if goal.status == "canceled" and _end_s(goal) <= within_s:
-        return None
+    """Why a goal that was asked to cancel was not canceled in time: refused, too late, or never."""
+    asked_ns, shown = goal.canceled_ns or 0, evidence(recording, goal)
+    if goal.status == "canceled" and goal.result_ns is not None:
+        return why_late(
+            recording,
+            ACTION,
+            goal.action,
+            asked_ns,
+            goal.result_ns,
+            within_s,
+            never="",
+            late="the goal was canceled only after",
+            hint="Look at goal_handle.is_cancel_requested in every round of the loop.",
+            evidence=shown,
+        )
     if goal.cancel_accepted is False and not _answered_too_late(goal):
         return Cause(
             "the server refused to cancel the goal",
@@ -91,35 +109,29 @@ def _why_not_canceled(recording: Recording, goal: Goal, within_s: float) -> Caus
             "one rclpy refuses.",
             shown,
         )
-    if goal.cancel_answered_ns is None or goal.status != "canceled":
-        return _why_other_end(recording, goal, within_s)
-    seen = f"the goal was canceled only {format_duration(_end_s(goal))} after it was asked"
-    taken = why_taken(recording, seen, asked_ns, goal.result_ns or 0, within_s)
-    return taken or Cause(
-        seen, "Look at goal_handle.is_cancel_requested in every round of the loop.", shown
-    )
-
-
-def _never_asked(recording: Recording, goal: Goal) -> Cause:
-    """The goal was not asked to cancel: it ended too early, or the run did."""
     if goal.result_ns is None:
-        late = Cause.to_repeat("the run ended before the goal was asked to cancel")
-        return why_ended(recording) or late
-    lasted_s = (goal.result_ns - (goal.answered_ns or goal.sent_ns)) / NS
-    if lasted_s > (goal.cancel_after_s or 0.0):
-        return Cause.to_repeat("the probe was too late to ask for it")
-    return _ended_alone(recording, goal, f"the goal {goal.status} {format_duration(lasted_s)}")
+        seen = "the goal was asked to cancel, but neither canceled nor ended"
+    else:
+        seen = f"the goal {goal.status} instead of being canceled"
+    cause, one_cpu = Cause(f"{seen}: the execute callback goes on", _CANCELED, shown), None
+    is_untaken = goal.cancel_answered_ns is None or _answered_too_late(goal)
+    if is_untaken:
+        seen += ": the server did not take in the request to cancel"
+        busy = f"{seen}; its executor cannot while the execute callback runs"
+        cause, one_cpu = Cause(busy, _TWO_THREADS, shown), why_one_cpu(recording, seen)
+    if goal.result_ns is not None:
+        return why_raised(recording, seen, goal.sent_ns) or one_cpu or cause
+    if is_untaken:
+        return one_cpu or why_unanswered(
+            recording, seen, ACTION, goal.action, asked_ns, within_s, cause
+        )
+    return _why_no_end(recording, seen, asked_ns, within_s) or cause
 
 
-def _ended_alone(recording: Recording, goal: Goal, seen: str) -> Cause:
-    """The goal came to an end before anybody could end it."""
-    what = f"{seen} after it was accepted, before it was to be ended"
-    return why_raised(recording, what, goal.sent_ns) or Cause(
-        what,
-        "The execute callback returns too early: it must work on the goal step by step, with a "
-        "pause between.",
-        evidence(recording, goal),
-    )
+def _why_no_end(recording: Recording, seen: str, asked_ns: int, within_s: float) -> Cause | None:
+    """Why a goal never ended, if its process ended or had no time."""
+    taken = why_taken(recording, seen, asked_ns, recording.stop_ns, within_s)
+    return why_ended(recording, seen) or taken
 
 
 def _answered_too_late(goal: Goal) -> bool:
@@ -134,50 +146,6 @@ def _answered_too_late(goal: Goal) -> bool:
     return waited >= _AT_THE_END
 
 
-def _why_other_end(recording: Recording, goal: Goal, within_s: float) -> Cause:
-    """It was not canceled: it ended otherwise, or never."""
-    shown = evidence(recording, goal)
-    asked_ns = goal.canceled_ns or 0
-    if goal.result_ns is None:
-        seen = "the goal was asked to cancel, but neither canceled nor ended"
-        gone = why_server_gone(recording, goal, seen)
-        if gone is None and goal.cancel_answered_ns is None:
-            untold = f"{seen}: the server did not take that in"
-            busy = f"{untold}; its executor cannot while the execute callback runs"
-            return why_one_cpu(recording, untold) or why_unanswered(
-                recording,
-                untold,
-                ACTION,
-                goal.action,
-                asked_ns,
-                within_s,
-                Cause(busy, _TWO_THREADS),
-            )
-        gone = gone or why_taken(recording, seen, asked_ns, recording.stop_ns, within_s)
-        return gone or Cause(
-            f"{seen}: it goes on",
-            "In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
-            "goal_handle.canceled() and return the result.",
-            shown,
-        )
-    raised = why_raised(
-        recording, f"the goal {goal.status} instead of being canceled", goal.sent_ns
-    )
-    if raised is not None:
-        return raised
-    if _answered_too_late(goal):
-        untold = f"the goal {goal.status} before the server took in that it should cancel"
-        return why_one_cpu(recording, untold) or Cause(
-            f"{untold}: its executor cannot while the execute callback runs", _TWO_THREADS, shown
-        )
-    return Cause(
-        f"the server agreed to cancel, but the goal {goal.status}",
-        "In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
-        "goal_handle.canceled() and return the result.",
-        shown,
-    )
-
-
 class Preempts(OfGoals):
     """Parameters of action.preempts."""
 
@@ -189,6 +157,11 @@ class Preempts(OfGoals):
         validate_default=False,
     )
 
+    @property
+    def asked_for(self) -> str:
+        """The end of the old goal in words."""
+        return f"{self.words} ends the goal before it within {format_duration(self.within)}"
+
 
 @check("action.preempts", Subject.RECORDING, Preempts)
 def preempts(recording: Recording, parameters: Preempts) -> Finding:
@@ -197,57 +170,47 @@ def preempts(recording: Recording, parameters: Preempts) -> Finding:
     Judged by the goals that the probe sent while another one was active (`preempt: true`): the
     new one is accepted, and the old one ends in time, canceled or aborted, without success.
     """
-    expected = (
-        f"{parameters.words} ends the goal before it within {format_duration(parameters.within)}"
-    )
-    try:
-        goals = judged_goals(recording, parameters.action, parameters.goal, lambda g: g.preempts)
-    except NoSuchField as error:
-        return cannot(type_of(recording, parameters.action), error, expected)
-    if isinstance(goals, Cause):
-        return goals.finding(expected)
+    goals = answered_goals(recording, parameters, lambda goal: goal.preempts)
     sent = [goal for goal in recording.goals if goal.action == parameters.action]
     for goal in goals:
-        before = sent[sent.index(goal) - 1] if sent.index(goal) else None
-        cause = (
-            Cause("there is no goal before it that it could end", ours=True)
-            if before is None
-            else why_rejected(recording, before)
-            or why_rejected(recording, goal)
-            or _why_goes_on(recording, before, goal, parameters)
-        )
-        if cause is not None:
-            return cause.finding(expected)
-    return Finding.passed(expected, "the old goal ended", evidence(recording, goals[0]))
+        number = sent.index(goal)
+        if number == 0:
+            return Finding.error(
+                parameters.asked_for, "there is no goal before it that it could end"
+            )
+        old = sent[number - 1]
+        stop_if(why_rejected(recording, old) or why_rejected(recording, goal))
+        stop_if(_why_goes_on(recording, old, goal, parameters.within))
+    return Finding.passed(parameters.asked_for, "the old goal ended", evidence(recording, goals[0]))
 
 
-def _why_goes_on(
-    recording: Recording, before: Goal, goal: Goal, parameters: Preempts
-) -> Cause | None:
-    shown = evidence(recording, before)
+def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) -> Cause | None:
+    """Why the old goal was not ended by the new one, or None if it was."""
     hint = (
         "Keep the current goal handle, and call its abort() when a new goal comes "
         "(handle_accepted_callback); look at is_active in every round of the loop."
     )
-    if before.result_ns is not None and before.result_ns < goal.sent_ns:
-        late_s = (goal.sent_ns - before.result_ns) / NS
-        if recording.stolen_s(before.sent_ns, goal.sent_ns) >= late_s:
+    if old.result_ns is None:
+        seen = f"{the_goal(old)} was still worked on at the end"
+        never = _why_no_end(recording, seen, new.sent_ns, within_s)
+        return never or Cause(seen, hint, evidence(recording, old))
+    if old.result_ns < new.sent_ns:
+        late_s = (new.sent_ns - old.result_ns) / NS
+        if recording.stolen_s(old.sent_ns, new.sent_ns) >= late_s:
             return Cause.to_repeat("the old goal had ended before the new one was sent")
-        lasted_s = (before.result_ns - (before.answered_ns or before.sent_ns)) / NS
-        return _ended_alone(
-            recording, before, f"the old goal {before.status} {format_duration(lasted_s)}"
-        )
-    which = f"the old goal ({fields_words(before.goal)})"
-    if before.result_ns is None:
-        seen = f"{which} was still worked on at the end"
-        gone = why_server_gone(recording, before, seen)
-        taken = why_taken(recording, seen, goal.sent_ns, recording.stop_ns, parameters.within)
-        return gone or taken or Cause(seen, hint, shown)
-    took_s = (before.result_ns - goal.sent_ns) / NS
-    if before.status == "succeeded":
-        return Cause(f"{which} was worked on to its end, and succeeded", hint, shown)
-    if took_s <= parameters.within:
-        return None
-    seen = f"{which} ended only {format_duration(took_s)} after the new one was sent"
-    taken = why_taken(recording, seen, goal.sent_ns, before.result_ns, parameters.within)
-    return taken or Cause(seen, hint, shown)
+        return ended_alone(recording, old)
+    if old.status == "succeeded":
+        seen = f"{the_goal(old)} was worked on to its end, and succeeded"
+        return Cause(seen, hint, evidence(recording, old))
+    return why_late(
+        recording,
+        ACTION,
+        old.action,
+        new.sent_ns,
+        old.result_ns,
+        within_s,
+        never="",
+        late=f"{the_goal(old)} ended after the new one was sent, but only after",
+        hint=hint,
+        evidence=evidence(recording, old),
+    )

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.check import Parameters, Subject, check, stop_if
+from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import nodes_seen
 from grader.checks.need import Called, Doubt
-from grader.checks.service.service import judged_calls, why_late
+from grader.checks.requests import timeline
+from grader.checks.service.service import judged_calls, why_slow
 from grader.checks.wording import code, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_not_node
+from grader.diagnosis.no_server import SERVICE, offered
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 
@@ -35,6 +38,11 @@ class State(Parameters):
         "`unconfigured`, `inactive`, `active`, `finalized`.",
     )
 
+    @property
+    def asked_for(self) -> str:
+        """The states in words."""
+        return f"the states of {code(self.node)}: {listing(self.states, 'then')}"
+
 
 @check("lifecycle.state", Subject.RECORDING, State)
 def state(recording: Recording, parameters: State) -> Finding:
@@ -44,84 +52,52 @@ def state(recording: Recording, parameters: State) -> Finding:
     (`lifecycle_msgs/srv/GetState`), between those of `change_state`.
     Without the package lifecycle_msgs on the machine that grades, it is an error.
     """
-    node = parameters.node
-    expected = f"the states of {code(node)}: {listing(parameters.states, 'then')}"
-    cause = why_not_node(recording, node)
-    if cause is not None:
-        return cause.finding(expected)
-    service = f"{node}/get_state"
-    calls = judged_calls(recording, service, {})
-    if isinstance(calls, Cause):
-        if not calls.ours and not any(item.name == service for item in recording.services):
-            calls = Cause(
+    node, service = parameters.node, f"{parameters.node}/get_state"
+    stop_if(why_not_node(recording, node))
+    if not offered(recording, SERVICE, service):
+        stop_if(
+            Cause(
                 f"{code(node)} is no lifecycle node: it has no service {code(service)}",
                 "Inherit from rclpy.lifecycle.LifecycleNode instead of Node.",
                 Evidence(moments=nodes_seen(recording)),
             )
-        return calls.finding(expected)
-    late = why_late(recording, service, calls, _ANSWER_S)
-    if late is not None:
-        return late.finding(expected)
-    seen = [_label(call) for call in calls]
+        )
+    calls = judged_calls(recording, service)
+    stop_if(why_slow(recording, calls, _ANSWER_S))
+    seen = [_text(call.response, "current_state") for call in calls]
     if len(seen) < len(parameters.states):
-        return Finding.error(expected, f"the scenario asks for the state only {len(seen)} times")
-    wrong = next(
-        (
-            n
-            for n, pair in enumerate(zip(parameters.states, seen, strict=False))
-            if len(set(pair)) > 1
-        ),
-        None,
-    )
-    shown = _evidence(recording, node, calls)
-    if wrong is None:
-        return Finding.passed(expected, listing(seen, "then"), shown)
-    refused = _refused(recording, node, calls[wrong])
-    observed = f"at the call {wrong + 1} of get_state it is {seen[wrong]}"
-    return Finding.failed(
-        expected,
-        f"{observed}, after the transition {refused} failed" if refused else observed,
-        "The callback of a transition (on_configure, on_activate, ...) must return "
-        "TransitionCallbackReturn.SUCCESS, and call super() where it activates publishers."
-        if refused
-        else "Does the node begin unconfigured, and change no state by itself?",
-        shown,
-    )
-
-
-def _label(call: Call) -> str:
-    state: Any = (call.response or {}).get("current_state")
-    return str(state.get("label", "")) if isinstance(state, dict) else ""
-
-
-def _refused(recording: Recording, node: str, before: Call) -> str:
-    """The last transition before a call that did not succeed."""
-    for call in reversed(_changes(recording, node)):
-        if call.requested_ns < before.requested_ns:
-            good = (call.response or {}).get("success") is True
-            return "" if good else _transition(call)
-    return ""
-
-
-def _changes(recording: Recording, node: str) -> list[Call]:
-    return [call for call in recording.calls if call.service == f"{node}/change_state"]
-
-
-def _transition(call: Call) -> str:
-    asked: Any = (call.request or {}).get("transition")
-    if not isinstance(asked, dict):
-        return "?"
-    return str(asked.get("label") or asked.get("id"))
-
-
-def _evidence(recording: Recording, node: str, calls: tuple[Call, ...]) -> Evidence:
-    steps = [(call.requested_ns, f"is {_label(call)}") for call in calls]
+        text = f"the scenario asks for the state only {len(seen)} times"
+        return Finding.error(parameters.asked_for, text)
+    changes = [call for call in recording.calls if call.service == f"{node}/change_state"]
+    steps = [(call.requested_ns, f"is {label}") for call, label in zip(calls, seen, strict=True)]
     steps += [
-        (call.requested_ns, f"transition {_transition(call)}") for call in _changes(recording, node)
+        (call.requested_ns, f"transition {_text(call.request, 'transition')}") for call in changes
     ]
-    steps.sort(key=lambda step: step[0])
-    rows = tuple((f"{recording.since_launch_s(at_ns):.2f} s", said) for at_ns, said in steps)
-    return Evidence(
-        moments=tuple(Moment(said, recording.since_launch_s(at_ns)) for at_ns, said in steps[:8]),
-        tables=(Table(f"The lifecycle of {node}", ("since launch", ""), rows[:50]),),
-    )
+    shown = timeline(recording, f"The lifecycle of {node}", steps)
+    for number, (wanted, label) in enumerate(zip(parameters.states, seen, strict=False)):
+        if label != wanted:
+            before = [one for one in changes if one.requested_ns < calls[number].requested_ns]
+            observed = f"at the call {number + 1} of get_state it is {label}"
+            return _otherwise(parameters, observed, before[-1:], shown)
+    return Finding.passed(parameters.asked_for, listing(seen, "then"), shown)
+
+
+def _otherwise(
+    parameters: State, observed: str, last_change: list[Call], shown: Evidence
+) -> Finding:
+    """The finding for another state, after the last transition succeeded or failed."""
+    hint = "Does the node begin unconfigured, and change no state by itself?"
+    for call in last_change:
+        if (call.response or {}).get("success") is not True:
+            observed += f", after the transition {_text(call.request, 'transition')} failed"
+            hint = (
+                "The callback of a transition (on_configure, on_activate, ...) must return "
+                "TransitionCallbackReturn.SUCCESS, and call super() where it activates publishers."
+            )
+    return Finding.failed(parameters.asked_for, observed, hint, shown)
+
+
+def _text(fields: Mapping[str, Any] | None, key: str) -> str:
+    """The label, or else the number, of a state or transition."""
+    found = (fields or {}).get(key, {})
+    return str(found.get("label") or found.get("id", ""))

@@ -1,54 +1,23 @@
-"""Parameters of a node, as its parameter services told the probe.
-
-What the services answer is kept in the recording call by call; here it is read. Numbers of
-types are those of rcl_interfaces/msg/ParameterType.
-"""
+"""Parameters of a node, as its parameter services (rcl_interfaces/srv) answered the probe."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import chain, repeat
+from typing import Any, Literal, get_args
 
 from grader.recording.model import Call, Recording
 
-TYPES = {
-    1: "bool",
-    2: "integer",
-    3: "double",
-    4: "string",
-    5: "byte_array",
-    6: "bool_array",
-    7: "integer_array",
-    8: "double_array",
-    9: "string_array",
-}
-_FIELDS = {
-    1: "bool_value",
-    2: "integer_value",
-    3: "double_value",
-    4: "string_value",
-    5: "byte_array_value",
-    6: "bool_array_value",
-    7: "integer_array_value",
-    8: "double_array_value",
-    9: "string_array_value",
-}
+Type = Literal[
+    "bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array",
+    "double_array", "string_array",
+]  # fmt: skip
+# Numbers of rcl_interfaces/msg/ParameterType.
+_TYPES = dict(enumerate(get_args(Type), start=1))
+_NO_RESULT = {"successful": False, "reason": "the node gave no result"}
 # Every node has these by itself; they say nothing of what the student wrote.
 _OWN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-
-
-@dataclass(frozen=True)
-class Range:
-    """Values that a number may have, both ends included.
-
-    Attributes:
-        step: Between two values, 0 for any.
-    """
-
-    low: float
-    high: float
-    step: float
 
 
 @dataclass(frozen=True)
@@ -56,24 +25,19 @@ class Descriptor:
     """How a parameter is declared.
 
     Attributes:
-        type: As in :data:`TYPES`, or ``not set``.
-        range: Allowed values, or None.
+        type: One of :data:`Type`, or ``not set``.
+        range: Lowest and highest value, and the step between two values (0 for any); or None.
     """
 
-    name: str
     type: str
     read_only: bool
-    range: Range | None
+    range: tuple[float, float, float] | None
     description: str
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A value at a time.
-
-    Attributes:
-        value: It, or None where it is not set.
-    """
+    """The value of a parameter when the probe asked for it; None where it is not set."""
 
     call: Call
     value: Any
@@ -81,31 +45,27 @@ class Reading:
 
 @dataclass(frozen=True)
 class Setting:
-    """An attempt to set a parameter.
-
-    Attributes:
-        accepted: Whether the node set it; None without an answer.
-    """
+    """An attempt to set a parameter, and the node's answer."""
 
     call: Call
     value: Any
-    accepted: bool | None
+    accepted: bool
     reason: str
 
 
-def calls_to(recording: Recording, node: str, service: str) -> tuple[Call, ...]:
-    """Calls with a request to one of a node's parameter services, in order."""
-    name = f"{node}/{service}"
-    return tuple(call for call in recording.calls if call.service == name and call.request)
+def calls_to(recording: Recording, node: str, *services: str) -> tuple[Call, ...]:
+    """Calls with a request to some of a node's parameter services, in order."""
+    names = [f"{node}/{service}" for service in services]
+    return tuple(call for call in recording.calls if call.service in names and call.request)
 
 
-def names(recording: Recording, node: str) -> list[str] | None:
-    """Names of the parameters that the student declared, or None if nobody could tell."""
+def names(recording: Recording, node: str) -> list[str]:
+    """Names of the parameters that the student declared, as the node listed them last."""
     for call in reversed(recording.calls):
         if call.service == f"{node}/list_parameters" and call.response is not None:
-            listed = _mapping(call.response.get("result")).get("names")
-            return [name for name in _items(listed) if not str(name).startswith(_OWN)]
-    return None
+            listed = call.response["result"]["names"]
+            return [name for name in listed if not name.startswith(_OWN)]
+    return []
 
 
 def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:
@@ -114,15 +74,14 @@ def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:
     An undeclared parameter has a descriptor without type.
     """
     for call in calls_to(recording, node, "describe_parameters"):
-        for item in _items(_mapping(call.response).get("descriptors")):
-            found = _mapping(item)
-            if found.get("name") == name:
+        for found in _answered(call, "descriptors"):
+            if found["name"] == name:
+                ranges = (*found["floating_point_range"], *found["integer_range"])
                 return Descriptor(
-                    name=name,
-                    type=TYPES.get(_whole(found.get("type")), "not set"),
-                    read_only=found.get("read_only") is True,
-                    range=_range(found),
-                    description=str(found.get("description", "")),
+                    _TYPES.get(found["type"], "not set"),
+                    found["read_only"],
+                    next(((r["from_value"], r["to_value"], r["step"]) for r in ranges), None),
+                    found["description"],
                 )
     return None
 
@@ -130,12 +89,10 @@ def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:
 def readings(recording: Recording, node: str, name: str) -> tuple[Reading, ...]:
     """What a parameter's value was, each time that the probe asked for it."""
     return tuple(
-        Reading(call, value_of(_mapping(value)))
+        Reading(call, _value(value))
         for call in calls_to(recording, node, "get_parameters")
         for asked, value in zip(
-            _items(_mapping(call.request).get("names")),
-            _items(_mapping(call.response).get("values")),
-            strict=False,
+            (call.request or {})["names"], _answered(call, "values"), strict=False
         )
         if asked == name
     )
@@ -144,50 +101,21 @@ def readings(recording: Recording, node: str, name: str) -> tuple[Reading, ...]:
 def settings(recording: Recording, node: str, name: str) -> tuple[Setting, ...]:
     """Every attempt to set a parameter."""
     return tuple(
-        setting
+        Setting(call, _value(wanted["value"]), result["successful"], result["reason"])
         for call in calls_to(recording, node, "set_parameters")
-        for setting in _settings(call, name)
+        for wanted, result in zip(
+            (call.request or {})["parameters"],
+            chain(_answered(call, "results"), repeat(_NO_RESULT)),
+            strict=False,
+        )
+        if wanted["name"] == name
     )
 
 
-def _settings(call: Call, name: str) -> Iterator[Setting]:
-    wanted = _items(_mapping(call.request).get("parameters"))
-    results = _items(_mapping(call.response).get("results"))
-    for number, item in enumerate(wanted):
-        found = _mapping(item)
-        if found.get("name") != name:
-            continue
-        value = value_of(_mapping(found.get("value")))
-        if number >= len(results):
-            yield Setting(call, value, None, "")
-            continue
-        result = _mapping(results[number])
-        yield Setting(call, value, result.get("successful") is True, str(result.get("reason", "")))
+def _answered(call: Call, key: str) -> Sequence[Any]:
+    return call.response[key] if call.response is not None else ()
 
 
-def value_of(value: Mapping[str, Any]) -> Any:
+def _value(value: Mapping[str, Any]) -> Any:
     """The value in an rcl_interfaces/msg/ParameterValue, or None where it is not set."""
-    return value.get(_FIELDS.get(_whole(value.get("type")), ""))
-
-
-def _range(found: Mapping[str, Any]) -> Range | None:
-    for key in ("floating_point_range", "integer_range"):
-        for item in _items(found.get(key)):
-            bounds = _mapping(item)
-            ends = [bounds.get(end) for end in ("from_value", "to_value", "step")]
-            numbers = [float(end) for end in ends if isinstance(end, int | float)]
-            if len(numbers) == 3:
-                return Range(*numbers)
-    return None
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}
-
-
-def _items(value: Any) -> Sequence[Any]:
-    return value if isinstance(value, list | tuple) else ()
-
-
-def _whole(value: Any) -> int:
-    return value if isinstance(value, int) else 0
+    return value.get(f"{_TYPES.get(value['type'])}_value")

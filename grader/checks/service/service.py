@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 from typing import Any, Literal
 
 from pydantic import Field
 
-from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.fields import (
-    FieldTolerance,
-    brief,
-    difference_table,
-    difference_words,
-    fields_hint,
-    has_fields,
-    toleranced,
-    unlike,
-)
-from grader.checks.fields import words as fields_words
+from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
+from grader.checks.field import value_at
+from grader.checks.fields import FieldTolerance, brief, toleranced, words
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Called, Doubt
-from grader.checks.value import EXACT, NoSuchField
+from grader.checks.requests import judged_requests, why_late, why_other_fields
+from grader.checks.value import EXACT
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_answer import why_one_cpu, why_taken, why_unanswered
-from grader.diagnosis.no_server import SERVICE, is_offered, why_not_met, why_not_offered
-from grader.diagnosis.process.process_exit import why_ended
+from grader.diagnosis.no_answer import why_one_cpu
+from grader.diagnosis.no_server import SERVICE, is_offered
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration
@@ -85,6 +77,17 @@ class Responds(Parameters):
         validate_default=False,
     )
 
+    @property
+    def asked_for(self) -> str:
+        """The answer in words."""
+        asked = f" to {words(self.request)}" if self.request else ""
+        wanted = [words(self.response)] if self.response else []
+        wanted += [f"{path} with “{word}”" for path, word in self.contains.items()]
+        return (
+            f"the service {code(self.service)} answers{asked} with "
+            f"{' and '.join(wanted) or 'a response'} within {format_duration(self.within)}"
+        )
+
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields of the request and of the response."""
         yield NamedFields(("request",), self.service, self.request)
@@ -100,95 +103,38 @@ def responds(recording: Recording, parameters: Responds) -> Finding:
     Judged by the calls that the probe sent: every one must be answered in time, with the
     expected fields. A node answers only while its executor spins.
     """
-    asked = f" to {fields_words(parameters.request)}" if parameters.request else ""
-    wanted = [f"{path} with “{word}”" for path, word in parameters.contains.items()]
-    if parameters.response or not wanted:
-        wanted.insert(0, fields_words(parameters.response) if parameters.response else "a response")
-    expected = (
-        f"the service {code(parameters.service)} answers{asked} with {' and '.join(wanted)} "
-        f"within {format_duration(parameters.within)}"
-    )
-    try:
-        calls = judged_calls(recording, parameters.service, parameters.request)
-    except NoSuchField as error:
-        return _cannot(recording, parameters.service, error, expected)
-    if isinstance(calls, Cause):
-        return calls.finding(expected)
-    late = why_late(recording, parameters.service, calls, parameters.within)
-    if late is not None:
-        return late.finding(expected)
-    try:
-        wrong = _first_wrong(recording, calls, parameters)
-    except NoSuchField as error:
-        return _cannot(recording, parameters.service, error, expected)
-    if wrong is not None:
-        return wrong.finding(expected)
-    slowest_s = max(_took_s(call) for call in calls)
-    return Finding.passed(
-        expected,
-        f"{counted(len(calls), 'call')}, answered within {format_duration(slowest_s)}",
-        _evidence(recording, calls),
-    )
-
-
-def _cannot(recording: Recording, service: str, error: NoSuchField, expected: str) -> Finding:
-    interface = next(call.type for call in recording.calls if call.service == service)
-    return Finding.error(expected, f"the assignment expects what {interface} cannot be: {error}")
+    calls = judged_calls(recording, parameters.service, parameters.request)
+    stop_if(why_slow(recording, calls, parameters.within))
+    for call in calls:
+        stop_if(_why_other_response(recording, calls, call, parameters))
+    slowest_s = max(map(_took_s, calls))
+    observed = f"{counted(len(calls), 'call')}, answered within {format_duration(slowest_s)}"
+    return Finding.passed(parameters.asked_for, observed, _evidence(recording, calls))
 
 
 def judged_calls(
-    recording: Recording, service: str, request: dict[str, Any]
-) -> tuple[Call, ...] | Cause:
-    """The calls to a service whose request has certain fields, or why there are none.
-
-    Raises:
-        NoSuchField: A request cannot have such a field.
-    """
-    calls = [call for call in recording.calls if call.service == service]
-    interface = calls[0].type if calls else None
-    cause = why_not_offered(recording, SERVICE, service, interface)
-    if cause is not None:
-        return cause
-    failed = next((call for call in calls if call.error and call.error != "no server"), None)
-    if failed is not None:
-        return Cause(f"{code(service)} could not be called: {failed.error}", ours=True)
-    found = tuple(call for call in calls if has_fields(call.request or {}, request))
-    if not found:
-        asked = f" with {fields_words(request)}" if request else ""
-        return why_ended(recording) or Cause.to_repeat(
-            f"the probe sent no call{asked} to {code(service)}"
-        )
-    lost = next((call for call in found if call.error), None)
-    if lost is not None:
-        return why_not_met(recording, SERVICE, service, "could not be called", lost.requested_ns)
-    return found
+    recording: Recording, service: str, request: dict[str, Any] | None = None
+) -> tuple[Call, ...]:
+    """The calls to a service whose request has certain fields; ends the check if there is none."""
+    return judged_requests(recording, SERVICE, service, recording.calls, request or {})
 
 
-def why_late(
-    recording: Recording, service: str, calls: tuple[Call, ...], within_s: float
-) -> Cause | None:
+def why_slow(recording: Recording, calls: tuple[Call, ...], within_s: float) -> Cause | None:
     """Why one of some calls was not answered in time, or None if all were."""
-    unanswered = [call for call in calls if call.answered_ns is None]
-    if unanswered:
-        first = unanswered[0]
-        what = f"{_which(calls, first)} to {code(service)} was never answered"
-        return why_unanswered(recording, what, SERVICE, service, first.requested_ns, within_s)
-    late = [call for call in calls if _took_s(call) > within_s]
-    if not late:
-        return None
-    worst = max(late, key=_took_s)
-    what = (
-        f"{_which(calls, worst)} to {code(service)} was answered only after "
-        f"{format_duration(_took_s(worst))}"
-    )
-    taken = why_taken(
-        recording, what, worst.requested_ns, worst.answered_ns or recording.stop_ns, within_s
-    )
-    return taken or Cause(
-        what,
-        "A service callback must return soon: no time.sleep() and no waiting in it, nor in a "
+    worst = max(calls, key=_took_s)
+    seen = f"{_which(calls, worst)} to {code(worst.service)} was"
+    return why_late(
+        recording,
+        SERVICE,
+        worst.service,
+        worst.requested_ns,
+        worst.answered_ns,
+        within_s,
+        never=f"{seen} never answered",
+        late=f"{seen} answered only after",
+        hint="A service callback must return soon: no time.sleep() and no waiting in it, nor in a "
         "timer or subscription callback that the same executor runs.",
-        _evidence(recording, calls),
+        evidence=_evidence(recording, calls),
     )
 
 
@@ -198,55 +144,35 @@ def _which(calls: tuple[Call, ...], call: Call) -> str:
 
 
 def _took_s(call: Call) -> float:
-    return ((call.answered_ns or call.requested_ns) - call.requested_ns) / NS
+    return math.inf if call.answered_ns is None else (call.answered_ns - call.requested_ns) / NS
 
 
-def _first_wrong(
-    recording: Recording, calls: tuple[Call, ...], parameters: Responds
+def _why_other_response(
+    recording: Recording, calls: tuple[Call, ...], call: Call, parameters: Responds
 ) -> Cause | None:
-    for call in calls:
-        response = call.response or {}
-        found = unlike(response, parameters.response, parameters.tolerance)
-        lacking = [
-            path
-            for path, word in parameters.contains.items()
-            if word.casefold() not in str(_text_at(response, path)).casefold()
-        ]
-        if not found and not lacking:
-            continue
-        told = [difference_words(found)] if found else []
-        told += [
-            f"{path} = {_text_at(response, path)!r} without “{parameters.contains[path]}”"
-            for path in lacking
-        ]
-        asked = brief(call.request or {})
-        when_s = recording.since_launch_s(call.requested_ns)
-        return Cause(
-            f"{_which(calls, call)} was answered with {' and '.join(told)}",
-            fields_hint("response", response, [*(item.field for item in found), *lacking]),
-            Evidence(
-                moments=(Moment(f"called with {asked}", when_s),),
-                tables=((difference_table(f"Response to {asked}", found),) if found else ()),
-            ),
-        )
-    return None
-
-
-def _text_at(response: Any, path: str) -> Any:
-    here = response
-    for step in path.split("."):
-        if not isinstance(here, dict) or step not in here:
-            raise NoSuchField(f"the response has no field {path!r}")
-        here = here[step]
-    return here
+    seen = f"{_which(calls, call)} was answered with"
+    called = Moment(f"called with {brief(call.request or {})}", _since_s(recording, call))
+    shown, response = Evidence(moments=(called,)), call.response or {}
+    wrong = why_other_fields(
+        seen, "response", response, parameters.response, parameters.tolerance, shown
+    )
+    lacking = [
+        f"{path} = {value_at(response, path)!r} without “{word}”"
+        for path, word in parameters.contains.items()
+        if word.casefold() not in str(value_at(response, path)).casefold()
+    ]
+    if wrong or not lacking:
+        return wrong
+    hint = "Look where the callback sets this text of the response that it returns."
+    return Cause(f"{seen} {' and '.join(lacking)}", hint, shown)
 
 
 def _evidence(recording: Recording, calls: tuple[Call, ...]) -> Evidence:
     rows = tuple(
         (
-            f"{recording.since_launch_s(call.requested_ns):.2f} s",
+            f"{_since_s(recording, call):.2f} s",
             brief(call.request or {}),
-            fields_words(call.response) if call.response is not None else "no answer",
+            words(call.response) if call.response is not None else "no answer",
             format_duration(_took_s(call)) if call.answered_ns is not None else "",
         )
         for call in calls[:50]
@@ -254,11 +180,14 @@ def _evidence(recording: Recording, calls: tuple[Call, ...]) -> Evidence:
     header = ("called at", "request", "response", "after")
     return Evidence(
         moments=tuple(
-            Moment(f"{call.service} called", recording.since_launch_s(call.requested_ns))
-            for call in calls[:5]
+            Moment(f"{call.service} called", _since_s(recording, call)) for call in calls[:5]
         ),
         tables=(Table("Calls", header, rows),),
     )
+
+
+def _since_s(recording: Recording, call: Call) -> float:
+    return recording.since_launch_s(call.requested_ns)
 
 
 class Concurrent(Parameters):
@@ -275,6 +204,14 @@ class Concurrent(Parameters):
         "side_by_side", description="How it works on two calls that come at once."
     )
 
+    @property
+    def asked_for(self) -> str:
+        """The order in words."""
+        return (
+            f"{code(self.service)} works on calls that come at once "
+            f"{self.calls.replace('_', ' ')}, each for {format_duration(self.takes)}"
+        )
+
 
 @check("service.concurrent", Subject.RECORDING, Concurrent)
 def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
@@ -283,79 +220,57 @@ def concurrent(recording: Recording, parameters: Concurrent) -> Finding:
     Judged by the answers to calls that the probe sent at once: side by side they come together,
     one after another they are as far apart as one call takes.
     """
-    how = parameters.calls.replace("_", " ")
-    expected = (
-        f"{code(parameters.service)} works on calls that come at once {how}, each for "
-        f"{format_duration(parameters.takes)}"
-    )
-    calls = judged_calls(recording, parameters.service, {})
-    if isinstance(calls, Cause):
-        return calls.finding(expected)
-    pairs = _pairs(calls, parameters.takes)
-    if not pairs:
-        return Finding.error(expected, "the scenario calls the service never twice at once")
-    # Time enough for the slower of both, one after the other.
-    late = why_late(recording, parameters.service, calls, 2.0 * len(calls) * parameters.takes)
-    if late is not None:
-        return late.finding(expected)
-    for first, second in pairs:
-        cause = _why_otherwise(recording, parameters, first, second)
-        if cause is not None:
-            return cause.finding(expected)
-    gap_s = max(_gap_s(*pair) for pair in pairs)
-    return Finding.passed(
-        expected,
-        f"the answers came {format_duration(gap_s)} apart",
-        _evidence(recording, calls),
-    )
-
-
-def _pairs(calls: tuple[Call, ...], takes_s: float) -> list[tuple[Call, Call]]:
-    """Neighbours of which the second came while the first was worked on."""
-    return [
+    calls = judged_calls(recording, parameters.service)
+    pairs = [
         (first, second)
         for first, second in itertools.pairwise(calls)
-        if (second.requested_ns - first.requested_ns) / NS < _TOGETHER * takes_s
+        if (second.requested_ns - first.requested_ns) / NS < _TOGETHER * parameters.takes
     ]
+    if not pairs:
+        text = "the scenario calls the service never twice at once"
+        return Finding.error(parameters.asked_for, text)
+    # Time enough for the slower of both, one after the other.
+    stop_if(why_slow(recording, calls, 2.0 * len(calls) * parameters.takes))
+    for pair in pairs:
+        stop_if(_why_other_order(recording, parameters, pair))
+    observed = f"the answers came {format_duration(max(map(_gap_s, pairs)))} apart"
+    return Finding.passed(parameters.asked_for, observed, _evidence(recording, calls))
 
 
-def _gap_s(first: Call, second: Call) -> float:
-    return abs((second.answered_ns or 0) - (first.answered_ns or 0)) / NS
+def _gap_s(pair: tuple[Call, Call]) -> float:
+    return abs((pair[1].answered_ns or 0) - (pair[0].answered_ns or 0)) / NS
 
 
-def _why_otherwise(
-    recording: Recording, parameters: Concurrent, first: Call, second: Call
+def _why_other_order(
+    recording: Recording, parameters: Concurrent, pair: tuple[Call, Call]
 ) -> Cause | None:
-    takes_s, gap_s = parameters.takes, _gap_s(first, second)
-    standalone_build = gap_s >= _APART * takes_s
-    together = gap_s <= _TOGETHER * takes_s
-    if together if parameters.calls == "side_by_side" else standalone_build:
+    gap_s, takes_s = _gap_s(pair), parameters.takes
+    side_by_side = parameters.calls == "side_by_side"
+    together, far_apart = gap_s <= _TOGETHER * takes_s, gap_s >= _APART * takes_s
+    if together if side_by_side else far_apart:
         return None
     seen = f"the answers to two calls at once came {format_duration(gap_s)} apart"
-    ends = (first.answered_ns or 0, second.answered_ns or 0)
-    stolen_s = recording.stolen_s(first.requested_ns, max(ends))
-    if (parameters.calls == "side_by_side" and gap_s - stolen_s <= _TOGETHER * takes_s) or (
-        not together and not standalone_build
-    ):
+    ended_ns = max(call.answered_ns or 0 for call in pair)
+    stolen_s = recording.stolen_s(pair[0].requested_ns, ended_ns)
+    in_doubt = side_by_side and gap_s - stolen_s <= _TOGETHER * takes_s
+    if in_doubt or not (together or far_apart):
         return Cause(
             f"{seen}, so it cannot be told how they were worked on",
+            f"Each call should take {format_duration(takes_s)}.",
             ours=stolen_s > 0.0,
             disturbed=stolen_s > 0.0,
-            hint=f"Each call should take {format_duration(takes_s)}.",
         )
-    evidence = _evidence(recording, (first, second))
-    spins = [item.data for item in recording.declared("spin")]
-    executors = codes(sorted({str(item.get("executor")) for item in spins}))
-    declared = f"; the process declared a {executors}" if spins else ""
-    if parameters.calls == "one_after_another":
+    executors = sorted({str(item.data.get("executor")) for item in recording.declared("spin")})
+    declared = f"; the process declared a {codes(executors)}" if executors else ""
+    if not side_by_side:
         return Cause(
             f"{seen}, so both were worked on at the same time{declared}",
             "Give the service a MutuallyExclusiveCallbackGroup, or use rclpy.spin(node).",
-            evidence,
+            _evidence(recording, pair),
         )
     return why_one_cpu(recording, seen) or Cause(
         f"{seen}, so the second call waited until the first was answered{declared}",
         "Spin with a MultiThreadedExecutor, and give the service a ReentrantCallbackGroup: "
         "self.create_service(..., callback_group=ReentrantCallbackGroup()).",
-        evidence,
+        _evidence(recording, pair),
     )

@@ -1,0 +1,144 @@
+"""Calls and goals that the probe sent: which a check judges, and why an answer is not as asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from grader.checks.check import stop_if
+from grader.checks.fields import (
+    difference_table,
+    difference_words,
+    fields_hint,
+    has_fields,
+    unlike,
+    words,
+)
+from grader.checks.finding import Evidence, Moment, Table
+from grader.checks.value import Tolerance
+from grader.checks.wording import code
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_answer import why_taken, why_unanswered
+from grader.diagnosis.no_server import SERVICE, Word, why_not_met, why_not_offered
+from grader.diagnosis.process.process_exit import why_ended
+from grader.recording.interaction import Goal
+from grader.recording.model import NS, Call, Recording
+from grader.spec.unit import format_duration
+
+NO_SERVER = "no server"
+"""Error of a request to a server that was not there."""
+_MOST_ROWS, _MOST_MOMENTS = 50, 8
+
+Request = TypeVar("Request", Call, Goal)
+
+
+def judged_requests(
+    recording: Recording,
+    kind: Word,
+    name: str,
+    sent: Sequence[Request],
+    fields: Mapping[str, Any],
+    is_judged: Callable[[Request], bool] = lambda _: True,
+) -> tuple[Request, ...]:
+    """The requests to a service, or goals of an action, that have certain fields; one at least.
+
+    Raises:
+        Unmet: There is none, or one could not be sent.
+        NoSuchField: A request cannot have such a field.
+    """
+    own = [one for one in sent if _server(one) == name]
+    stop_if(why_not_offered(recording, kind, name, own[0].type if own else None))
+    failed = next((one.error for one in own if one.error not in ("", NO_SERVER)), None)
+    if failed:
+        stop_if(Cause(f"{code(name)} could not be asked: {failed}", ours=True))
+    found = tuple(one for one in own if has_fields(_content(one), fields) and is_judged(one))
+    if not found:
+        request = "call" if kind is SERVICE else "goal"
+        which = f" with {words(fields)}" if fields else ""
+        never = f"the probe sent no such {request}{which} to {code(name)}"
+        stop_if(why_ended(recording) or Cause.to_repeat(never))
+    for one in found:
+        if one.error:
+            stop_if(why_not_met(recording, kind, name, "could not be asked", _sent_ns(one)))
+    return found
+
+
+def _server(one: Call | Goal) -> str:
+    return one.action if isinstance(one, Goal) else one.service
+
+
+def _content(one: Call | Goal) -> Mapping[str, Any]:
+    return one.goal if isinstance(one, Goal) else one.request or {}
+
+
+def _sent_ns(one: Call | Goal) -> int:
+    return one.sent_ns if isinstance(one, Goal) else one.requested_ns
+
+
+def why_late(
+    recording: Recording,
+    kind: Word,
+    name: str,
+    asked_ns: int,
+    answered_ns: int | None,
+    within_s: float,
+    *,
+    never: str,
+    late: str,
+    hint: str,
+    evidence: Evidence,
+) -> Cause | None:
+    """Why an answer did not come in time, or None if it did.
+
+    Args:
+        never: What is said where no answer came.
+        late: What is said of a late one; how long it took follows.
+    """
+    if answered_ns is None:
+        return why_unanswered(recording, never, kind, name, asked_ns, within_s)
+    took_s = (answered_ns - asked_ns) / NS
+    if took_s <= within_s:
+        return None
+    seen = f"{late} {format_duration(took_s)}"
+    taken = why_taken(recording, seen, asked_ns, answered_ns, within_s)
+    return taken or Cause(seen, hint, evidence)
+
+
+def why_other_fields(
+    seen: str,
+    part: str,
+    value: Mapping[str, Any] | None,
+    wanted: Mapping[str, Any],
+    tolerance: Tolerance,
+    evidence: Evidence,
+) -> Cause | None:
+    """Which fields of an answer are not as expected, or None if all are.
+
+    Args:
+        part: What the answer is called, such as ``result``.
+    """
+    found = unlike(value or {}, wanted, tolerance)
+    if not found:
+        return None
+    return Cause(
+        f"{seen} {difference_words(found)}",
+        fields_hint(part, value or {}, [item.field for item in found]),
+        replace(evidence, tables=(difference_table(part.capitalize(), found), *evidence.tables)),
+    )
+
+
+def timeline(recording: Recording, title: str, steps: Iterable[tuple[int, str]]) -> Evidence:
+    """What happened when, as a table and as moments; what follows a colon is for the table only."""
+    found = [
+        (recording.since_launch_s(at_ns), text)
+        for at_ns, text in sorted(steps, key=lambda step: step[0])
+    ]
+    rows = tuple((f"{at_s:.2f} s", text) for at_s, text in found)
+    moments = [
+        Moment(text.partition(":")[0], at_s)
+        for at_s, text in found
+        if not text.startswith("feedback")
+    ]
+    table = Table(title, ("since launch", "what happened"), rows[:_MOST_ROWS])
+    return Evidence(moments=tuple(moments[:_MOST_MOMENTS]), tables=(table,))
