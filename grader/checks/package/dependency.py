@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from collections.abc import Iterator
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Subject, check, stop_if
 from grader.checks.finding import Evidence, Finding, Table
-from grader.checks.need import Submitted
+from grader.checks.package.package import OfPackage
 from grader.checks.wording import code, codes
+from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_manifest, why_too_new
-from grader.spec.name import PackageName
 from grader.spec.nearest_name import nearest
 from grader.submission.read.dependencies import meant
-from grader.submission.record import (
-    Dependency,
-    Import,
-    PackageRecord,
-    SourceError,
-    SubmissionRecord,
-)
+from grader.submission.record import Import, PackageRecord, SourceError, SubmissionRecord
 
 INSIDE_EXPORT = "package.xml names it inside <export>, where it does not count"
 # Tags that make a package be there when the code runs or is built (REP-149).
@@ -32,12 +26,13 @@ _IDLE = {
 }
 
 
-class Dependencies(Parameters):
+class Dependencies(OfPackage):
     """Parameters of package.dependencies."""
 
-    needs = (Submitted(),)
-
-    package: PackageName = Field(description="Name in package.xml.")
+    @property
+    def asked_for(self) -> str:
+        """The entries in words."""
+        return f"every ROS package that {code(self.package)} imports is in package.xml"
 
 
 @check("package.dependencies", Subject.SUBMISSION, Dependencies)
@@ -50,86 +45,82 @@ def dependencies(submission: SubmissionRecord, parameters: Dependencies) -> Find
     needs no entry. Modules that the code names in none of its files, but imports in a run, count
     as well.
     """
-    expected = f"every ROS package that {code(parameters.package)} imports is in package.xml"
-    cause = why_no_manifest(submission, parameters.package)
-    if cause is not None:
-        return cause.finding(expected)
+    stop_if(why_no_manifest(submission, parameters.package))
     package = existing_package(submission, parameters.package)
-    newer = why_too_new(package)
-    if newer is not None:
-        return newer.finding(expected)
-    unreadable = _unreadable(package)
-    if unreadable is not None:
-        return Finding.failed(
-            expected,
-            f"the imports cannot be read: {unreadable}",
-            "Correct the syntax error first.",
-            Evidence(places=(unreadable,)),
-        )
-    missing, unknown = _missing(package), _unknown(submission, package)
-    if missing or unknown:
-        return _fault(package, expected, missing, unknown)
-    imported = sorted({item.module for item in package.ros_imports if item.module != package.name})
-    return Finding.passed(expected, f"{codes(imported)} declared" if imported else "none imported")
+    stop_if(why_too_new(package))
+    stop_if(_why_unreadable(package))
+    faults = [*_missing(package), *_unknown(submission, package)]
+    if not faults:
+        names = sorted({item.module for item in package.ros_imports} - {package.name})
+        observed = f"{codes(names)} declared" if names else "none imported"
+        return Finding.passed(parameters.asked_for, observed)
+    seen, hints, places, rows = zip(*faults, strict=True)
+    tags = [write for (_, write), hint in zip(rows, hints, strict=True) if not hint]
+    add = (
+        [
+            f"Don't forget the dependencies: add {codes(tags)} to package.xml, directly below "
+            "<package>."
+        ]
+        if tags
+        else []
+    )
+    return Finding.failed(
+        parameters.asked_for,
+        "; ".join(seen),
+        " ".join([*add, *filter(None, hints)]),
+        Evidence(places=places, tables=(Table("package.xml", ("what", "write"), rows),)),
+    )
 
 
-def _unreadable(package: PackageRecord) -> SourceError | None:
-    """A file whose imports nobody could read, since Python cannot parse it."""
+def _why_unreadable(package: PackageRecord) -> Cause | None:
+    """A file whose imports are unknown, since Python cannot parse it."""
     read = {item.file for item in package.imports}
-    return next((error for error in package.syntax_errors if error.file not in read), None)
+    for error in package.syntax_errors:
+        if error.file not in read:
+            seen = f"the imports cannot be read: {error}"
+            return Cause(seen, "Correct the syntax error first.", Evidence(places=(error,)))
+    return None
 
 
-def _missing(package: PackageRecord) -> list[Import]:
+_Fault = tuple[str, str, SourceError, tuple[str, str]]
+"""What is seen, what to do (nothing: add a tag), where, and what is there and what to write."""
+
+
+def _missing(package: PackageRecord) -> Iterator[_Fault]:
     """The first import of each ROS package that is needed and not declared."""
+    kinds = {item.name: item.kind for item in package.dependencies if item.kind not in _COUNTING}
     declared = {item.name for item in package.dependencies if item.kind in _COUNTING}
-    found: dict[str, Import] = {}
+    needed: dict[str, Import] = {}
     for item in package.ros_imports:
         if not item.optional and item.module not in declared and item.module != package.name:
-            found.setdefault(item.module, item)
-    return list(found.values())
-
-
-def _unknown(submission: SubmissionRecord, package: PackageRecord) -> list[Dependency]:
-    own = {item.name for item in submission.packages}
-    return [item for item in package.dependencies if item.known is False and item.name not in own]
-
-
-def _fault(
-    package: PackageRecord, expected: str, missing: list[Import], unknown: list[Dependency]
-) -> Finding:
-    manifest = "package.xml" if package.path in ("", ".") else f"{package.path}/package.xml"
-    idle = {item.name: item.kind for item in package.dependencies if item.kind not in _COUNTING}
-    parts, hints = [], []
-    places: list[SourceError] = []
-    rows: list[tuple[str, str]] = []
-    for item in missing:
-        why = _IDLE.get(idle.get(item.module, "").partition("/")[0], "")
-        parts.append(f"{item.file}:{item.line} imports {code(item.module)}{why}")
-        places.append(SourceError(item.file, item.line, f"imports {item.module}"))
-        rows.append((f"imported in {item.file}:{item.line}", f"<depend>{item.module}</depend>"))
-    if missing:
-        tags = codes(f"<depend>{item.module}</depend>" for item in missing)
-        hints.append(
-            f"Don't forget the dependencies: add {tags} to package.xml, directly below <package>."
+            needed.setdefault(item.module, item)
+    for item in needed.values():
+        why = _IDLE.get(kinds.get(item.module, "").partition("/")[0], "")
+        tag = f"<depend>{item.module}</depend>"
+        yield (
+            f"{item.file}:{item.line} imports {code(item.module)}{why}",
+            "",
+            SourceError(item.file, item.line, f"imports {item.module}"),
+            (f"imported in {item.file}:{item.line}", tag),
         )
+
+
+def _unknown(submission: SubmissionRecord, package: PackageRecord) -> Iterator[_Fault]:
+    """The packages that package.xml names and that do not exist."""
+    own = {item.name for item in submission.packages}
     imported = {item.module for item in package.ros_imports}
-    for entry in unknown:
+    for entry in package.dependencies:
+        if entry.known is not False or entry.name in own:
+            continue
         match = nearest(entry.name, imported) or meant(entry.name)
-        parts.append(f"package.xml names {code(entry.name)}, which does not exist")
-        places.append(SourceError(manifest, entry.line, f"{entry.name} does not exist"))
-        remedy = f"<{entry.kind}>{match}</{entry.kind}>" if match else "remove it"
-        rows.append((f"<{entry.kind}>{entry.name}</{entry.kind}> does not exist", remedy))
-        hints.append(
+        yield (
+            f"package.xml names {code(entry.name)}, which does not exist",
             f"Did you mean {code(match)} instead of {code(entry.name)}?"
             if match
-            else f"Remove {code(entry.name)} from package.xml."
+            else f"Remove {code(entry.name)} from package.xml.",
+            SourceError(package.file("package.xml"), entry.line, f"{entry.name} does not exist"),
+            (
+                f"<{entry.kind}>{entry.name}</{entry.kind}> does not exist",
+                f"<{entry.kind}>{match}</{entry.kind}>" if match else "remove it",
+            ),
         )
-    return Finding.failed(
-        expected,
-        "; ".join(parts),
-        " ".join(hints),
-        Evidence(
-            places=tuple(places),
-            tables=(Table("package.xml", ("what", "write"), tuple(rows)),),
-        ),
-    )

@@ -1,45 +1,30 @@
-"""Whether a class of a submission inherits another one: by import, alias, and own base classes.
+"""What the classes of a submission inherit: by import, alias, and own base classes.
 
-Pure: what names stand for is found out from the facts of the source, never by an import.
+What names stand for is found out from the facts of the source, never by an import.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from grader.submission.read.code_facts import SourceClass, SourceFile
 
 NODE = "rclpy.node.Node"
 
 # Classes of rclpy that are nodes as well.
-_SAME = {
-    NODE: frozenset(
-        {
-            NODE,
-            "rclpy.lifecycle.LifecycleNode",
-            "rclpy.lifecycle.Node",
-            "rclpy.lifecycle.node.LifecycleNode",
-            "rclpy.lifecycle.node.LifecycleNodeMixin",
-        }
-    )
+_NODES = {
+    NODE,
+    "rclpy.lifecycle.LifecycleNode",
+    "rclpy.lifecycle.Node",
+    "rclpy.lifecycle.node.LifecycleNode",
+    "rclpy.lifecycle.node.LifecycleNodeMixin",
 }
 _MOST_STEPS = 200
 
 
-class Kinship(Enum):
-    """What can be said of a class and a base class."""
-
-    YES = "yes"
-    NO = "no"
-    UNKNOWN = "unknown"
-    """It inherits a class from a package that was not handed in."""
-
-
-@dataclass(frozen=True)
-class FoundClass:
+class FoundClass(NamedTuple):
     """A class with the file that it is in."""
 
     file: SourceFile
@@ -50,60 +35,41 @@ class Family:
     """The classes of some files, and what they inherit."""
 
     def __init__(self, files: Sequence[SourceFile]) -> None:
-        """Index the files by their modules."""
-        self._files = files
+        self.classes = [FoundClass(file, one) for file in files for one in file.classes]
         self._modules = {file.module: file for file in files}
 
-    @property
-    def classes(self) -> tuple[FoundClass, ...]:
-        """Every class, in the order of files and lines."""
-        return tuple(FoundClass(file, one) for file in self._files for one in file.classes)
+    def inherits(self, item: FoundClass, base: str) -> bool:
+        """Whether a class inherits another one, as far as the files tell."""
+        return bool(self._ancestors(item) & (_NODES if base == NODE else {base}))
 
-    def ancestors(self, item: FoundClass) -> set[str]:
-        """Dotted names of everything that a class inherits, as far as the files tell."""
-        pending = self._resolved(item.found.bases, item.file, item.found)
+    def foreign(self, item: FoundClass) -> list[str]:
+        """Classes that it inherits from packages that were not handed in."""
+        return sorted(
+            name
+            for name in self._ancestors(item)
+            if "." in name
+            and name.partition(".")[0] not in ("rclpy", *sys.stdlib_module_names)
+            and self._split(name)[0] is None
+        )
+
+    def _ancestors(self, item: FoundClass) -> set[str]:
+        """Dotted names of everything that a class inherits."""
+        pending = _bases(item)
         known: set[str] = set()
         while pending and len(known) < _MOST_STEPS:
             name = pending.pop()
-            if name in known:
+            module, rest = self._split(name)
+            if name in known or module is None:
+                known.add(name)
                 continue
             known.add(name)
-            module, rest = self._split(name)
-            if module is None:
-                continue
             own = next((one for one in module.classes if one.name == rest), None)
             if own is not None:
-                pending += self._resolved(own.bases, module, own)
+                pending += _bases(FoundClass(module, own))
             else:
                 # A name that the module itself has from elsewhere, such as in __init__.py.
                 pending += [found for found in _named(rest, module) if found != rest]
         return known
-
-    def inherits(self, item: FoundClass, base: str) -> Kinship:
-        """Whether a class inherits another one."""
-        ancestors = self.ancestors(item)
-        if ancestors & _SAME.get(base, frozenset({base})):
-            return Kinship.YES
-        return Kinship.UNKNOWN if any(map(self._is_foreign, ancestors)) else Kinship.NO
-
-    def foreign(self, item: FoundClass) -> list[str]:
-        """Classes that it inherits from packages that were not handed in."""
-        return sorted(filter(self._is_foreign, self.ancestors(item)))
-
-    def _is_foreign(self, name: str) -> bool:
-        top, _, rest = name.partition(".")
-        if not rest or top == "rclpy" or top in sys.stdlib_module_names:
-            return False
-        return self._split(name)[0] is None
-
-    def _resolved(
-        self, bases: Iterable[str], file: SourceFile, inheriting: SourceClass
-    ) -> list[str]:
-        found: list[str] = []
-        for base in bases:
-            own = _class_in(base, file, inheriting)
-            found += [f"{file.module}.{own}"] if own else _named(base, file)
-        return found
 
     def _split(self, name: str) -> tuple[SourceFile | None, str]:
         """The file of the longest module that a dotted name begins with, and the rest."""
@@ -115,15 +81,18 @@ class Family:
         return None, ""
 
 
-def _class_in(base: str, file: SourceFile, inheriting: SourceClass) -> str | None:
-    """The class of the same file that a base class is, the nearest scope first."""
+def _bases(item: FoundClass) -> list[str]:
+    """What the base classes of a class may be, by their dotted names."""
+    file, inheriting = item
     names = {one.name for one in file.classes if one is not inheriting}
     scope = inheriting.name.split(".")[:-1]
-    for end in range(len(scope), -1, -1):
-        name = ".".join([*scope[:end], base])
-        if name in names:
-            return name
-    return None
+    found: list[str] = []
+    for base in inheriting.bases:
+        # A class of the same file, the nearest scope first.
+        nested = [".".join([*scope[:end], base]) for end in range(len(scope), -1, -1)]
+        own = next((name for name in nested if name in names), None)
+        found += [f"{file.module}.{own}"] if own else _named(base, file)
+    return found
 
 
 def _named(dotted: str, file: SourceFile) -> list[str]:
@@ -135,9 +104,8 @@ def _named(dotted: str, file: SourceFile) -> list[str]:
     # An alias of an alias, as in `Base = N` after `from rclpy.node import Node as N`.
     while head in names and head not in seen:
         seen.add(head)
-        target = names[head]
-        first, _, more = target.partition(".")
+        first, _, more = names[head].partition(".")
         if first == head or first not in names:
-            return [target + tail]
+            return [names[head] + tail]
         head, tail = first, (f".{more}" if more else "") + tail
     return [f"{module}.{dotted}" for module in file.stars] or [dotted]

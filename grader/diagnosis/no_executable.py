@@ -1,0 +1,145 @@
+"""Why the build installed no executable of a name where `ros2 run` finds it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from grader.checks.finding import Evidence
+from grader.checks.wording import code, codes
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.not_built import existing_package, why_not_built
+from grader.spec.nearest_name import nearest
+from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
+
+
+@dataclass(frozen=True)
+class NoExecutable(Symptom[Cause]):
+    """An executable is missing, or there is no function behind it."""
+
+    submission: SubmissionRecord
+    package: PackageRecord
+    name: str
+
+    @property
+    def setup_py(self) -> Evidence:
+        """Where executables of a Python package are defined."""
+        return _at(self.package, "setup.py", "console_scripts")
+
+
+def why_no_executable(submission: SubmissionRecord, package: str, name: str) -> Cause | None:
+    """Why a package has no executable of a name, or None if it has one."""
+    cause = why_not_built(submission, package)
+    if cause is not None:
+        return cause
+    record = existing_package(submission, package)
+    if name in record.executables and name not in dict(record.missing_targets):
+        return None
+    return cause_of(NoExecutable(submission, record, name))
+
+
+def _at(package: PackageRecord, file: str, what: str) -> Evidence:
+    return Evidence(places=(SourceError(package.file(file), None, what),))
+
+
+@explanation(NoExecutable)
+def no_such_function(symptom: NoExecutable) -> Cause | None:
+    """The entry point names a module or function that is not there, or not installed."""
+    target = dict(symptom.package.missing_targets).get(symptom.name)
+    if target is None:
+        return None
+    points_to = dict(symptom.package.entry_points).get(symptom.name, "")
+    entry = f"{symptom.name} = {points_to}" if points_to else symptom.name
+    hint = (
+        "An entry of console_scripts is `name = module:function`: the module with its package in "
+        "front, the function as it is called there."
+    )
+    if target.message.endswith("/__init__.py"):
+        hint = (
+            "find_packages() in setup.py leaves out a folder without __init__.py, which may be "
+            "empty: create it there."
+        )
+    seen = f"the entry point {code(entry)} leads nowhere: {target}"
+    return Cause(seen, hint, Evidence(places=(target,)))
+
+
+@explanation(NoExecutable)
+def in_another_package(symptom: NoExecutable) -> Cause | None:
+    """Another package of the submission has the executable."""
+    name, own = symptom.name, symptom.package
+    if name in dict(own.entry_points):
+        return None
+    for other in symptom.submission.packages:
+        if other.name != own.name and name in other.executables:
+            return Cause(
+                f"it is in the package {code(other.name)}: `ros2 run {other.name} {name}`",
+                f"Move its entry of console_scripts, and the module behind it, to "
+                f"{code(own.name)}.",
+                _at(other, "setup.py", "console_scripts"),
+            )
+    return None
+
+
+@explanation(NoExecutable)
+def installed_in_bin(symptom: NoExecutable) -> Cause | None:
+    """setup.cfg is missing or wrong: the executable was installed in bin/."""
+    if symptom.name not in symptom.package.misplaced_executables:
+        return None
+    folder = f"$base/lib/{symptom.package.name}"
+    return Cause(
+        f"{code(symptom.name)} was installed in bin/, where `ros2 run` does not look",
+        f"setup.cfg beside setup.py must hold these four lines: [develop] / script_dir={folder} / "
+        f"[install] / install_scripts={folder}",
+        _at(symptom.package, "setup.cfg", "script_dir"),
+    )
+
+
+@explanation(NoExecutable)
+def not_installed_by_cmake(symptom: NoExecutable) -> Cause | None:
+    """CMakeLists.txt does not install the executable, or under another name."""
+    package, name = symptom.package, symptom.name
+    if package.build_type == "ament_python":
+        return None
+    match = nearest(name, package.executables)
+    there = f"installed is {code(match)}" if match else "it was not installed"
+    if not match and package.executables:
+        there = f"installed are {codes(package.executables)}"
+    return Cause(
+        there,
+        f"CMakeLists.txt needs `install(TARGETS {name} DESTINATION lib/${{PROJECT_NAME}})`, or "
+        "install(PROGRAMS ...) for a Python script.",
+        _at(package, "CMakeLists.txt", "install"),
+    )
+
+
+@explanation(NoExecutable)
+def no_console_scripts(symptom: NoExecutable) -> Cause | None:
+    """setup.py defines no executables."""
+    if symptom.package.entry_points:
+        return None
+    entry = f"{symptom.name} = {symptom.package.name}.<your module>:main"
+    return Cause(
+        "setup.py defines no console_scripts",
+        f"Add to setup.py: entry_points={{'console_scripts': ['{entry}']}}.",
+        symptom.setup_py,
+    )
+
+
+@explanation(NoExecutable, general=True)
+def other_console_scripts(symptom: NoExecutable) -> Cause:
+    """setup.py gives the executable another name, or setup() does not get it."""
+    name, scripts = symptom.name, [script for script, _ in symptom.package.entry_points]
+    if name in scripts:
+        return Cause(
+            f"setup.py defines {code(name)}, but the build did not install it",
+            "setup() must be given it in entry_points={'console_scripts': [...]}, and setup.cfg "
+            f"the folder: install_scripts=$base/lib/{symptom.package.name}.",
+            symptom.setup_py,
+        )
+    match = nearest(name, scripts)
+    return Cause(
+        f"setup.py defines {code(match) if match else codes(scripts)}",
+        "The left side of an entry of console_scripts is the executable's name: write "
+        f"'{name} = ...'.",
+        symptom.setup_py,
+    )
