@@ -47,11 +47,13 @@ class Parameters(Model):
     needs: ClassVar[tuple[Need, ...]] = ()
     doubt: ClassVar[Doubt | None] = None
     """A failure in a run that was disturbed so must happen twice to count."""
+    asks: ClassVar[str] = ""
+    """What is asked for, in the words of the handout, such as ``the node `{self.name}```."""
 
     @property
     def asked_for(self) -> str:
-        """What is asked for, in the words of the handout."""
-        return ""
+        """The same with the values of the parameters."""
+        return self.asks.format(self=self)
 
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields that the check names, so that a misspelt one is found before any run."""

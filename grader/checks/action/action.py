@@ -63,10 +63,7 @@ def exists(recording: Recording, parameters: ActionExists) -> Finding:
 class Rejects(OfGoals):
     """Parameters of action.rejects."""
 
-    @property
-    def asked_for(self) -> str:
-        """The answer in words."""
-        return f"{self.words} is rejected"
+    asks = "{self.words} is rejected"
 
 
 @check("action.rejects", Subject.RECORDING, Rejects)

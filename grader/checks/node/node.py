@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks.check import NoParameters, Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import endpoints_seen
 from grader.checks.node.target_nodes import target_nodes
-from grader.checks.wording import code, codes, counted, listing
+from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.process_exit import (
@@ -25,27 +25,34 @@ from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
 
-@check("node.starts", Subject.RECORDING)
-def starts(recording: Recording, parameters: NoParameters) -> Finding:
+class Starts(Parameters):
+    """Parameters of node.starts."""
+
+    asks = "the program creates a node"
+
+
+@check("node.starts", Subject.RECORDING, Starts)
+def starts(recording: Recording, parameters: Starts) -> Finding:
     """The program starts and has a node.
 
     Judged by the ROS graph: any node of the student was seen, whatever its name.
     """
-    expected = "the program creates a node"
-    missing = why_no_node(recording)
-    if missing is not None:
-        return missing.finding(expected)
+    stop_if(why_no_node(recording))
     first = recording.student_nodes[0]
-    when_s = recording.since_launch_s(first.appeared_ns)
-    return Finding.passed(
-        expected,
-        f"{code(first.name)} appeared {when_s:.2f} s after launch",
-        Evidence(moments=(Moment(f"node {first.name} appeared", when_s),)),
-    )
+    return _appeared(recording, parameters, first, code(first.name))
+
+
+def _appeared(recording: Recording, parameters: Parameters, node: Node, what: str) -> Finding:
+    when_s = recording.since_launch_s(node.appeared_ns)
+    shown = Evidence(moments=(Moment(f"node {node.name} appeared", when_s),))
+    observed = f"{what} appeared {when_s:.2f} s after launch"
+    return Finding.passed(parameters.asked_for, observed, shown)
 
 
 class NodeExists(Parameters):
     """Parameters of node.exists."""
+
+    asks = "a node `{self.name}`"
 
     name: QualifiedNodeName = Field(
         description="Name of the node: `bot` is `/bot`; with a namespace `/robot/bot`."
@@ -61,17 +68,10 @@ def exists(recording: Recording, parameters: NodeExists) -> Finding:
 
     Judged by the ROS graph: a node of the student with this fully qualified name was seen.
     """
-    expected = f"a node {code(parameters.name)}"
-    missing = why_not_node(recording, parameters.name) or _other_publisher(recording, parameters)
-    if missing is not None:
-        return missing.finding(expected)
+    stop_if(why_not_node(recording, parameters.name))
+    stop_if(_other_publisher(recording, parameters))
     node = next(item for item in recording.student_nodes if item.name == parameters.name)
-    when_s = recording.since_launch_s(node.appeared_ns)
-    return Finding.passed(
-        expected,
-        f"it appeared {when_s:.2f} s after launch",
-        Evidence(moments=(Moment(f"node {node.name} appeared", when_s),)),
-    )
+    return _appeared(recording, parameters, node, "it")
 
 
 def _other_publisher(recording: Recording, parameters: NodeExists) -> Cause | None:
@@ -97,6 +97,11 @@ class Alive(Parameters):
         None, description="Name of the node; by default everything that was launched."
     )
 
+    @property
+    def asked_for(self) -> str:
+        """The life of the node in words."""
+        return f"{code(self.name) if self.name else 'the node'} runs until SIGINT (Ctrl-C)"
+
 
 @check("node.alive", Subject.RECORDING, Alive)
 def alive(recording: Recording, parameters: Alive) -> Finding:
@@ -107,79 +112,76 @@ def alive(recording: Recording, parameters: Alive) -> Finding:
     what is recorded, or subscribe to what they are sent; a helper node may come and go. What a
     sandbox never allows, such as a signal to the process that holds it, ends a node.
     """
-    who = code(parameters.name) if parameters.name else "the node"
-    expected = f"{who} runs until SIGINT (Ctrl-C)"
-    missing = (
-        why_not_node(recording, parameters.name) if parameters.name else why_no_node(recording)
-    )
-    process = declarations.process_of(recording, parameters.name) if parameters.name else None
-    ended = [process] if process and ended_early(recording, process) else []
-    if not ended and (parameters.name is None or process is None):
+    name = parameters.name
+    process = declarations.process_of(recording, name) if name else None
+    if process is None:
         ended = list(exited(recording))
+    else:
+        ended = [process] if ended_early(recording, process) else []
     if ended:
-        return why_it_exited(recording, ended[0]).finding(expected)
-    seen = offence(recording) or missing
-    if seen is not None:
-        return seen.finding(expected)
-    gone = _gone(recording, parameters.name)
-    if gone is not None:
-        when_s = recording.since_launch_s(gone.vanished_ns or recording.stop_ns)
-        return Finding.failed(
-            expected,
-            f"the node {code(gone.name)} left the ROS graph {when_s:.2f} s after launch, although "
-            "its process still ran",
-            "Call destroy_node() and rclpy.shutdown() only after rclpy.spin() has returned.",
-            Evidence(moments=(Moment(f"node {gone.name} vanished", when_s),)),
-        )
+        stop_if(why_it_exited(recording, ended[0]))
+    stop_if(offence(recording))
+    stop_if(why_not_node(recording, name) if name else why_no_node(recording))
+    stop_if(_why_gone(recording, name))
     watched_s = recording.since_launch_s(recording.stop_ns)
-    return Finding.passed(expected, f"it ran for {format_duration(watched_s)}, until SIGINT")
+    observed = f"it ran for {format_duration(watched_s)}, until SIGINT"
+    return Finding.passed(parameters.asked_for, observed)
 
 
-def _gone(recording: Recording, name: str | None) -> Node | None:
-    """A node that the scenario is about, and that vanished early without a sign of life after."""
-    if name is not None:
-        nodes = tuple(node for node in recording.student_nodes if node.name == name)
-        return next((node for node in nodes if _vanished(recording, node)), None)
+def _why_gone(recording: Recording, name: str | None) -> Cause | None:
+    """A node that the scenario is about vanished early, and gave no sign of life after."""
     concerned = target_nodes(recording)
     nodes = concerned or recording.student_nodes
+    if name is not None:
+        nodes = tuple(node for node in recording.student_nodes if node.name == name)
     gone = [node for node in nodes if _vanished(recording, node)]
     # Of nodes that the scenario is not about, one is as good as another.
-    return gone[0] if gone and (concerned or len(gone) == len(nodes)) else None
+    if not gone or (name is None and not concerned and len(gone) < len(nodes)):
+        return None
+    when_s = recording.since_launch_s(gone[0].vanished_ns or recording.stop_ns)
+    return Cause(
+        f"the node {code(gone[0].name)} left the ROS graph {when_s:.2f} s after launch, although "
+        "its process still ran",
+        "Call destroy_node() and rclpy.shutdown() only after rclpy.spin() has returned.",
+        Evidence(moments=(Moment(f"node {gone[0].name} vanished", when_s),)),
+    )
 
 
 def _vanished(recording: Recording, node: Node) -> bool:
-    if node.vanished_ns is None or node.vanished_ns >= recording.stop_ns:
+    gone_ns = node.vanished_ns
+    if gone_ns is None or gone_ns >= recording.stop_ns:
         return False
     # What a stimulus ends is meant to vanish, within the lease of its participant.
-    if any(item.time_ns <= node.vanished_ns for item in recording.interventions):
+    if any(item.time_ns <= gone_ns for item in recording.interventions):
         return False
-    return not _lives_after(recording, node.name, node.vanished_ns)
-
-
-def _lives_after(recording: Recording, name: str, time_ns: int) -> bool:
-    # The graph can lose a node for a moment on a busy machine; what it does tells better.
+    # The graph can lose a node for a moment on a busy machine; what it does tells better. What it
+    # subscribed to tells nothing: others publish that.
     again = any(
-        node.name == name and (node.vanished_ns is None or node.vanished_ns > time_ns)
-        for node in recording.student_nodes
+        other.name == node.name and (other.vanished_ns is None or other.vanished_ns > gone_ns)
+        for other in recording.student_nodes
     )
     answered = any(
-        call.service.startswith(f"{name}/") and (call.answered_ns or 0) > time_ns
+        call.service.startswith(f"{node.name}/") and (call.answered_ns or 0) > gone_ns
         for call in recording.calls
     )
-    # Not what it subscribed to: that others publish.
-    topics = {
-        item.topic for item in recording.student_endpoints(Kind.PUBLISHER) if item.node == name
-    }
     published = any(
-        message.stamp_ns > time_ns for topic in topics for message in recording.on(topic)[-1:]
+        message.stamp_ns > gone_ns
+        for item in recording.student_endpoints(Kind.PUBLISHER)
+        if item.node == node.name
+        for message in recording.on(item.topic)[-1:]
     )
-    return again or answered or published
+    return not (again or answered or published)
 
 
 class Ends(Parameters):
     """Parameters of node.ends."""
 
     within: Duration = Field(description="How long the process may take to end after SIGINT.")
+
+    @property
+    def asked_for(self) -> str:
+        """The end in words."""
+        return f"the process ends within {format_duration(self.within)} of SIGINT (Ctrl-C)"
 
 
 @check("node.ends", Subject.RECORDING, Ends)
@@ -189,32 +191,27 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
     Judged by the process: after SIGINT it must end in time, and leave no process behind. Its
     exit status does not matter, nor does a traceback of KeyboardInterrupt.
     """
-    expected = f"the process ends within {format_duration(parameters.within)} of SIGINT (Ctrl-C)"
     if not recording.processes:
-        missing = why_no_node(recording) or Cause("nothing was launched")
-        return missing.finding(expected)
-    ended = why_ended(recording, "it had already ended before SIGINT")
-    if ended is not None:
-        return ended.finding(expected)
-    stuck = [process for process in recording.processes if process.exited_ns is None]
+        stop_if(why_no_node(recording) or Cause("nothing was launched"))
+    stop_if(why_ended(recording, "it had already ended before SIGINT"))
+    stuck = [process.name for process in recording.processes if process.exited_ns is None]
     if stuck:
-        return Finding.error(
-            expected,
-            f"{codes(process.name for process in stuck)} could not be ended, not even by SIGKILL",
-        )
+        text = f"{codes(stuck)} could not be ended, not even by SIGKILL"
+        return Finding.error(parameters.asked_for, text)
     asked = [process for process in recording.processes if not _was_killed(recording, process)]
     slow = [process for process in asked if not _in_time(process, parameters)]
     if slow:
         worst = max(slow, key=lambda process: _stop_s(recording, process))
-        return _too_late(recording, worst, parameters).finding(expected)
-    leaving = [process for process in recording.processes if process.survivors]
-    if leaving:
-        return _survived(recording, leaving[0]).finding(expected)
+        stop_if(_why_slow(recording, worst, parameters))
+    for process in recording.processes:
+        if process.survivors:
+            stop_if(_why_survived(recording, process))
     if not asked:
-        return Finding.error(expected, "a stimulus of the scenario had ended it before")
+        text = "a stimulus of the scenario had ended it before"
+        return Finding.error(parameters.asked_for, text)
     longest_s = max(_stop_s(recording, process) for process in asked)
     return Finding.passed(
-        expected,
+        parameters.asked_for,
         f"ended {format_duration(longest_s)} after SIGINT",
         Evidence(moments=(Moment("SIGINT", recording.since_launch_s(recording.stop_ns)),)),
     )
@@ -222,15 +219,11 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
 
 def _was_killed(recording: Recording, process: Process) -> bool:
     """Whether a stimulus ended it in the middle of the run."""
-    ended_ns = process.exited_ns
-    return (
-        process.stopped_by != "itself"
-        and ended_ns is not None
-        and any(
-            item.process == process.name and item.action == "kill" and item.time_ns <= ended_ns
-            for item in recording.interventions
-        )
-        and ended_ns < recording.stop_ns
+    ended_ns = process.exited_ns or recording.end_ns
+    return process.stopped_by != "itself" and any(
+        item.process == process.name and item.action == "kill" and item.time_ns <= ended_ns
+        for item in recording.interventions
+        if ended_ns < recording.stop_ns
     )
 
 
@@ -247,50 +240,40 @@ def _stop_s(recording: Recording, process: Process) -> float:
     return max(((process.exited_ns or recording.end_ns) - recording.stop_ns) / NS, 0.0)
 
 
-def _too_late(recording: Recording, process: Process, parameters: Ends) -> Cause:
+def _why_slow(recording: Recording, process: Process, parameters: Ends) -> Cause:
     took_s = _stop_s(recording, process)
-    end_ns = process.exited_ns or recording.end_ns
+    seen = f"{code(process.name)} did not end after SIGINT; {process.stopped_by} was needed"
     if process.stopped_by == "SIGINT":
-        observed = f"{code(process.name)} needed {format_duration(took_s)} to end after SIGINT"
-    else:
-        observed = f"{code(process.name)} did not end after SIGINT; {process.stopped_by} was needed"
-    stolen_s = recording.stolen_s(recording.stop_ns, end_ns)
+        seen = f"{code(process.name)} needed {format_duration(took_s)} to end after SIGINT"
+    stolen_s = recording.stolen_s(recording.stop_ns, process.exited_ns or recording.end_ns)
     if stolen_s > 0.0 and took_s - stolen_s <= parameters.within:
         return Cause.to_repeat(
-            f"{observed}, but the machine took {format_duration(stolen_s)} from it meanwhile"
+            f"{seen}, but the machine took {format_duration(stolen_s)} from it meanwhile"
         )
-    stop_s = recording.since_launch_s(recording.stop_ns)
+    lines = [
+        line.text
+        for line in recording.log
+        if line.process == process.name and line.time_ns >= recording.stop_ns
+    ]
+    sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
     return Cause(
-        observed,
+        seen,
         "Ctrl-C raises KeyboardInterrupt: look for a bare `except:` or `except BaseException:` "
         "in a loop that swallows it, for a signal handler of your own, for a callback that "
         "sleeps or loops, and for a thread that is not a daemon.",
-        Evidence(
-            moments=(
-                Moment("SIGINT", stop_s),
-                Moment(f"{process.name} ended", recording.since_launch_s(end_ns)),
-            ),
-            log=tuple(
-                line.text
-                for line in recording.log
-                if line.process == process.name and line.time_ns >= recording.stop_ns
-            )[-10:],
-        ),
+        Evidence(moments=(sigint, _end(recording, process)), log=tuple(lines[-10:])),
     )
 
 
-def _survived(recording: Recording, process: Process) -> Cause:
+def _why_survived(recording: Recording, process: Process) -> Cause:
     number = counted(len(process.survivors), "process", "processes")
     return Cause(
-        f"{code(process.name)} left {number} running behind it: "
-        f"{listing(code(command) for command in process.survivors)}",
+        f"{code(process.name)} left {number} running behind it: {codes(process.survivors)}",
         "End child processes before main() returns: process.terminate(), then process.wait().",
-        Evidence(
-            moments=(
-                Moment(
-                    f"{process.name} ended",
-                    recording.since_launch_s(process.exited_ns or recording.end_ns),
-                ),
-            )
-        ),
+        Evidence(moments=(_end(recording, process),)),
     )
+
+
+def _end(recording: Recording, process: Process) -> Moment:
+    when_s = recording.since_launch_s(process.exited_ns or recording.end_ns)
+    return Moment(f"{process.name} ended", when_s)

@@ -29,10 +29,7 @@ _IDLE = {
 class Dependencies(OfPackage):
     """Parameters of package.dependencies."""
 
-    @property
-    def asked_for(self) -> str:
-        """The entries in words."""
-        return f"every ROS package that {code(self.package)} imports is in package.xml"
+    asks = "every ROS package that `{self.package}` imports is in package.xml"
 
 
 @check("package.dependencies", Subject.SUBMISSION, Dependencies)

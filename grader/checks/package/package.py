@@ -64,10 +64,7 @@ def found(submission: SubmissionRecord, parameters: PackageFound) -> Finding:
 class Builds(OfPackage):
     """Parameters of package.builds."""
 
-    @property
-    def asked_for(self) -> str:
-        """The build in words."""
-        return f"`colcon build` builds {code(self.package)}"
+    asks = "`colcon build` builds `{self.package}`"
 
 
 @check("package.builds", Subject.SUBMISSION, Builds)
@@ -121,6 +118,7 @@ class Executable(OfPackage):
     """Parameters of package.executable."""
 
     needs = (Submitted(executable="executable"),)
+    asks = "the executable `{self.executable}`, for `ros2 run {self.package} {self.executable}`"
 
     executable: str = Field(min_length=1, description="Name that `ros2 run` is given.")
     remap: bool = Field(
@@ -128,13 +126,6 @@ class Executable(OfPackage):
         description="Where the one executable of the package has another name or lies in bin/, run "
         "that in its place. This check fails, and what requires it is judged all the same.",
     )
-
-    @property
-    def asked_for(self) -> str:
-        """The executable in words."""
-        return f"the executable {code(self.executable)}, for `ros2 run {self.package} " + (
-            f"{self.executable}`"
-        )
 
 
 @check("package.executable", Subject.SUBMISSION, Executable)

@@ -270,10 +270,7 @@ def _shared(
 class NoPrint(OfPackage):
     """Parameters of source.no_print."""
 
-    @property
-    def asked_for(self) -> str:
-        """The absence of prints in words."""
-        return "no print(): the node's logger tells what happens"
+    asks = "no print(): the node's logger tells what happens"
 
 
 @check("source.no_print", Subject.SUBMISSION, NoPrint)
