@@ -83,24 +83,21 @@ def why_late(
     asked_ns: int,
     answered_ns: int | None,
     within_s: float,
-    *,
-    never: str,
-    late: str,
+    seen: str,
     hint: str,
     evidence: Evidence,
 ) -> Cause | None:
     """Why an answer did not come in time, or None if it did.
 
     Args:
-        never: What is said where no answer came.
-        late: What is said of a late one; how long it took follows.
+        seen: What did not happen, such as ``the call was not answered``.
     """
     if answered_ns is None:
-        return why_unanswered(recording, never, kind, name, asked_ns, within_s)
+        return why_unanswered(recording, seen, kind, name, asked_ns, within_s)
     took_s = (answered_ns - asked_ns) / NS
     if took_s <= within_s:
         return None
-    seen = f"{late} {format_duration(took_s)}"
+    seen = f"{seen} for {format_duration(took_s)}"
     taken = why_taken(recording, seen, asked_ns, answered_ns, within_s)
     return taken or Cause(seen, hint, evidence)
 

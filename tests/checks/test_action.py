@@ -82,7 +82,7 @@ class TestResult:
 
     def test_never_ends(self):
         run = acting(goal(end_s=None))
-        assert "but never had a result" in failing("action.result", run, **RESULT)
+        assert "did not come" in failing("action.result", run, **RESULT)
 
     def test_the_process_died(self):
         run = acting(goal(end_s=None), processes=(died(-11, 1.3),), ending=Ending.EXITED)
@@ -90,7 +90,7 @@ class TestResult:
 
     def test_late(self):
         run = acting(goal(end_s=2.5))
-        assert "the result of the goal (order = 4) came only after 2.5 s" in failing("action.result", run, **RESULT)
+        assert "did not come for 2.5 s" in failing("action.result", run, **RESULT)
         taken_run = acting(goal(end_s=2.5), disturbance=taken(1.0, 3.5, waited_s=0.6))
         assert judge("action.result", taken_run, **RESULT).disturbed
 
@@ -213,7 +213,7 @@ class TestCancels:
 
     def test_late(self):
         run = acting(canceled(end_s=2.21))
-        assert "was canceled only after 2 s" in failing("action.cancels", run, **FIB)
+        assert "was not canceled for 2 s" in failing("action.cancels", run, **FIB)
         busy = acting(canceled(end_s=2.21), disturbance=taken(1.2, 3.2, waited_s=1.5))
         assert judge("action.cancels", busy, **FIB).disturbed
 

@@ -114,7 +114,7 @@ class TestResponds:
             log=output(traceback("ZeroDivisionError: division by zero")),
         )  # fmt: skip
         found = failing("service.responds", run, **TRUE)
-        assert "was never answered: the process" in found
+        assert "was not answered: the process" in found
         assert f"ZeroDivisionError: division by zero ({SOURCE}:14)" in found
 
     def test_the_executor_never_spun(self):
@@ -134,7 +134,7 @@ class TestResponds:
 
     def test_nothing_is_said_of_an_executor_that_was_not_asked(self):
         found = failing("service.responds", serving(asked(1.0, None)), **TRUE)
-        assert "was never answered" in found
+        assert "was not answered" in found
         assert "spins" not in found
 
     def test_a_callback_that_does_not_return_while_the_executor_spins(self):
@@ -144,7 +144,7 @@ class TestResponds:
 
     def test_too_late(self):
         found = failing("service.responds", serving(asked(answer_s=1.5)), **TRUE)
-        assert "was answered only after 1.5 s" in found
+        assert "was not answered for 1.5 s" in found
 
     def test_the_machine_took_the_time(self):
         run = serving(asked(answer_s=1.5), disturbance=taken(1.0, 2.5, waited_s=0.8))

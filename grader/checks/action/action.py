@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
 from pydantic import Field, model_validator
 
-from grader.checks.action.goals import (
-    OfGoals,
-    answered_goals,
-    evidence,
-    is_undisturbed,
-    the_goal,
-    why_rejected,
-)
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.fields import (
     FieldTolerance,
@@ -25,19 +17,22 @@ from grader.checks.fields import (
     unlike,
     words,
 )
-from grader.checks.finding import Finding, Plot
+from grader.checks.finding import Evidence, Finding, Plot
 from grader.checks.need import Doubt, GoalSent
-from grader.checks.requests import why_late, why_other_fields
+from grader.checks.requests import judged_requests, timeline, why_late, why_other_fields
 from grader.checks.value import EXACT
-from grader.checks.wording import counted, percent
+from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_answer import why_raised
+from grader.diagnosis.no_answer import why_raised, why_unanswered
 from grader.diagnosis.no_server import ACTION, is_offered
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration, Frequency, Ratio
 from grader.spec.unit import format_duration
+
+# How soon a server must say whether it accepts a goal: its callback only decides.
+_ANSWER_S = 1.0
 
 
 class ActionExists(Parameters):
@@ -58,6 +53,82 @@ def exists(recording: Recording, parameters: ActionExists) -> Finding:
     Judged by the ROS graph: an action server of the student's was there, with this type.
     """
     return is_offered(recording, ACTION, parameters.action, parameters.type)
+
+
+class OfGoals(Parameters):
+    """Part of the parameters of every check of goals."""
+
+    needs = (GoalSent(),)
+    doubt = Doubt.ANSWER_MISSED
+
+    action: TopicName = Field(description="Action that a `send_goal` of the scenario sends to.")
+    goal: dict[str, Any] = Field(
+        default_factory=dict,
+        description="Which goals are judged: those with these fields; by default all that the "
+        "check can be about.",
+    )
+
+    def named_fields(self) -> Iterator[NamedFields]:
+        """The fields of the goal."""
+        yield NamedFields(("goal",), self.action, self.goal)
+
+    @property
+    def words(self) -> str:
+        """The goals in words."""
+        which = f" with {words(self.goal)}" if self.goal else ""
+        return f"the goal{which} of {code(self.action)}"
+
+
+def answered_goals(
+    recording: Recording, parameters: OfGoals, is_judged: Callable[[Goal], bool] = lambda _: True
+) -> tuple[Goal, ...]:
+    """The goals that a check judges, each accepted or rejected; ends the check without any."""
+    found = judged_requests(
+        recording, ACTION, parameters.action, recording.goals, parameters.goal, is_judged
+    )
+    for goal in found:
+        if goal.accepted is None:
+            what = f"{the_goal(goal)} was neither accepted nor rejected"
+            stop_if(why_unanswered(recording, what, ACTION, goal.action, goal.sent_ns, _ANSWER_S))
+    return found
+
+
+def is_undisturbed(goal: Goal) -> bool:
+    """Whether the probe let a goal come to its own end."""
+    return goal.cancel_after_s is None and not goal.preempted
+
+
+def the_goal(goal: Goal) -> str:
+    """A goal in words."""
+    return f"the goal ({words(goal.goal)})"
+
+
+def why_rejected(recording: Recording, goal: Goal) -> Cause | None:
+    """Why a goal that should have been accepted was not, or None if it was."""
+    if goal.accepted is not False:
+        return None
+    return Cause(
+        f"{the_goal(goal)} was rejected",
+        "A goal_callback must return GoalResponse.ACCEPT for a goal that is right; without one "
+        "every goal is accepted.",
+        evidence(recording, goal),
+    )
+
+
+def evidence(recording: Recording, goal: Goal) -> Evidence:
+    """What became of a goal, step by step."""
+    agreed = "accepted" if goal.cancel_accepted else "refused"
+    steps = [
+        (goal.sent_ns, f"goal sent: {words(goal.goal)}"),
+        (goal.answered_ns, "accepted" if goal.accepted else "rejected"),
+        *((item.time_ns, f"feedback: {words(item.value)}") for item in goal.feedback),
+        *((time_ns, f"status: {status}") for time_ns, status in goal.statuses),
+        (goal.canceled_ns, "asked to cancel"),
+        (goal.cancel_answered_ns, f"cancel {agreed}"),
+        (goal.result_ns, f"{goal.status}: {words(goal.result or {})}"),
+    ]
+    known = [(at_ns, text) for at_ns, text in steps if at_ns is not None]
+    return timeline(recording, f"A goal of {goal.action}", known)
 
 
 class Rejects(OfGoals):
@@ -229,29 +300,10 @@ def result(recording: Recording, parameters: Result) -> Finding:
     """
     goals = answered_goals(recording, parameters, is_undisturbed)
     for goal in goals:
-        shown = evidence(recording, goal)
         stop_if(why_rejected(recording, goal))
-        stop_if(
-            why_late(
-                recording,
-                ACTION,
-                goal.action,
-                goal.sent_ns,
-                goal.result_ns,
-                parameters.within,
-                never=f"{the_goal(goal)} was accepted, but never had a result",
-                late=f"the result of {the_goal(goal)} came only after",
-                hint="Look for a sleep that is too long.",
-                evidence=shown,
-            )
-        )
+        stop_if(_why_no_result(recording, goal, parameters.within))
         stop_if(_why_other_status(recording, goal, parameters))
-        seen = f"the result of {the_goal(goal)} has"
-        stop_if(
-            why_other_fields(
-                seen, "result", goal.result, parameters.result, parameters.tolerance, shown
-            )
-        )
+        stop_if(_why_other_result(recording, goal, parameters))
     observed = f"{goals[0].status}: {words(goals[0].result or {})}"
     return Finding.passed(parameters.asked_for, observed, evidence(recording, goals[0]))
 
@@ -269,3 +321,18 @@ def _why_other_status(recording: Recording, goal: Goal, parameters: Result) -> C
         + (" Without it rclpy aborts the goal." if is_aborted else ""),
         evidence(recording, goal),
     )
+
+
+def _why_no_result(recording: Recording, goal: Goal, within_s: float) -> Cause | None:
+    seen, hint = (
+        f"the result of {the_goal(goal)} did not come",
+        "Look for a sleep that is too long.",
+    )
+    sent_ns, end_ns, shown = goal.sent_ns, goal.result_ns, evidence(recording, goal)
+    return why_late(recording, ACTION, goal.action, sent_ns, end_ns, within_s, seen, hint, shown)
+
+
+def _why_other_result(recording: Recording, goal: Goal, parameters: Result) -> Cause | None:
+    seen, shown = f"the result of {the_goal(goal)} has", evidence(recording, goal)
+    wanted, tolerance = parameters.result, parameters.tolerance
+    return why_other_fields(seen, "result", goal.result, wanted, tolerance, shown)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from grader.checks.action.goals import (
+from grader.checks.action.action import (
     OfGoals,
     answered_goals,
-    ended_alone,
     evidence,
     the_goal,
     why_rejected,
@@ -83,25 +82,17 @@ def _why_not_asked(recording: Recording, goal: Goal) -> Cause | None:
     lasted_s = (goal.result_ns - (goal.answered_ns or goal.sent_ns)) / NS
     if lasted_s > (goal.cancel_after_s or 0.0):
         return Cause.to_repeat("the probe was too late to ask for it")
-    return ended_alone(recording, goal)
+    return _ended_alone(recording, goal)
 
 
 def _why_not_canceled(recording: Recording, goal: Goal, within_s: float) -> Cause | None:
     """Why a goal that was asked to cancel was not canceled in time: refused, too late, or never."""
     asked_ns, shown = goal.canceled_ns or 0, evidence(recording, goal)
     if goal.status == "canceled" and goal.result_ns is not None:
-        return why_late(
-            recording,
-            ACTION,
-            goal.action,
-            asked_ns,
-            goal.result_ns,
-            within_s,
-            never="",
-            late="the goal was canceled only after",
-            hint="Look at goal_handle.is_cancel_requested in every round of the loop.",
-            evidence=shown,
-        )
+        seen = f"{the_goal(goal)} was not canceled"
+        hint = "Look at goal_handle.is_cancel_requested in every round of the loop."
+        server, end_ns = goal.action, goal.result_ns
+        return why_late(recording, ACTION, server, asked_ns, end_ns, within_s, seen, hint, shown)
     if goal.cancel_accepted is False and not _answered_too_late(goal):
         return Cause(
             "the server refused to cancel the goal",
@@ -144,6 +135,21 @@ def _answered_too_late(goal: Goal) -> bool:
     # An executor that was busy until then answers right before it tells the result.
     waited = (goal.cancel_answered_ns - asked_ns) / max(goal.result_ns - asked_ns, 1)
     return waited >= _AT_THE_END
+
+
+def _ended_alone(recording: Recording, goal: Goal) -> Cause:
+    """A goal came to an end before the probe could end it."""
+    lasted_s = ((goal.result_ns or 0) - (goal.answered_ns or goal.sent_ns)) / NS
+    what = (
+        f"{the_goal(goal)} {goal.status} {format_duration(lasted_s)} after it was accepted, before "
+        "it was to be ended"
+    )
+    return why_raised(recording, what, goal.sent_ns) or Cause(
+        what,
+        "The execute callback returns too early: it must work on the goal step by step, with a "
+        "pause between.",
+        evidence(recording, goal),
+    )
 
 
 class Preempts(OfGoals):
@@ -198,19 +204,10 @@ def _why_goes_on(recording: Recording, old: Goal, new: Goal, within_s: float) ->
         late_s = (new.sent_ns - old.result_ns) / NS
         if recording.stolen_s(old.sent_ns, new.sent_ns) >= late_s:
             return Cause.to_repeat("the old goal had ended before the new one was sent")
-        return ended_alone(recording, old)
+        return _ended_alone(recording, old)
     if old.status == "succeeded":
         seen = f"{the_goal(old)} was worked on to its end, and succeeded"
         return Cause(seen, hint, evidence(recording, old))
-    return why_late(
-        recording,
-        ACTION,
-        old.action,
-        new.sent_ns,
-        old.result_ns,
-        within_s,
-        never="",
-        late=f"{the_goal(old)} ended after the new one was sent, but only after",
-        hint=hint,
-        evidence=evidence(recording, old),
-    )
+    seen = f"after the new goal was sent, {the_goal(old)} did not end"
+    sent_ns, end_ns, shown = new.sent_ns, old.result_ns, evidence(recording, old)
+    return why_late(recording, ACTION, old.action, sent_ns, end_ns, within_s, seen, hint, shown)

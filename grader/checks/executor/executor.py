@@ -12,7 +12,7 @@ from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.first_seen import nodes_seen
 from grader.checks.need import Doubt
-from grader.checks.node.target_nodes import target_nodes
+from grader.checks.node.node import target_nodes
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node

@@ -14,7 +14,6 @@ from grader.checks.interface.definition_differences import (
     constant_differences,
     field_differences,
 )
-from grader.checks.package.dependency import INSIDE_EXPORT
 from grader.checks.wording import code, codes, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_definition import InterfaceName, find_definition
@@ -248,7 +247,6 @@ def _missing(package: PackageRecord, used: Iterable[str]) -> Iterator[tuple[str,
     """The tags that package.xml lacks, with what each is for."""
     building = {item.name for item in package.dependencies if item.kind in _BUILD_KINDS}
     running = {item.name for item in package.dependencies if item.kind in _RUN_KINDS}
-    misplaced = {item.name for item in package.dependencies if item.kind.startswith("export/")}
     wanted = [
         ("buildtool_depend", GENERATORS, GENERATORS in building, "generates the code"),
         ("exec_depend", _RUNTIME, _RUNTIME in running, "what the generated code needs to run"),
@@ -263,5 +261,4 @@ def _missing(package: PackageRecord, used: Iterable[str]) -> Iterator[tuple[str,
             wanted.append(("exec_depend", name, name in running, "its messages are imported"))
     for kind, name, is_there, why in wanted:
         if not is_there:
-            inside = f"; {INSIDE_EXPORT}" if name in misplaced else ""
-            yield f"<{kind}>{name}</{kind}>", f"{why}{inside}"
+            yield f"<{kind}>{name}</{kind}>", why

@@ -7,7 +7,6 @@ from pydantic import Field
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import endpoints_seen
-from grader.checks.node.target_nodes import target_nodes
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
@@ -19,7 +18,7 @@ from grader.diagnosis.process.process_exit import (
     why_it_exited,
 )
 from grader.measure import declarations
-from grader.recording.model import NS, Kind, Node, Process, Recording
+from grader.recording.model import NS, Kind, Node, Owner, Process, Recording
 from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
@@ -88,6 +87,26 @@ def _other_publisher(recording: Recording, parameters: NodeExists) -> Cause | No
         "Create the publisher with self.create_publisher(...) in the node that is asked for.",
         Evidence(moments=endpoints_seen(recording, publishers)),
     )
+
+
+def target_nodes(recording: Recording) -> tuple[Node, ...]:
+    """The student's nodes that publish what the probe subscribes to, or subscribe to what it sends.
+
+    A program may have more nodes, such as one that only reads parameters or listens to another
+    node of the program, and is destroyed again or never spun; what becomes of those is its own
+    affair.
+
+    Returns:
+        In the order of their appearance; empty if no node has such an endpoint.
+    """
+    ends = {(item.kind, item.topic) for item in recording.endpoints if item.owner is Owner.PROBE}
+    names = {
+        item.node
+        for item in recording.endpoints
+        if item.owner is Owner.STUDENT
+        and any(kind is not item.kind and topic == item.topic for kind, topic in ends)
+    }
+    return tuple(node for node in recording.student_nodes if node.name in names)
 
 
 class Alive(Parameters):

@@ -21,8 +21,7 @@ from grader.checks.fields import (
 )
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.need import ParameterSet, Recorded
-from grader.checks.parameter.parameter import OfSetting, refusal, settings_to
-from grader.checks.parameter.parameter_calls import settings
+from grader.checks.parameter.parameter import OfSetting, refusal, settings, settings_to
 from grader.checks.value import EXACT
 from grader.checks.wording import code, counted, percent, value_text
 from grader.diagnosis.cause import Cause

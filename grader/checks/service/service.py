@@ -122,20 +122,14 @@ def judged_calls(
 def why_slow(recording: Recording, calls: tuple[Call, ...], within_s: float) -> Cause | None:
     """Why one of some calls was not answered in time, or None if all were."""
     worst = max(calls, key=_took_s)
-    seen = f"{_which(calls, worst)} to {code(worst.service)} was"
-    return why_late(
-        recording,
-        SERVICE,
-        worst.service,
-        worst.requested_ns,
-        worst.answered_ns,
-        within_s,
-        never=f"{seen} never answered",
-        late=f"{seen} answered only after",
-        hint="A service callback must return soon: no time.sleep() and no waiting in it, nor in a "
-        "timer or subscription callback that the same executor runs.",
-        evidence=_evidence(recording, calls),
+    sent_ns, end_ns, server = worst.requested_ns, worst.answered_ns, worst.service
+    seen = f"{_which(calls, worst)} to {code(server)} was not answered"
+    hint = (
+        "A service callback must return soon: no time.sleep() and no waiting in it, nor in a "
+        "timer or subscription callback that the same executor runs."
     )
+    shown = _evidence(recording, calls)
+    return why_late(recording, SERVICE, server, sent_ns, end_ns, within_s, seen, hint, shown)
 
 
 def _which(calls: tuple[Call, ...], call: Call) -> str:

@@ -1,24 +1,32 @@
-"""Checks of topics: who publishes and subscribes, with which type."""
+"""Checks of topics: who publishes and subscribes, with which type, and not in the robot's name."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
 
-from grader.checks.check import Parameters, Subject, check
+from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.finding import Evidence, Finding, Moment, Status
+from grader.checks.first_seen import endpoints_seen, nodes_seen
 from grader.checks.need import Recorded
 from grader.checks.wording import code, codes
 from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
+from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.type_confusion import OtherType
 from grader.recording.model import Endpoint, Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
 
+PROBE = "rosgrade_probe"
+"""Name of the node through which a run is watched."""
 
-class _Named(Parameters):
+
+class Topic(Parameters):
+    """Parameters of topic.published and topic.subscribed, and part of those of topic.type."""
+
     topic: TopicName = Field(description="Fully qualified topic name.")
     remap: bool = Field(
         False,
@@ -26,10 +34,6 @@ class _Named(Parameters):
         "run again with that topic remapped to this one. This check fails, and the checks that "
         "require it are judged in the second run: a wrong name costs the points of one check.",
     )
-
-
-class Topic(_Named):
-    """Parameters of topic.published and topic.subscribed."""
 
 
 @check("topic.published", Subject.RECORDING, Topic)
@@ -52,50 +56,45 @@ def subscribed(recording: Recording, parameters: Topic) -> Finding:
 
 
 def _presence(recording: Recording, kind: Kind, parameters: Topic) -> Finding:
-    topic = parameters.topic
-    expected = f"a {kind.value} on {code(topic)}"
-    finding = _absence(recording, kind, parameters, expected)
-    if finding is not None:
-        return finding
-    endpoints = recording.student_endpoints(kind, topic)
+    expected = f"a {kind.value} on {code(parameters.topic)}"
+    absent = _absence(recording, kind, parameters, expected)
+    if absent is not None:
+        return absent
+    endpoints = recording.student_endpoints(kind, parameters.topic)
     if not endpoints:
         return Finding.passed(expected, "messages came from one, too short-lived for the graph")
     first = min(endpoints, key=lambda item: item.appeared_ns)
-    when_s = recording.since_launch_s(first.appeared_ns)
+    nodes, when_s = {item.node for item in endpoints}, recording.since_launch_s(first.appeared_ns)
     return Finding.passed(
         expected,
-        f"{codes(sorted({item.node for item in endpoints}))} has one, seen {when_s:.2f} s after "
-        "launch",
-        Evidence(moments=(Moment(f"{kind.value} on {topic} appeared", when_s),)),
+        f"{codes(sorted(nodes))} has one, seen {when_s:.2f} s after launch",
+        Evidence(moments=endpoints_seen(recording, [first])),
     )
 
 
-def _absence(
-    recording: Recording, kind: Kind, parameters: Topic | Type, expected: str
-) -> Finding | None:
+def _absence(recording: Recording, kind: Kind, parameters: Topic, expected: str) -> Finding | None:
     """The finding of an endpoint that is not there, or only under another name."""
-    cause = why_no_endpoint(recording, kind, parameters.topic)
+    topic = parameters.topic
+    cause = why_no_endpoint(recording, kind, topic)
     if cause is not None:
         finding = cause.finding(expected)
-        remap = misnamed(recording, kind, parameters.topic) if parameters.remap else ""
+        remap = misnamed(recording, kind, topic) if parameters.remap else ""
         return replace(finding, remap=remap) if finding.status is Status.FAILED else finding
-    for remap in recording.remaps:
+    for remap in recording.remaps if parameters.remap else ():
         found, _, name = remap.partition(":=")
-        if parameters.remap and name == parameters.topic:
-            return replace(
-                Finding.failed(
-                    expected,
-                    f"one on {code(found)} instead; everything else was judged in a run with "
-                    f"`--ros-args -r {remap}`, which puts the name right",
-                    f"Write the topic's name as '{name.lstrip('/')}'.",
-                    Evidence(moments=_moments(recording, recording.student_endpoints(kind, name))),
-                ),
-                remap=remap,
+        if name == topic:
+            failed = Finding.failed(
+                expected,
+                f"one on {code(found)} instead; everything else was judged in a run with "
+                f"`--ros-args -r {remap}`, which puts the name right",
+                f"Write the topic's name as '{name.lstrip('/')}'.",
+                _types_seen(recording, recording.student_endpoints(kind, name)),
             )
+            return replace(failed, remap=remap)
     return None
 
 
-class Type(_Named):
+class Type(Topic):
     """Parameters of topic.type."""
 
     needs = (Recorded(type="type", kind="kind"),)
@@ -112,39 +111,76 @@ def type_(recording: Recording, parameters: Type) -> Finding:
 
     Judged by the ROS graph, for every endpoint of the student's on the topic.
     """
-    kind = Kind(parameters.kind)
-    expected = f"a {kind.value} of {code(parameters.type)} on {code(parameters.topic)}"
-    finding = _absence(recording, kind, parameters, expected)
-    if finding is not None:
-        return finding
-    types = _types(recording, kind, parameters.topic)
-    wrong = [name for name in types if name != parameters.type]
+    kind, topic, wanted = Kind(parameters.kind), parameters.topic, parameters.type
+    expected = f"a {kind.value} of {code(wanted)} on {code(topic)}"
+    absent = _absence(recording, kind, parameters, expected)
+    if absent is not None:
+        return absent
+    endpoints = recording.student_endpoints(kind, topic)
+    types = sorted({item.type for item in endpoints or recording.on(topic)[:1]})
+    wrong = [name for name in types if name != wanted]
     if not wrong:
         return Finding.passed(expected, f"the type is {codes(types)}")
-    places = recording.student_endpoints(kind, parameters.topic)
-    observed = f"the {kind.value} has the type {code(wrong[0])}"
-    if parameters.type in types:
-        observed = f"another {kind.value} on the topic has the type {code(wrong[0])}"
-    explanation = explain(OtherType(parameters.type, wrong[0]))
-    package, _, short = parameters.type.split("/")
+    which = f"another {kind.value} on the topic" if wanted in types else f"the {kind.value}"
+    explanation = explain(OtherType(wanted, wrong[0]))
+    package, _, short = wanted.split("/")
     return Finding.failed(
         expected,
-        f"{observed}: {explanation}" if explanation else observed,
-        f"A publisher and a subscription meet only if their types are the same: "
+        f"{which} has the type {code(wrong[0])}" + (f": {explanation}" if explanation else ""),
+        "A publisher and a subscription meet only if their types are the same: "
         f"`from {package}.msg import {short}`.",
-        Evidence(moments=_moments(recording, places)),
+        _types_seen(recording, endpoints),
     )
 
 
-def _types(recording: Recording, kind: Kind, topic: str) -> list[str]:
-    found = [item.type for item in recording.student_endpoints(kind, topic)]
-    if not found:
-        found = [message.type for message in recording.on(topic)[:1]]
-    return sorted(set(found))
-
-
-def _moments(recording: Recording, endpoints: tuple[Endpoint, ...]) -> tuple[Moment, ...]:
-    return tuple(
+def _types_seen(recording: Recording, endpoints: Iterable[Endpoint]) -> Evidence:
+    moments = [
         Moment(f"{item.type} on {item.topic}", recording.since_launch_s(item.appeared_ns))
-        for item in endpoints[:5]
+        for item in endpoints
+    ]
+    return Evidence(moments=tuple(moments[:5]))
+
+
+class Untouched(Parameters):
+    """Parameters of topic.untouched."""
+
+    topics: tuple[TopicName, ...] = Field(
+        ("/odom", "/scan", "/clock", "/tf", "/tf_static"),
+        description="Topics that belong to the robot.",
     )
+
+    @property
+    def asked_for(self) -> str:
+        """The absence of publishers in words."""
+        return f"no publisher on {codes(self.topics, last='or')}"
+
+
+@check("topic.untouched", Subject.RECORDING, Untouched)
+def untouched(recording: Recording, parameters: Untouched) -> Finding:
+    """Only the robot publishes its sensors.
+
+    Judged by the ROS graph: no node of the student has a publisher on a topic of the robot, or
+    the name of the node that watches the run. Motion is judged by the simulator itself, so
+    that publishing there could gain nothing.
+    """
+    stop_if(why_no_node(recording))
+    for endpoint in recording.student_endpoints(Kind.PUBLISHER):
+        if endpoint.topic in parameters.topics:
+            return Finding.failed(
+                parameters.asked_for,
+                f"the node {code(endpoint.node)} publishes on {code(endpoint.topic)}, which "
+                "belongs to the robot",
+                "To read the sensor use create_subscription; what you compute goes to a topic of "
+                "your own.",
+                Evidence(moments=endpoints_seen(recording, [endpoint])),
+            )
+    for node in recording.student_nodes:
+        if node.name.rpartition("/")[2] == PROBE:
+            return Finding.failed(
+                parameters.asked_for,
+                f"a node of the submission is called {code(node.name)}, which is the name of the "
+                "node that watches the run",
+                "Give your node the name that the assignment asks for.",
+                Evidence(moments=nodes_seen(recording)),
+            )
+    return Finding.passed(parameters.asked_for, "none")

@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
 
-from grader.checks.topic.forged_topics import PROBE, Untouched
+from grader.checks.topic.topic import PROBE, Untouched
 from grader.checks.wording import code, codes, counted
 from grader.recording.model import NS, Kind, Message, Owner, Recording
 
