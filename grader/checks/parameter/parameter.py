@@ -2,142 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import chain, repeat
-from typing import Any, Literal, get_args
+from typing import Any
 
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check, stop_if
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Doubt, ParameterSet, ParametersRead
-from grader.checks.requests import NO_SERVER, why_late
 from grader.checks.value import same, same_value
-from grader.checks.wording import code, codes, value_text
+from grader.checks.wording import code, value_text
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_answer import why_unanswered
-from grader.diagnosis.no_node import why_not_node
-from grader.diagnosis.no_server import SERVICE
-from grader.diagnosis.process.process_exit import why_ended
-from grader.recording.model import Call, Recording
+from grader.diagnosis.no_parameter import (
+    answered_at,
+    why_not_asked,
+    why_not_declared,
+    why_services_silent,
+)
+from grader.measure.parameter_calls import (
+    Descriptor,
+    Reading,
+    Setting,
+    Type,
+    calls_to,
+    descriptor,
+    readings,
+    settings,
+)
+from grader.recording.model import Recording
 from grader.spec.name import QualifiedNodeName
-from grader.spec.nearest_name import nearest
 
-_ANSWER_S = 1.0
 _TOLERANCE = 1e-9
-
-
-Type = Literal[
-    "bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array",
-    "double_array", "string_array",
-]  # fmt: skip
-# Numbers of rcl_interfaces/msg/ParameterType.
-_TYPES = dict(enumerate(get_args(Type), start=1))
-_NO_RESULT = {"successful": False, "reason": "the node gave no result"}
-# Every node has these by itself; they say nothing of what the student wrote.
-_OWN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-
-
-@dataclass(frozen=True)
-class Descriptor:
-    """How a parameter is declared.
-
-    Attributes:
-        type: One of :data:`Type`, or ``not set``.
-        range: Lowest and highest value, and the step between two values (0 for any); or None.
-    """
-
-    type: str
-    read_only: bool
-    range: tuple[float, float, float] | None
-    description: str
-
-
-@dataclass(frozen=True)
-class Reading:
-    """The value of a parameter when the probe asked for it; None where it is not set."""
-
-    call: Call
-    value: Any
-
-
-@dataclass(frozen=True)
-class Setting:
-    """An attempt to set a parameter, and the node's answer."""
-
-    call: Call
-    value: Any
-    accepted: bool
-    reason: str
-
-
-def calls_to(recording: Recording, node: str, *services: str) -> tuple[Call, ...]:
-    """Calls with a request to some of a node's parameter services, in order."""
-    names = [f"{node}/{service}" for service in services]
-    return tuple(call for call in recording.calls if call.service in names and call.request)
-
-
-def names(recording: Recording, node: str) -> list[str]:
-    """Names of the parameters that the student declared, as the node listed them last."""
-    for call in reversed(recording.calls):
-        if call.service == f"{node}/list_parameters" and call.response is not None:
-            listed = call.response["result"]["names"]
-            return [name for name in listed if not name.startswith(_OWN)]
-    return []
-
-
-def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:
-    """How a parameter is declared, by the first answer; None if there is none.
-
-    An undeclared parameter has a descriptor without type.
-    """
-    for call in calls_to(recording, node, "describe_parameters"):
-        for found in _answered(call, "descriptors"):
-            if found["name"] == name:
-                ranges = (*found["floating_point_range"], *found["integer_range"])
-                return Descriptor(
-                    _TYPES.get(found["type"], "not set"),
-                    found["read_only"],
-                    next(((r["from_value"], r["to_value"], r["step"]) for r in ranges), None),
-                    found["description"],
-                )
-    return None
-
-
-def readings(recording: Recording, node: str, name: str) -> tuple[Reading, ...]:
-    """What a parameter's value was, each time that the probe asked for it."""
-    return tuple(
-        Reading(call, _value(value))
-        for call in calls_to(recording, node, "get_parameters")
-        for asked, value in zip(
-            (call.request or {})["names"], _answered(call, "values"), strict=False
-        )
-        if asked == name
-    )
-
-
-def settings(recording: Recording, node: str, name: str) -> tuple[Setting, ...]:
-    """Every attempt to set a parameter."""
-    return tuple(
-        Setting(call, _value(wanted["value"]), result["successful"], result["reason"])
-        for call in calls_to(recording, node, "set_parameters")
-        for wanted, result in zip(
-            (call.request or {})["parameters"],
-            chain(_answered(call, "results"), repeat(_NO_RESULT)),
-            strict=False,
-        )
-        if wanted["name"] == name
-    )
-
-
-def _answered(call: Call, key: str) -> Sequence[Any]:
-    return call.response[key] if call.response is not None else ()
-
-
-def _value(value: Mapping[str, Any]) -> Any:
-    """The value in an rcl_interfaces/msg/ParameterValue, or None where it is not set."""
-    return value.get(f"{_TYPES.get(value['type'])}_value")
 
 
 class OfParameter(Parameters):
@@ -230,79 +124,10 @@ def _range_words(found: tuple[float, float, float]) -> str:
 
 def found_declared(recording: Recording, parameters: OfParameter) -> Descriptor:
     """How a parameter is declared; ends the check if it is not."""
-    node, name = parameters.node, parameters.name
-    stop_if(why_not_node(recording, node))
-    asked = calls_to(recording, node, "list_parameters", "describe_parameters")
-    if not asked:
-        never = Cause(f"the probe did not ask {code(node)} for parameters", ours=True)
-        stop_if(why_ended(recording) or never)
-    stop_if(why_services_silent(recording, asked))
-    found = descriptor(recording, node, name)
-    if found is not None and found.type != "not set":
-        return found
-    there = names(recording, node)
-    if name in there and found is None:
-        stop_if(why_not_asked(recording, node, "its descriptor was not read"))
-    match = nearest(name, there)
-    seen = f"declared is {code(match)}" if match else f"declared are {codes(there)}"
-    if name in there:
-        seen = f"{code(name)} is declared, but without a value"
-    stop_if(
-        Cause(
-            seen if there else "the node declares no parameters",
-            f"Call self.declare_parameter('{name}', default) in the node's constructor.",
-            _when(recording, asked[0], "answered"),
-        )
-    )
-    raise AssertionError
-
-
-def why_services_silent(recording: Recording, calls: tuple[Call, ...]) -> Cause | None:
-    """Why one of some calls to a node's parameter services has no answer, or None."""
-    lost = next((call for call in calls if call.answered_ns is None), None)
-    if lost is None:
-        return None
-    service = code(lost.service.rpartition("/")[2])
-    if not lost.error:
-        what = f"the node's parameter service {service} did not answer"
-        return why_unanswered(recording, what, SERVICE, lost.service, lost.requested_ns, _ANSWER_S)
-    is_missing = lost.error == NO_SERVER
-    return Cause(
-        f"the node has no service {service}"
-        if is_missing
-        else f"{service} could not be asked: {lost.error}",
-        "Leave start_parameter_services as it is: the parameters of a node are read and set "
-        "through its services.",
-        _when(recording, lost, "asked"),
-        ours=not is_missing,
-    )
-
-
-def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
-    """Why the probe asked a node's parameter services no more: an answer was late or lost."""
-    ended = why_ended(recording)
-    calls = [
-        call
-        for call in recording.calls
-        if call.service.rpartition("/")[0] == node and call.request and not call.error
-    ]
-    for last in [] if ended else calls[-1:]:
-        server, asked_ns, end_ns = last.service, last.requested_ns, last.answered_ns
-        seen = f"the node's parameter service {code(server.rpartition('/')[2])} did not answer"
-        hint = (
-            "A callback must return soon: no time.sleep() and no waiting in it. The node answers "
-            "only while its executor spins."
-        )
-        shown = _when(recording, last, "asked")
-        ended = why_late(recording, SERVICE, server, asked_ns, end_ns, _ANSWER_S, seen, hint, shown)
-    return ended.after(what) if ended else Cause.to_repeat(f"{what} by the probe")
-
-
-def _when(recording: Recording, call: Call, what: str) -> Evidence:
-    """When a call was asked, or answered."""
-    at_ns = call.requested_ns if what == "asked" else call.answered_ns or call.requested_ns
-    text = f"{call.service.rpartition('/')[2]} was {what}"
-    return Evidence(moments=(Moment(text, recording.since_launch_s(at_ns)),))
+    stop_if(why_not_declared(recording, parameters.node, parameters.name))
+    found = descriptor(recording, parameters.node, parameters.name)
+    assert found is not None
+    return found
 
 
 def _why_other_descriptor(found: Descriptor, parameters: Declared, shown: Evidence) -> Cause | None:
@@ -341,9 +166,9 @@ def _evidence(
     for item in values[:20]:
         at_s = recording.since_launch_s(item.call.requested_ns)
         rows.append((f"value at {at_s:.2f} s", value_text(item.value)))
-    asked = calls_to(recording, parameters.node, "describe_parameters")[0]
+    asked = calls_to(recording, parameters.node, "describe_parameters")
     table = Table(f"The parameter {parameters.name}", ("", ""), tuple(rows))
-    return replace(_when(recording, asked, "answered"), tables=(table,))
+    return Evidence(moments=answered_at(recording, asked), tables=(table,))
 
 
 class OfSetting(OfParameter):

@@ -21,13 +21,14 @@ from grader.checks.fields import (
 )
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.need import ParameterSet, Recorded
-from grader.checks.parameter.parameter import OfSetting, refusal, settings, settings_to
+from grader.checks.parameter.parameter import OfSetting, refusal, settings_to
 from grader.checks.value import EXACT
 from grader.checks.wording import code, counted, percent, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_raised, why_taken
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.process.process_exit import why_ended
+from grader.measure.parameter_calls import settings
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration, Ratio

@@ -1,0 +1,138 @@
+"""Why a node's parameter is not declared, or its parameter services were not asked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from grader.checks.finding import Evidence, Moment
+from grader.checks.requests import NO_SERVER, why_late
+from grader.checks.wording import code, codes
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.no_answer import why_unanswered
+from grader.diagnosis.no_node import why_not_node
+from grader.diagnosis.no_server import SERVICE
+from grader.diagnosis.process.process_exit import why_ended
+from grader.measure.parameter_calls import calls_to, descriptor, names
+from grader.recording.model import Call, Recording
+from grader.spec.nearest_name import nearest
+
+_ANSWER_S = 1.0
+
+
+@dataclass(frozen=True)
+class NotDeclared(Symptom[Cause]):
+    """A parameter is not declared."""
+
+    recording: Recording
+    node: str
+    name: str
+
+    @property
+    def there(self) -> list[str]:
+        """Parameters that the node declares."""
+        return names(self.recording, self.node)
+
+    @property
+    def asked(self) -> tuple[Call, ...]:
+        """Calls that ask which parameters there are."""
+        return calls_to(self.recording, self.node, "list_parameters", "describe_parameters")
+
+    def cause(self, seen: str) -> Cause:
+        """The cause for what is declared instead."""
+        hint = f"Call self.declare_parameter('{self.name}', default) in the node's constructor."
+        return Cause(seen, hint, Evidence(moments=answered_at(self.recording, self.asked)))
+
+
+def why_not_declared(recording: Recording, node: str, name: str) -> Cause | None:
+    """Why a node does not declare a parameter, or None if it does."""
+    symptom = NotDeclared(recording, node, name)
+    lost = why_not_node(recording, node) or why_services_silent(recording, symptom.asked)
+    found = descriptor(recording, node, name)
+    if lost is not None or (found is not None and found.type != "not set"):
+        return lost
+    return cause_of(symptom)
+
+
+@explanation(NotDeclared)
+def services_not_asked(symptom: NotDeclared) -> Cause | None:
+    """The process ended, or a callback held up the node, before the probe could ask."""
+    found = descriptor(symptom.recording, symptom.node, symptom.name)
+    if symptom.asked and (found is not None or symptom.name not in symptom.there):
+        return None
+    return why_not_asked(symptom.recording, symptom.node, "its descriptor was not read")
+
+
+@explanation(NotDeclared)
+def no_parameters(symptom: NotDeclared) -> Cause | None:
+    """The node declares no parameters."""
+    return None if symptom.there else symptom.cause("the node declares no parameters")
+
+
+@explanation(NotDeclared)
+def no_value(symptom: NotDeclared) -> Cause | None:
+    """It is declared without a default, and so has no value."""
+    if symptom.name not in symptom.there:
+        return None
+    return symptom.cause(f"{code(symptom.name)} is declared, but without a value")
+
+
+@explanation(NotDeclared, general=True)
+def other_parameters(symptom: NotDeclared) -> Cause:
+    """Its name is misspelt, or only others are declared."""
+    match = nearest(symptom.name, symptom.there)
+    there = f"is {code(match)}" if match else f"are {codes(symptom.there)}"
+    return symptom.cause(f"declared {there}")
+
+
+def why_services_silent(recording: Recording, calls: Iterable[Call]) -> Cause | None:
+    """Why one of some calls to a node's parameter services has no answer, or None."""
+    lost = next((call for call in calls if call.answered_ns is None), None)
+    if lost is None:
+        return None
+    service = code(lost.service.rpartition("/")[2])
+    if not lost.error:
+        what = f"the node's parameter service {service} did not answer"
+        return why_unanswered(recording, what, SERVICE, lost.service, lost.requested_ns, _ANSWER_S)
+    if lost.error != NO_SERVER:
+        return Cause(f"{service} could not be asked: {lost.error}", ours=True)
+    return Cause(
+        f"the node has no service {service}",
+        "Leave start_parameter_services as it is: the parameters of a node are read and set "
+        "through its services.",
+        Evidence(moments=(Moment("asked", recording.since_launch_s(lost.requested_ns)),)),
+    )
+
+
+def why_not_asked(recording: Recording, node: str, what: str) -> Cause:
+    """Why the probe asked a node's parameter services no more: an answer was late or lost."""
+    ended = why_ended(recording)
+    calls = [
+        call
+        for call in recording.calls
+        if call.service.rpartition("/")[0] == node and call.request and not call.error
+    ]
+    for last in [] if ended else calls[-1:]:
+        server, asked_ns, end_ns = last.service, last.requested_ns, last.answered_ns
+        seen = f"the node's parameter service {code(server.rpartition('/')[2])} did not answer"
+        hint = (
+            "A callback must return soon: no time.sleep() and no waiting in it. The node answers "
+            "only while its executor spins."
+        )
+        shown = Evidence(moments=(Moment("asked", recording.since_launch_s(asked_ns)),))
+        ended = why_late(recording, SERVICE, server, asked_ns, end_ns, _ANSWER_S, seen, hint, shown)
+    return ended.after(what) if ended else Cause.to_repeat(f"{what} by the probe")
+
+
+def answered_at(recording: Recording, calls: Iterable[Call]) -> tuple[Moment, ...]:
+    """When the first of some calls was answered."""
+    moments = [
+        Moment(
+            f"{call.service.rpartition('/')[2]} was answered",
+            recording.since_launch_s(call.answered_ns),
+        )
+        for call in calls
+        if call.answered_ns is not None
+    ]
+    return tuple(moments[:1])

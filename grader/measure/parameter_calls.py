@@ -1,0 +1,121 @@
+"""Parameters of a node, as its parameter services (rcl_interfaces/srv) answered the probe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, repeat
+from typing import Any, Literal, get_args
+
+from grader.recording.model import Call, Recording
+
+Type = Literal[
+    "bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array",
+    "double_array", "string_array",
+]  # fmt: skip
+# Numbers of rcl_interfaces/msg/ParameterType.
+_TYPES = dict(enumerate(get_args(Type), start=1))
+_NO_RESULT = {"successful": False, "reason": "the node gave no result"}
+# Every node has these by itself; they say nothing of what the student wrote.
+_OWN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+
+
+@dataclass(frozen=True)
+class Descriptor:
+    """How a parameter is declared.
+
+    Attributes:
+        type: One of :data:`Type`, or ``not set``.
+        range: Lowest and highest value, and the step between two values (0 for any); or None.
+    """
+
+    type: str
+    read_only: bool
+    range: tuple[float, float, float] | None
+    description: str
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The value of a parameter when the probe asked for it; None where it is not set."""
+
+    call: Call
+    value: Any
+
+
+@dataclass(frozen=True)
+class Setting:
+    """An attempt to set a parameter, and the node's answer."""
+
+    call: Call
+    value: Any
+    accepted: bool
+    reason: str
+
+
+def calls_to(recording: Recording, node: str, *services: str) -> tuple[Call, ...]:
+    """Calls with a request to some of a node's parameter services, in order."""
+    names = [f"{node}/{service}" for service in services]
+    return tuple(call for call in recording.calls if call.service in names and call.request)
+
+
+def names(recording: Recording, node: str) -> list[str]:
+    """Names of the parameters that the student declared, as the node listed them last."""
+    for call in reversed(recording.calls):
+        if call.service == f"{node}/list_parameters" and call.response is not None:
+            listed = call.response["result"]["names"]
+            return [name for name in listed if not name.startswith(_OWN)]
+    return []
+
+
+def descriptor(recording: Recording, node: str, name: str) -> Descriptor | None:
+    """How a parameter is declared, by the first answer; None if there is none.
+
+    An undeclared parameter has a descriptor without type.
+    """
+    for call in calls_to(recording, node, "describe_parameters"):
+        for found in _answered(call, "descriptors"):
+            if found["name"] == name:
+                ranges = (*found["floating_point_range"], *found["integer_range"])
+                return Descriptor(
+                    _TYPES.get(found["type"], "not set"),
+                    found["read_only"],
+                    next(((r["from_value"], r["to_value"], r["step"]) for r in ranges), None),
+                    found["description"],
+                )
+    return None
+
+
+def readings(recording: Recording, node: str, name: str) -> tuple[Reading, ...]:
+    """What a parameter's value was, each time that the probe asked for it."""
+    return tuple(
+        Reading(call, _value(value))
+        for call in calls_to(recording, node, "get_parameters")
+        for asked, value in zip(
+            (call.request or {})["names"], _answered(call, "values"), strict=False
+        )
+        if asked == name
+    )
+
+
+def settings(recording: Recording, node: str, name: str) -> tuple[Setting, ...]:
+    """Every attempt to set a parameter."""
+    return tuple(
+        Setting(call, _value(wanted["value"]), result["successful"], result["reason"])
+        for call in calls_to(recording, node, "set_parameters")
+        for wanted, result in zip(
+            (call.request or {})["parameters"],
+            chain(_answered(call, "results"), repeat(_NO_RESULT)),
+            strict=False,
+        )
+        if wanted["name"] == name
+    )
+
+
+def _answered(call: Call, key: str) -> Sequence[Any]:
+    return call.response[key] if call.response is not None else ()
+
+
+def _value(value: Mapping[str, Any]) -> Any:
+    """The value in an rcl_interfaces/msg/ParameterValue, or None where it is not set."""
+    return value.get(f"{_TYPES.get(value['type'])}_value")
