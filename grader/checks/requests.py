@@ -125,6 +125,11 @@ def why_other_fields(
     )
 
 
+def the_goal(goal: Goal) -> str:
+    """A goal in words."""
+    return f"the goal ({words(goal.goal)})"
+
+
 def timeline(recording: Recording, title: str, steps: Iterable[tuple[int, str]]) -> Evidence:
     """What happened when, as a table and as moments; what follows a colon is for the table only."""
     found = [

@@ -19,7 +19,13 @@ from grader.checks.fields import (
 )
 from grader.checks.finding import Evidence, Finding, Plot
 from grader.checks.need import Doubt, GoalSent
-from grader.checks.requests import judged_requests, timeline, why_late, why_other_fields
+from grader.checks.requests import (
+    judged_requests,
+    the_goal,
+    timeline,
+    why_late,
+    why_other_fields,
+)
 from grader.checks.value import EXACT
 from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
@@ -96,11 +102,6 @@ def answered_goals(
 def is_undisturbed(goal: Goal) -> bool:
     """Whether the probe let a goal come to its own end."""
     return goal.cancel_after_s is None and not goal.preempted
-
-
-def the_goal(goal: Goal) -> str:
-    """A goal in words."""
-    return f"the goal ({words(goal.goal)})"
 
 
 def why_rejected(recording: Recording, goal: Goal) -> Cause | None:

@@ -1,0 +1,136 @@
+"""Why a goal of an action was not ended: not canceled when asked to, or not by a new goal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from grader.checks.finding import Evidence
+from grader.checks.requests import the_goal, why_late
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.no_answer import why_one_cpu, why_raised, why_taken, why_unanswered
+from grader.diagnosis.no_server import ACTION
+from grader.diagnosis.process.process_exit import why_ended
+from grader.recording.interaction import Goal
+from grader.recording.model import NS, Recording
+from grader.spec.unit import format_duration
+
+# Share of the time from the request to cancel until the end of the goal.
+_AT_THE_END = 0.8
+_TWO_THREADS = (
+    "Spin with a MultiThreadedExecutor, and give the ActionServer a ReentrantCallbackGroup."
+)
+_LOOK = (
+    "In the loop of the execute callback: if goal_handle.is_cancel_requested, call "
+    "goal_handle.canceled() and return the result."
+)
+
+
+@dataclass(frozen=True)
+class NotCanceled(Symptom[Cause]):
+    """A goal that was asked to cancel was not canceled."""
+
+    recording: Recording
+    goal: Goal
+    within_s: float
+    evidence: Evidence
+
+    @property
+    def seen(self) -> str:
+        """What happened instead."""
+        if self.goal.result_ns is None:
+            return f"{the_goal(self.goal)} was asked to cancel, but neither canceled nor ended"
+        return f"{the_goal(self.goal)} {self.goal.status} instead of being canceled"
+
+    @property
+    def is_untaken(self) -> bool:
+        """Whether the server took in that it should cancel only when the goal ended, or never."""
+        answered_ns, asked_ns = self.goal.cancel_answered_ns, self.goal.canceled_ns or 0
+        if answered_ns is None or self.goal.result_ns is None:
+            return answered_ns is None
+        # An executor that was busy until then answers right before it tells the result.
+        waited = (answered_ns - asked_ns) / max(self.goal.result_ns - asked_ns, 1)
+        return waited >= _AT_THE_END
+
+
+def why_not_canceled(
+    recording: Recording, goal: Goal, within_s: float, evidence: Evidence
+) -> Cause | None:
+    """Why a goal that was asked to cancel was not canceled in time, or None if it was."""
+    asked_ns, end_ns = goal.canceled_ns or 0, goal.result_ns
+    if goal.status != "canceled" or end_ns is None:
+        return cause_of(NotCanceled(recording, goal, within_s, evidence))
+    seen = f"{the_goal(goal)} was not canceled"
+    hint = "Look at goal_handle.is_cancel_requested in every round of the loop."
+    return why_late(
+        recording, ACTION, goal.action, asked_ns, end_ns, within_s, seen, hint, evidence
+    )
+
+
+@explanation(NotCanceled)
+def cancel_refused(symptom: NotCanceled) -> Cause | None:
+    """The server refuses to cancel: it has no cancel_callback that accepts."""
+    if symptom.goal.cancel_accepted is not False or symptom.is_untaken:
+        return None
+    return Cause(
+        f"the server refused to cancel {the_goal(symptom.goal)}",
+        "The ActionServer's cancel_callback decides: it returns CancelResponse.ACCEPT. Without "
+        "one rclpy refuses.",
+        symptom.evidence,
+    )
+
+
+@explanation(NotCanceled)
+def execute_callback_raised(symptom: NotCanceled) -> Cause | None:
+    """The execute callback raised an exception."""
+    if symptom.goal.result_ns is None:
+        return None
+    return why_raised(symptom.recording, symptom.seen, symptom.goal.sent_ns)
+
+
+@explanation(NotCanceled)
+def executor_busy_with_the_goal(symptom: NotCanceled) -> Cause | None:
+    """The executor cannot take in the request to cancel while the execute callback runs."""
+    if not symptom.is_untaken:
+        return None
+    goal, recording = symptom.goal, symptom.recording
+    seen = f"{symptom.seen}: the server did not take in the request to cancel"
+    text = f"{seen}; its executor cannot while the execute callback runs"
+    busy = Cause(text, _TWO_THREADS, symptom.evidence)
+    alone = why_one_cpu(recording, seen)
+    if alone is not None or goal.result_ns is not None:
+        return alone or busy
+    asked_ns, within_s = goal.canceled_ns or 0, symptom.within_s
+    return why_unanswered(recording, seen, ACTION, goal.action, asked_ns, within_s, busy)
+
+
+@explanation(NotCanceled, general=True)
+def request_ignored(symptom: NotCanceled) -> Cause:
+    """The loop of the execute callback never looks whether the goal is to be canceled."""
+    never = None
+    if symptom.goal.result_ns is None:
+        asked_ns = symptom.goal.canceled_ns or 0
+        never = why_no_end(symptom.recording, symptom.seen, asked_ns, symptom.within_s)
+    seen = f"{symptom.seen}: the execute callback goes on"
+    return never or Cause(seen, _LOOK, symptom.evidence)
+
+
+def why_no_end(recording: Recording, seen: str, asked_ns: int, within_s: float) -> Cause | None:
+    """Why a goal never ended, if its process ended or had no time."""
+    taken = why_taken(recording, seen, asked_ns, recording.stop_ns, within_s)
+    return why_ended(recording, seen) or taken
+
+
+def ended_alone(recording: Recording, goal: Goal, evidence: Evidence) -> Cause:
+    """A goal came to an end before the probe could end it."""
+    lasted_s = ((goal.result_ns or 0) - (goal.answered_ns or goal.sent_ns)) / NS
+    seen = (
+        f"{the_goal(goal)} {goal.status} {format_duration(lasted_s)} after it was accepted, before "
+        "it was to be ended"
+    )
+    return why_raised(recording, seen, goal.sent_ns) or Cause(
+        seen,
+        "The execute callback returns too early: it must work on the goal step by step, with a "
+        "pause between.",
+        evidence,
+    )
