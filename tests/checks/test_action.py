@@ -159,7 +159,9 @@ class TestCancels:
 
     def test_agreed_but_succeeded(self):
         run = acting(canceled(status="succeeded", end_s=0.9))
-        assert "succeeded instead of being canceled: the execute callback goes on" in failing("action.cancels", run, **FIB)
+        assert "succeeded instead of being canceled: the execute callback goes on" in failing(
+            "action.cancels", run, **FIB
+        )
 
     def test_agreed_but_goes_on(self):
         run = acting(canceled(end_s=None))

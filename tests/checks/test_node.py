@@ -42,7 +42,7 @@ class TestExists:
         assert judge("node.exists", recording(), name=name).status is Status.PASSED
 
     def test_a_name_that_ros_does_not_allow_is_the_authors_mistake(self):
-        with pytest.raises(ValueError, match="'bot publisher' is not a node name"):
+        with pytest.raises(ValueError, match="bot publisher' is not a node name"):
             judge("node.exists", recording(), name="bot publisher")
 
     def test_another_node_that_publishes_in_its_place(self):

@@ -19,74 +19,62 @@ TIMES = st.integers(-(10**9), 6 * 10**9).map(lambda ns: LAUNCH_NS + ns)
 MAYBE = st.one_of(st.none(), TIMES)
 JSON = st.recursive(
     st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=9)),
-    lambda inner: st.one_of(
-        st.lists(inner, max_size=2),
-        st.dictionaries(
-            st.sampled_from(
-                [
-                    "data",
-                    "success",
-                    "message",
-                    "sequence",
-                    "order",
-                    "results",
-                    "successful",
-                    "reason",
-                    "values",
-                    "type",
-                    "names",
-                    "double_value",
-                    "descriptors",
-                    "name",
-                    "result",
-                    "current_state",
-                    "label",
-                    "floating_point_range",
-                    "from_value",
-                    "to_value",
-                    "step",
-                    "parameters",
-                    "value",
-                ]
-            ),
-            inner,
-            max_size=3,
-        ),
-    ),
+    lambda inner: st.lists(inner, max_size=2),
     max_leaves=6,
 )
-FIELDS = st.one_of(
-    st.dictionaries(st.sampled_from(["data", "success", "names", "results", "order"]), JSON),
-    st.just({"parameters": [{"name": "speed", "value": {"type": 3, "double_value": 0.9}}]}),
-    st.just({"names": ["speed"]}),
-    st.just({"results": [{"successful": True, "reason": ""}]}),
-    st.just({"values": [{"type": 3, "double_value": 0.9}]}),
-    st.just({"descriptors": [{"name": "speed", "type": 3}]}),
+FIELDS = st.dictionaries(st.sampled_from(["data", "success", "sequence", "order"]), JSON)
+NAME = st.sampled_from(["speed", "speeed", "qos_overrides.x"])
+VALUE = st.fixed_dictionaries({"type": st.integers(0, 9), "double_value": st.floats()})
+RANGE = st.fixed_dictionaries(dict.fromkeys(("from_value", "to_value", "step"), st.floats()))
+DESCRIPTOR = st.fixed_dictionaries(
+    {
+        "name": NAME,
+        "type": st.integers(0, 12),
+        "read_only": st.booleans(),
+        "description": st.text(max_size=9),
+        "floating_point_range": st.lists(RANGE, max_size=1),
+        "integer_range": st.just([]),
+    }
 )
-CALLS = st.builds(
-    Call,
-    st.sampled_from(
-        [
-            "/enable",
-            *(
-                f"{NODE}/{name}"
-                for name in (
-                    "list_parameters",
-                    "describe_parameters",
-                    "get_parameters",
-                    "set_parameters",
-                    "get_state",
-                    "change_state",
-                )
-            ),
-        ]
+RESULT = st.fixed_dictionaries({"successful": st.booleans(), "reason": st.text(max_size=9)})
+
+
+def few(key, item):
+    return st.fixed_dictionaries({key: st.lists(item, max_size=2)})
+
+
+LABELS = {"current_state": st.fixed_dictionaries({"label": st.text(max_size=9)})}
+SETTING = st.fixed_dictionaries({"name": NAME, "value": VALUE})
+# Service -> its request and its response, in their types and of any length.
+PARAMETER_SERVICES = {
+    "list_parameters": (
+        st.just({"depth": 0}),
+        st.fixed_dictionaries({"result": few("names", NAME)}),
     ),
-    st.just("std_srvs/srv/SetBool"),
-    TIMES,
-    MAYBE,
-    st.one_of(st.none(), FIELDS),
-    st.one_of(st.none(), FIELDS),
-    st.sampled_from(["", "", "no server", "not installed"]),
+    "describe_parameters": (few("names", NAME), few("descriptors", DESCRIPTOR)),
+    "get_parameters": (few("names", NAME), few("values", VALUE)),
+    "set_parameters": (few("parameters", SETTING), few("results", RESULT)),
+    "get_state": (st.just({}), st.fixed_dictionaries(LABELS)),
+    "change_state": (st.just({"transition": {"id": 1, "label": ""}}), FIELDS),
+}
+
+
+def calls_to(name, request, response):
+    return st.builds(
+        Call,
+        st.just(name),
+        st.just("std_srvs/srv/SetBool"),
+        TIMES,
+        MAYBE,
+        st.one_of(st.none(), request),
+        st.one_of(st.none(), response),
+        st.sampled_from(["", "", "no server", "not installed"]),
+    )
+
+
+CALLS = st.one_of(
+    calls_to("/enable", FIELDS, FIELDS),
+    *(calls_to(f"{NODE}/{name}", *parts) for name, parts in PARAMETER_SERVICES.items()),
 )
 SERVICES = st.builds(
     Service,
