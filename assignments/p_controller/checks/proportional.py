@@ -12,14 +12,13 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
-from grader.measure.motion.answer import MOST_BEHIND, answers
+from grader.measure.motion.steering import MOST_BEHIND, LEAST_SAMPLES, answers, at_the_goal, on_the_way
 from grader.measure.motion.approach import Approach
 from grader.diagnosis.motion.no_motion import approach
 from grader.measure.motion.command import command_topic, commands
 from grader.measure.motion.control_law import Law, Sample, LawVerdict, examine
 from grader.measure.motion.quantities import metres
 from grader.checks.motion.robot_check import RobotParameters
-from grader.measure.motion.steering import LEAST_SAMPLES, at_the_goal, on_the_way
 from grader.checks.reference import GoalPose
 from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause

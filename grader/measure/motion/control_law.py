@@ -14,7 +14,7 @@ _ZERO_RAD_S = 1e-4
 # Near zero the command may pause, near half a turn both senses are right.
 _PAUSE_RAD = 0.15
 _EITHER_WAY_RAD = 0.3
-# An error that needs no turn, and one that leaves nothing to tell the law by.
+# An error that needs no turn, and one from which the law cannot be seen.
 _SMALL_RAD = 0.1
 _TINY_RAD = 0.02
 _SLOW_RAD_S = 0.2
@@ -28,27 +28,38 @@ _SHORT_OF = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A command and the error it answers."""
+    """A command and the error that it answers."""
 
     error_rad: float
     command_rad_s: float
 
     @property
+    def is_turning(self) -> bool:
+        """Whether it asks for a turn."""
+        return abs(self.command_rad_s) > _ZERO_RAD_S
+
+    @property
+    def is_away(self) -> bool:
+        """Whether it turns away from the error."""
+        return self.error_rad * self.command_rad_s < 0.0
+
+    @property
     def is_wrong(self) -> bool:
         """Whether it clearly turns away from the error."""
         size = abs(self.error_rad)
-        return (
-            _PAUSE_RAD < size < math.pi - _EITHER_WAY_RAD
-            and abs(self.command_rad_s) > _ZERO_RAD_S
-            and self.error_rad * self.command_rad_s < 0.0
-        )
+        return _PAUSE_RAD < size < math.pi - _EITHER_WAY_RAD and self.is_turning and self.is_away
+
+    def full_turn_off(self) -> Sample:
+        """The same command for the error with the other sign, a full turn off."""
+        other_rad = self.error_rad - math.copysign(math.tau, self.error_rad)
+        return Sample(other_rad, self.command_rad_s)
 
 
 class Law(Enum):
     """What the commands follow."""
 
     PROPORTIONAL = auto()
-    """A line through the origin is the best there is to say, good or bad."""
+    """A line through the origin describes them best, well or badly."""
     NOTHING_TO_DO = auto()
     """There was hardly an error, and hardly a command."""
     TOO_FEW = auto()
@@ -84,7 +95,7 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> L
         samples: In the order of time; finite.
         limit_rad_s: What the robot can do; larger commands say little of the law.
     """
-    turning = [item for item in samples if abs(item.command_rad_s) > _ZERO_RAD_S]
+    turning = [item for item in samples if item.is_turning]
     largest_rad = max((abs(item.error_rad) for item in samples), default=math.inf)
     fastest_rad_s = max((abs(item.command_rad_s) for item in samples), default=0.0)
     if (largest_rad <= _SMALL_RAD and len(turning) < _FEW_TURNS) or (
@@ -98,16 +109,26 @@ def examine(samples: Sequence[Sample], limit_rad_s: float, least_r2: float) -> L
     steps = _steps(turning)
     if steps:
         return LawVerdict(Law.STEPS, used=len(turning), values=steps)
-    telling = [
-        _toward(item)
+    # Near half a turn the error may be read with either sign: take that of the command.
+    judged = [
+        item.full_turn_off()
+        if abs(item.error_rad) > math.pi - _EITHER_WAY_RAD and item.is_away
+        else item
         for item in samples
-        if abs(item.command_rad_s) > _ZERO_RAD_S or abs(item.error_rad) > _PAUSE_RAD
+        if item.is_turning or abs(item.error_rad) > _PAUSE_RAD
     ]
-    wrong = sum(item.is_wrong for item in telling) / len(telling) if telling else 0.0
-    best = fit(telling, limit_rad_s)
-    if wrong <= _FEW_WRONG and best.r2 >= least_r2 and best.gain > 0.0:
+    wrong = sum(item.is_wrong for item in judged) / len(judged)
+    best = fit(judged, limit_rad_s)
+    if wrong <= _FEW_WRONG:
         return best
-    return _otherwise(telling, limit_rad_s, least_r2, wrong) or best
+    turned = fit([one.full_turn_off() if one.is_wrong else one for one in judged], limit_rad_s)
+    mirrored = fit([Sample(-one.error_rad, one.command_rad_s) for one in judged], limit_rad_s)
+    if turned.gain > 0.0 and turned.r2 >= max(0.8 * least_r2, mirrored.r2):
+        return LawVerdict(Law.NOT_NORMALISED, turned.gain, turned.r2, turned.used, share=wrong)
+    if mirrored.gain > 0.0 and wrong > 0.5:
+        return LawVerdict(Law.WRONG_SIGN, -mirrored.gain, mirrored.r2, mirrored.used)
+    # The line of those that turn the right way, with no merit for the others.
+    return LawVerdict(Law.PROPORTIONAL, best.gain, min(best.r2, 1.0 - wrong - least_r2), best.used)
 
 
 def _steps(turning: Sequence[Sample]) -> tuple[float, ...]:
@@ -120,38 +141,6 @@ def _steps(turning: Sequence[Sample]) -> tuple[float, ...]:
     below = sum(size < distinct[-1] for size in sizes)
     few = len(distinct) <= _MOST_SIZES and len(sizes) > 2 * len(distinct)
     return distinct if few and (not below or below > 2 * (len(distinct) - 1)) else ()
-
-
-def _otherwise(
-    samples: Sequence[Sample], limit_rad_s: float, least_r2: float, wrong: float
-) -> LawVerdict | None:
-    """A mistake that explains commands which are not in proportion to the error."""
-    if wrong <= _FEW_WRONG:
-        return None
-    raw = [
-        Sample(item.error_rad - math.copysign(math.tau, item.error_rad), item.command_rad_s)
-        if item.is_wrong
-        else item
-        for item in samples
-    ]
-    turned = fit(raw, limit_rad_s)
-    mirrored = fit([Sample(-item.error_rad, item.command_rad_s) for item in samples], limit_rad_s)
-    if turned.gain > 0.0 and turned.r2 >= max(0.8 * least_r2, mirrored.r2):
-        return LawVerdict(Law.NOT_NORMALISED, turned.gain, turned.r2, turned.used, share=wrong)
-    if mirrored.gain > 0.0 and wrong > 0.5:
-        return LawVerdict(Law.WRONG_SIGN, -mirrored.gain, mirrored.r2, mirrored.used)
-    # The line of those that turn the right way, with no merit for the others.
-    line = fit(samples, limit_rad_s)
-    return LawVerdict(Law.PROPORTIONAL, line.gain, min(line.r2, 1.0 - wrong - least_r2), line.used)
-
-
-def _toward(item: Sample) -> Sample:
-    """Near half a turn the error may be read with either sign: take that of the command."""
-    if abs(item.error_rad) > math.pi - _EITHER_WAY_RAD and (
-        item.error_rad * item.command_rad_s < 0.0
-    ):
-        return Sample(item.error_rad - math.copysign(math.tau, item.error_rad), item.command_rad_s)
-    return item
 
 
 def fit(samples: Sequence[Sample], limit_rad_s: float) -> LawVerdict:

@@ -39,9 +39,5 @@ def point(x_m: float, y_m: float) -> str:
 
 
 def side(bearing_rad: float) -> str:
-    """Say where something is as seen from the robot.
-
-    Args:
-        bearing_rad: In the robot's frame, counter-clockwise from straight ahead.
-    """
+    """Write where something is as seen from the robot, by its bearing from straight ahead."""
     return _SIDES[round(math.remainder(bearing_rad, math.tau) / (math.pi / 2.0)) % 4]
