@@ -8,11 +8,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from assignments.p_controller.checks.control_law import examine
 from grader.assignment.load import load_assignment
 from grader.checks.finding import Status
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.control_law import Sample, examine
+from grader.measure.motion.steering import Sample
 from grader.measure.motion.quantities import degrees
 from sim.motion import Pose
 from tests.checks.builder import (

@@ -7,8 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.control_law import Sample, fit
-from grader.measure.motion.steering import MOST_BEHIND, Answer, answers, before_arrival
+from grader.measure.motion.steering import (
+    MOST_BEHIND,
+    Answer,
+    Sample,
+    answers,
+    before_arrival,
+    fit,
+)
 from sim.motion import wrap_angle
 
 # Chance does not come near it: nothing is read from fewer commands, or a worse fit.
