@@ -199,7 +199,7 @@ def stays_at_rest(recording: Recording, parameters: StaysAtRest) -> Finding:
         if is_start and (ended := exited(recording)):
             return why_it_exited(recording, ended[0]).finding(expected)
         watched = format_duration((truth[-1].time_ns - truth[rest].time_ns) / NS)
-        evidence = Evidence(plots=(speed_plot(recording),))
+        evidence = Evidence(plots=() if is_start else (speed_plot(recording),))
         return Finding.passed(expected, f"at rest for {watched}, to the end", evidence)
     cause = None if is_start else why_cut_short(recording)
     if cause is not None:

@@ -24,7 +24,7 @@ def speed(speed_m_s: float) -> str:
 
 def turn(speed_rad_s: float) -> str:
     """Write an angular speed: ``0.5 rad/s``."""
-    return f"{speed_rad_s:.3g} rad/s"
+    return f"{round(speed_rad_s, 6) + 0.0:.3g} rad/s"
 
 
 def degrees(angle_rad: float) -> str:
