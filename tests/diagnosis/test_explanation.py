@@ -7,8 +7,7 @@ import re
 import pytest
 
 from grader.diagnosis.explanation import Explanation, explanations
-from grader.diagnosis.few_messages import FewMessages
-from grader.diagnosis.no_messages import NoMessages
+from grader.diagnosis.no_messages import FewMessages, NoMessages
 from grader.diagnosis.process.exceptions import Raised, Row, Table
 from grader.diagnosis.process.raised import Failure, Frame
 from grader.docs import explanations_markdown

@@ -18,7 +18,7 @@ from grader.checks.need import GoalSent
 from grader.checks.value import NoSuchField
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_one_cpu, why_raised, why_taken, why_unanswered
-from grader.diagnosis.no_server import ACTION
+from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording

@@ -12,7 +12,7 @@ from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.no_answer import why_gone, why_taken, why_unanswered
-from grader.diagnosis.no_server import ACTION, offered, why_not_met, why_not_offered
+from grader.diagnosis.no_endpoint import ACTION, offered, why_not_met, why_not_offered
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording

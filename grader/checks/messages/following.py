@@ -19,8 +19,7 @@ from grader.checks.messages.derived_messages import (
 from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted, listing
-from grader.diagnosis.few_messages import why_few
-from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_messages import why_few, why_silent
 from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration

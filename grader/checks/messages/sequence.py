@@ -14,8 +14,7 @@ from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField, same
 from grader.checks.wording import code, counted, value_text
-from grader.diagnosis.few_messages import why_few
-from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_messages import why_few, why_silent
 from grader.measure.numbering import is_numbered
 from grader.recording.model import Recording
 from grader.spec.name import TopicName

@@ -25,8 +25,8 @@ from grader.checks.wording import code, codes, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.no_answer import why_taken, why_unanswered
+from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
-from grader.diagnosis.no_server import SERVICE, offered
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import QualifiedNodeName

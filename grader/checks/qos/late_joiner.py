@@ -13,7 +13,7 @@ from grader.checks.need import Joined
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished
-from grader.diagnosis.few_messages import why_few
+from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.measure import declarations
 from grader.measure.compatibility import compatibility_table, refusals

@@ -26,7 +26,7 @@ from grader.checks.value import EXACT, NoSuchField
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_one_cpu, why_taken, why_unanswered
-from grader.diagnosis.no_server import SERVICE, is_offered, why_not_met, why_not_offered
+from grader.diagnosis.no_endpoint import SERVICE, is_offered, why_not_met, why_not_offered
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import InterfaceName, TopicName
