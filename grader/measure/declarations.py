@@ -79,11 +79,6 @@ def exiting_ns(recording: Recording, process: str) -> int | None:
     return ends[0] if ends else None
 
 
-def broke_off(recording: Recording, process: str) -> bool:
-    """Whether the tracer was there and Python did not end in its usual way."""
-    return traced(recording, process) and exiting_ns(recording, process) is None
-
-
 def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
     """Timers that the processes declared, in the order of their declaration."""
     found = []
