@@ -13,8 +13,8 @@ from grader.assignment.load import load_assignment
 from grader.checks.finding import Status
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.steering import Sample
 from grader.measure.motion.quantities import degrees
+from grader.measure.motion.steering import Sample
 from sim.motion import Pose
 from tests.checks.builder import (
     INSTALLED,
