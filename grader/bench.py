@@ -39,7 +39,6 @@ from grader.sandbox.choice import Choice
 from grader.sandbox.trial import choose
 from grader.submission.build.build_cache import BUILDS
 from grader.submission.prepare import Prepared, prepare
-from sim.benchmark import share_of_core
 
 ASSIGNMENTS = ("timed_publisher", "bot_controller")
 """Without and with a robot; the first one is graded by `rosgrade check`, too."""
@@ -196,12 +195,23 @@ def _plain(samples: Samples, prepared: Prepared) -> float:
     return wall_s
 
 
-def _simulator(samples: Samples, _folder: Path, _: int) -> None:
-    """What share of a core the simulator takes in real time."""
+def _simulator(samples: Samples, folder: Path, _: int) -> None:
+    """What share of a core the simulator takes in real time, with a robot among 100 walls."""
+    world, options = folder / "walls.yaml", folder / "options.yaml"
+    walls = [[x, y, x + 0.5, y + 0.3] for x in range(10) for y in range(10)]
+    world.write_text(json.dumps({"start": [-1, -1, 0], "segments": walls}))
+    options.write_text("robot: {drives: [{at: 0 s, linear: 0.2 m/s, angular: 0.4 rad/s}]}")
+    command = [sys.executable, "-m", "sim", str(world), "--options", str(options), "--duration"]
     for _ in range(_FEW):
         with lock_domain() as domain:
-            share = share_of_core(domain_id=domain.domain_id)
-        samples["simulator: share of a core at real time, 100 segments"].append(share)
+            domain_id = ["--domain-id", str(domain.domain_id)]
+            short_s, long_s = (
+                _timed([*command, seconds, *domain_id], dict(os.environ))[1]
+                for seconds in ("1", "11")
+            )
+        samples["simulator: share of a core at real time, 100 segments"].append(
+            (long_s - short_s) / 10
+        )
 
 
 MEASUREMENTS: dict[str, Callable[[Samples, Path, int], None]] = {

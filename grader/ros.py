@@ -54,16 +54,15 @@ class RosInstallation:
         roots = [
             Path(path) for path in dict(self.inherited).get("PYTHONPATH", "").split(":") if path
         ]
-        roots += self._site_packages()
+        roots += self.site_packages
         return frozenset(
             name for name in self.packages if any((root / name).is_dir() for root in roots)
         )
 
-    def _site_packages(self) -> list[Path]:
-        found: list[Path] = []
-        for prefix in (*self.underlays, *self.prefixes):
-            found.extend(sorted(prefix.glob("lib/python3.*/site-packages")))
-        return found
+    @property
+    def site_packages(self) -> list[Path]:
+        """Folders that Python imports from."""
+        return [path for one in (*self.underlays, *self.prefixes) for path in site_packages(one)]
 
     def environment(
         self, environ: Mapping[str, str], overlays: tuple[Path, ...] = ()
@@ -88,9 +87,7 @@ class RosInstallation:
         python_path: list[str] = []
         library_path: list[str] = []
         for overlay in overlays:
-            python_path.extend(
-                str(path) for path in sorted(overlay.glob("lib/python3.*/site-packages"))
-            )
+            python_path.extend(map(str, site_packages(overlay)))
             library_path.append(str(overlay / "lib"))
         if self.source == "wheels":
             library_path.extend(self._wheel_libraries())
@@ -103,9 +100,14 @@ class RosInstallation:
 
     def _wheel_libraries(self) -> list[str]:
         libraries = [str(prefix / "lib") for prefix in self.prefixes]
-        for site in self._site_packages():
+        for site in self.site_packages:
             libraries.extend(str(path) for path in sorted(site.glob("ros_*.libs")))
         return libraries
+
+
+def site_packages(prefix: Path) -> list[Path]:
+    """Folders of an install space that Python imports from."""
+    return sorted(prefix.glob("lib/python3*/site-packages"))
 
 
 def _prepend(

@@ -38,11 +38,12 @@ def listing(folder: Path) -> frozenset[str]:
         # What is gone by now is not listed.
         with contextlib.suppress(OSError):
             for entry in os.scandir(ahead.pop()):
+                name = entry.path.removeprefix(str(folder))
                 if entry.is_dir(follow_symlinks=False):
                     ahead.append(entry.path)
+                    found.append(f"{name}/\0\0")
                 else:
                     status = entry.stat(follow_symlinks=False)
-                    name = entry.path.removeprefix(str(folder))
                     found.append(f"{name}\0{status.st_size}\0{status.st_mtime_ns}")
     return frozenset(found)
 

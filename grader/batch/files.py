@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from grader import __version__
@@ -14,9 +14,9 @@ from grader.report.files import write_whole
 from grader.report.formats.foxglove import LAYOUT_FILE, render_layout
 from grader.report.html.report import render_report
 from grader.report.model.facts import Clock, RunFacts
-from grader.report.model.result import write_result
+from grader.report.model.result import make_result, result_json
 from grader.report.model.result_model import Result
-from grader.report.model.student import grade_for_student
+from grader.report.model.student import for_student
 
 REPORT_FILE = "report.html"
 STUDENT_FILE = "student-report.html"
@@ -54,15 +54,16 @@ def write_graded(
         recordings={name: os.path.relpath(file, folder) for name, file in graded.files.items()},
         runs=graded.runs,
     )
-    report = write_report(graded, folder, facts)
+    result = make_result(graded.grade, graded.recordings, facts)
+    report = write_report(graded, folder, result)
     # Last: where it says what the grade is, the report beside it says the same.
-    result = write_result(graded.grade, graded.recordings, facts, folder / RESULT_FILE)
-    if json_file is not None:
-        write_result(graded.grade, graded.recordings, facts, json_file)
+    for file in (folder / RESULT_FILE, json_file):
+        if file is not None:
+            write_whole(file, result_json(result))
     return Written(report, result)
 
 
-def write_report(graded: Graded, folder: Path, facts: RunFacts) -> Path:
+def write_report(graded: Graded, folder: Path, result: Result) -> Path:
     """Write ``report.html``, and a Foxglove layout beside the recordings.
 
     Where checks are hidden, the copy that a student may see is written too.
@@ -71,19 +72,14 @@ def write_report(graded: Graded, folder: Path, facts: RunFacts) -> Path:
         layout = render_layout(graded.recordings.values())
         write_whole(folder / RECORDINGS_FOLDER / LAYOUT_FILE, layout)
     report = folder / REPORT_FILE
-    write_whole(report, render_report(graded.grade, graded.recordings, facts, graded.references))
-    _write_student_copy(graded, folder / STUDENT_FILE, facts)
-    return report
-
-
-def _write_student_copy(graded: Graded, file: Path, facts: RunFacts) -> None:
-    grade = grade_for_student(graded.grade)
-    if grade is graded.grade:
+    write_whole(report, render_report(graded.grade, result, graded.recordings, graded.references))
+    copy, file = for_student(result), folder / STUDENT_FILE
+    if copy is result:
         file.unlink(missing_ok=True)
-        return
-    # The recordings stay with whoever grades.
-    facts = replace(facts, recordings={})
-    write_whole(file, render_report(grade, graded.recordings, facts, graded.references))
+    else:
+        text = render_report(graded.grade, copy, graded.recordings, graded.references)
+        write_whole(file, text)
+    return report
 
 
 def refuse_foreign(folder: Path, *, keep: bool) -> None:

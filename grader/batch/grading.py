@@ -26,7 +26,7 @@ from grader.run.host.load import cpu_count
 from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.submission.build.bounded import OutputLimits
-from grader.submission.build.build_limits import BuildLimits
+from grader.submission.build.colcon import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits, prepare
 from grader.tree import listing
 

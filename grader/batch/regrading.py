@@ -21,8 +21,7 @@ from grader.recording.model import Recording
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
 from grader.submission.prepare import Prepared
-from grader.submission.record import SubmissionRecord
-from grader.submission.record_json import read_record
+from grader.submission.record import SubmissionRecord, read_record
 
 
 @dataclass(frozen=True)

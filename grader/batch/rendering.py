@@ -18,7 +18,6 @@ from grader.batch.regrading import find, regrade, regrade_command, stored_assign
 from grader.errors import UsageError
 from grader.grade import Grade
 from grader.report.model.class_row import ClassRow
-from grader.report.model.facts import RunFacts
 from grader.report.model.result import read_result
 from grader.report.model.result_model import Result
 from grader.run.host.load import cpu_count
@@ -133,15 +132,7 @@ def render_again(folder: Path, assignment: str | None = None) -> Written:
             f"{folder}: judged again it is not what the result says ({', '.join(changed)}): "
             f"{regrade_command(folder, loaded)} writes both anew"
         )
-    facts = RunFacts(
-        started=result.started,
-        duration_s=result.duration_s,
-        environment=result.environment,
-        rosgrade_version=result.rosgrade_version,
-        recordings={one.id: one.recording for one in result.scenarios if one.recording},
-        runs=graded.runs,
-    )
-    return Written(write_report(graded, folder, facts), result)
+    return Written(write_report(graded, folder, result), result)
 
 
 def _stored(folder: Path, result: Result) -> str:

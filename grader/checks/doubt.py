@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 
 from grader.checks.need import Doubt
-from grader.measure.motion.lateness import stolen_s
+from grader.measure.motion.command import stolen_s
 from grader.recording.model import NS, Recording
 
 # As long as a timer of 10 Hz makes a command wait anyway; tolerances are made for that.

@@ -20,7 +20,7 @@ from grader.checks.value import Tolerance
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_taken, why_unanswered
-from grader.diagnosis.no_server import SERVICE, Word, why_not_met, why_not_offered
+from grader.diagnosis.no_endpoint import SERVICE, Word, why_not_met, why_not_offered
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Call, Recording

@@ -31,7 +31,7 @@ def _get_ready() -> None:
     for module in ("grader.batch.files", "grader.report.text.terminal"):
         import_module(module)
     from grader.recording import mcap_reader
-    from grader.report.html import report as html
+    from grader.report.html import page
 
     mcap_reader.get_ready()
-    html.environment()
+    page.environment()

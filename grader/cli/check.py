@@ -127,7 +127,7 @@ def check(
             runner.close()
         written = write_graded(graded, report, clock, json_file)
         console = output_console()
-        print_grade(console, graded.grade, graded.recordings)
+        print_grade(console, graded.grade.assignment.title, written.result)
         console.print(f"Report: {written.report}", soft_wrap=True)
         if keep:
             console.print(f"Installed: {keep_install(graded, report)}", soft_wrap=True)

@@ -55,7 +55,8 @@ def _one(path: Path, assignment: str | None) -> None:
     from grader.batch.ledger import Ledger
     from grader.batch.regrading import compare, find, refuse_other, stored_assignment
     from grader.batch.regrading import regrade as judge_again
-    from grader.report.model.facts import Clock
+    from grader.report.model.facts import Clock, RunFacts
+    from grader.report.model.result import make_result
     from grader.report.text.terminal import print_grade
 
     found = find(path)
@@ -69,7 +70,8 @@ def _one(path: Path, assignment: str | None) -> None:
     graded = judge_again(loaded, found)
     console = output_console()
     console.print(f"Assignment: {loaded.file}", soft_wrap=True)
-    print_grade(console, graded.grade, graded.recordings)
+    result = make_result(graded.grade, graded.recordings, RunFacts(clock.started, clock.elapsed_s))
+    print_grade(console, loaded.assignment.title, result)
     if found.result is not None:
         for line in compare(found.result, graded.grade) or ["no check changed"]:
             console.print(line, markup=False)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from grader.batch.grading import Graded, Grading
     from grader.cli.screen.page import ReportPage
     from grader.errors import RosgradeError
-    from grader.grade import Grade
+    from grader.report.model.result_model import Result
     from grader.run.runner import Runner
 
 
@@ -168,10 +168,10 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
     from grader.batch.files import write_graded
     from grader.batch.watching import Began, Cancelled, Watching
     from grader.report.model.facts import Clock
+    from grader.report.text.explanation import score
     from grader.report.text.terminal import print_changes, print_grade
-    from grader.report.text.words import number
 
-    before: Grade | None = None
+    before: Result | None = None
     clock = Clock()
     with ExitStack() as shown:
         watching = Watching(work.submission, work.report, work, work.loaded.folder)
@@ -190,16 +190,14 @@ def _follow(work: _Work, page: ReportPage, console: Console) -> None:
                 print_error(str(event.problem))
                 page.tell(f"not graded: {event.problem}", f"! {title}")
             else:
-                grade = event.graded.grade
-                write_graded(event.graded, work.report, clock)
+                result = write_graded(event.graded, work.report, clock).result
                 console.rule(f"{time.strftime('%H:%M:%S')}, after {clock.elapsed_s:.1f} s")
                 if before is None:
-                    print_grade(console, grade, event.graded.recordings)
+                    print_grade(console, title, result)
                 else:
-                    print_changes(console, before, grade, event.graded.recordings)
-                before = grade
-                score = f"{number(grade.score)} of {number(grade.max_score)} points"
-                told = score if grade.graded else "not graded"
+                    print_changes(console, before, result)
+                before = result
+                told = score(result)
                 page.tell(
                     f"{told}, graded at {time.strftime('%H:%M:%S')}",
                     f"{told}: {title}",

@@ -36,13 +36,17 @@ class Symptom(Generic[A]):
 
 @dataclass(frozen=True)
 class Explanation:
-    """One entry of the catalogue."""
+    """One entry of the catalogue.
+
+    Attributes:
+        sentence: What it explains: the text of the documentation.
+    """
 
     symptom: type[Symptom[Any]]
+    name: str
     apply: Callable[[Any], Any]
     module: str
     sentence: str
-    """What it explains: the text of the documentation."""
     is_general: bool = False
 
 
@@ -52,17 +56,20 @@ def add(entry: Explanation) -> None:
 
 
 def explanation(
-    symptom: type[Symptom[Any]], *, general: bool = False
+    *symptoms: type[Symptom[Any]], general: bool = False
 ) -> Callable[[Callable[[S], A]], Callable[[S], A]]:
     """Put a function into the catalogue.
 
     Args:
+        symptoms: Which it explains.
         general: Asked after all others: it says only what is there in any case.
     """
 
     def register(apply: Callable[[S], A]) -> Callable[[S], A]:
         sentence = " ".join((inspect.getdoc(apply) or "").split())
-        add(Explanation(symptom, apply, apply.__module__, sentence, general))
+        for symptom in symptoms:
+            name, module = apply.__name__, apply.__module__
+            add(Explanation(symptom, name, apply, module, sentence, general))
         return apply
 
     return register

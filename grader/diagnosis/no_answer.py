@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -11,10 +10,15 @@ from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_server import Word, offered
+from grader.diagnosis.no_endpoint import Word, offered
 from grader.diagnosis.process.blocked_executor import why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, exited, why_it_exited
-from grader.diagnosis.process.raised import interrupted_place, parse_failures, student_place
+from grader.diagnosis.process.raised import (
+    in_brackets,
+    interrupted_place,
+    parse_failures,
+    student_place,
+)
 from grader.measure import declarations
 from grader.recording.interaction import executor_services
 from grader.recording.model import NS, Process, Recording
@@ -24,7 +28,6 @@ from grader.submission.record import SourceError
 _MULTI = "MultiThreadedExecutor"
 _LOG_LINES = 10
 _ROUNDING_S = 1e-6
-_NEVER_AWAITED = re.compile(r"RuntimeWarning: coroutine '([\w.<>]+)' was never awaited")
 
 
 @dataclass(frozen=True)
@@ -34,8 +37,7 @@ class NoAnswer(Symptom[Cause]):
     Attributes:
         what: The symptom in words.
         name: Of the service or action.
-        while_busy: What is said of an executor that is blocked, or does not tell; None for
-            general words.
+        while_busy: The cause where the executor is blocked or nothing tells, if not general.
     """
 
     recording: Recording
@@ -59,8 +61,15 @@ class NoAnswer(Symptom[Cause]):
 
     @property
     def spins(self) -> bool | None:
-        """Whether the node's executor spins; None if the node was not asked."""
-        return _spins(self.recording, self.node, self.asked_ns)
+        """Whether the executor answered a call of its own since then; None if it got none."""
+        calls = [
+            call
+            for call in self.recording.calls
+            if call.service in executor_services(self.node)
+            and self.asked_ns <= call.requested_ns <= self.recording.stop_ns - NS
+        ]
+        answered = any((call.answered_ns or 0) > self.asked_ns for call in calls)
+        return answered if calls else None
 
     @property
     def moment(self) -> Moment:
@@ -73,11 +82,6 @@ class NoAnswer(Symptom[Cause]):
         """Where the process was when it was interrupted."""
         process = self.process
         return interrupted_place(self.recording, process.name) if process else None
-
-    @property
-    def where(self) -> str:
-        """The same in words, with a space before."""
-        return f" ({self.place.file}:{self.place.line})" if self.place else ""
 
     @property
     def evidence(self) -> Evidence:
@@ -122,44 +126,33 @@ def no_cpu_time(symptom: NoAnswer) -> Cause | None:
 @explanation(NoAnswer)
 def callback_raised(symptom: NoAnswer) -> Cause | None:
     """A callback raised an exception."""
-    process = symptom.process
-    if process is None:
-        return None
-    return why_raised(symptom.recording, symptom.what, symptom.asked_ns, (process,))
+    own = [symptom.process] if symptom.process else []
+    return why_raised(symptom.recording, symptom.what, symptom.asked_ns, own)
 
 
 @explanation(NoAnswer)
 def never_spun(symptom: NoAnswer) -> Cause | None:
     """rclpy.spin() is never called, or the node is not given to the executor that spins."""
-    process = symptom.process
-    if process is None:
+    if symptom.process is None:
         return None
     nodes, moments = (symptom.node,), (symptom.moment,)
-    return why_never_spun(symptom.recording, symptom.what, nodes, (process,), moments)
-
-
-@explanation(NoAnswer)
-def busy_as_the_lesson_says(symptom: NoAnswer) -> Cause | None:
-    """The executor is busy with another callback, such as the execute callback of a goal."""
-    busy = symptom.while_busy
-    if busy is None or symptom.spins:
-        return None
-    return replace(busy, observed=busy.observed + symptom.where, evidence=symptom.evidence)
+    return why_never_spun(symptom.recording, symptom.what, nodes, (symptom.process,), moments)
 
 
 @explanation(NoAnswer)
 def blocked_executor(symptom: NoAnswer) -> Cause | None:
-    """A callback does not return, and blocks the executor."""
-    if symptom.spins is not False:
-        return None
-    return Cause(
-        f"{symptom.what}: something blocks the executor{symptom.where}; the node's parameter "
-        "services answer no call either",
-        "A callback must return soon. Look for `while True`, time.sleep() or input() in it, "
-        "and for a call() of another service, which waits for an answer that the same "
-        "executor would have to take in: use call_async().",
-        symptom.evidence,
-    )
+    """A callback does not return, such as that of a goal, and blocks the executor."""
+    blocked = None if symptom.spins else symptom.while_busy
+    if symptom.spins is False and blocked is None:
+        blocked = Cause(
+            f"{symptom.what}: something blocks the executor; the node's parameter services answer "
+            "no call either",
+            "A callback must return soon. Look for `while True`, time.sleep() or input() in it, "
+            "and for a call() of another service, which waits for an answer that the same "
+            "executor would have to take in: use call_async().",
+        )
+    observed = f"{blocked.observed if blocked else ''}{in_brackets(symptom.place)}"
+    return blocked and replace(blocked, observed=observed, evidence=symptom.evidence)
 
 
 @explanation(NoAnswer, general=True)
@@ -167,7 +160,7 @@ def callback_does_not_answer(symptom: NoAnswer) -> Cause:
     """The callback does not come to its end, or waits for another one of its group."""
     spins = ", although the node's executor spins" if symptom.spins else ""
     return Cause(
-        f"{symptom.what}{symptom.where}{spins}",
+        f"{symptom.what}{in_brackets(symptom.place)}{spins}",
         "Does the callback come to its end and return the response? A callback that waits for "
         "another one of the same callback group waits for ever.",
         symptom.evidence,
@@ -225,66 +218,28 @@ def why_raised(
     Args:
         processes: Whose; by default all.
     """
-    candidates = recording.processes if processes is None else processes
-    found = (_why_raised_in(recording, what, begin_ns, process) for process in candidates)
-    return next(filter(None, found), None)
-
-
-def _why_raised_in(
-    recording: Recording, what: str, begin_ns: int, process: Process
-) -> Cause | None:
-    lines = [
-        line
-        for line in recording.log
-        if line.process == process.name
-        and line.stream == "stderr"
-        and begin_ns <= line.time_ns <= recording.stop_ns
-    ]
-    found = [item for item in parse_failures([line.text for line in lines]) if not item.ignored]
-    if not found:
-        return None
-    place = student_place(found[-1], recording.submission)
-    where = f" ({place.file}:{place.line})" if place else ""
-    return Cause(
-        f"{what}: an exception was raised meanwhile, {found[-1]}{where}",
-        "Correct the line that is named here."
-        if place
-        else "Read the traceback from its last line.",
-        Evidence(
-            moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
-            places=(place,) if place else (),
-            log=tuple(line.text for line in lines[-_LOG_LINES:]),
-        ),
-    )
-
-
-def why_never_awaited(recording: Recording, what: str) -> Cause | None:
-    """A coroutine that was made but never run, as Python warns; None without such a warning."""
-    for line in recording.log:
-        found = _NEVER_AWAITED.search(line.text) if line.stream == "stderr" else None
-        if found:
-            name = found[1].rpartition(".")[2]
-            return Cause(
-                f"{what}: Python warns that the coroutine {code(found[1])} was never awaited, so "
-                "nothing of it ran",
-                f"A function that begins with `async def` runs only under await: await "
-                f"self.{name}(...). Where nothing is awaited in it, write def instead of async def "
-                "(an EventsExecutor awaits no callback of a subscription).",
-                Evidence(
-                    moments=(Moment("the warning", recording.since_launch_s(line.time_ns)),),
-                    log=(line.text,),
-                ),
-            )
+    for process in recording.processes if processes is None else processes:
+        lines = [
+            line
+            for line in recording.log
+            if line.process == process.name
+            and line.stream == "stderr"
+            and begin_ns <= line.time_ns <= recording.stop_ns
+        ]
+        failures = parse_failures([line.text for line in lines])
+        raised = next((item for item in reversed(failures) if not item.ignored), None)
+        if raised is None:
+            continue
+        place = student_place(raised, recording.submission)
+        return Cause(
+            f"{what}: an exception was raised meanwhile, {raised}{in_brackets(place)}",
+            "Correct the line that is named here."
+            if place
+            else "Read the traceback from its last line.",
+            Evidence(
+                moments=(Moment("the exception", recording.since_launch_s(lines[-1].time_ns)),),
+                places=(place,) if place else (),
+                log=tuple(line.text for line in lines[-_LOG_LINES:]),
+            ),
+        )
     return None
-
-
-def _spins(recording: Recording, node: str, asked_ns: int) -> bool | None:
-    """Whether the node answered what its executor answers, from a time on; None if not asked."""
-    calls = [
-        call
-        for call in recording.calls
-        if call.service in executor_services(node)
-        and asked_ns <= call.requested_ns <= recording.stop_ns - NS
-    ]
-    answered = any(call.answered_ns is not None and call.answered_ns > asked_ns for call in calls)
-    return answered if calls else None

@@ -1,174 +1,183 @@
-"""Why the student has no publisher or subscription on a topic, near misses first."""
+"""Publishers, subscriptions, services and actions of the student, and why one is not there."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence, Table
-from grader.checks.first_seen import endpoints_seen, nodes_seen
+from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.first_seen import nodes_seen
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.destroyed_endpoint import why_destroyed
 from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.near_name import Named, why_misnamed
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.process.process_exit import crashed, why_it_exited
+from grader.diagnosis.process.process_exit import crashed, why_crashed
 from grader.diagnosis.undeclared import why_never_appeared
 from grader.measure import declarations
-from grader.recording.model import Endpoint, Kind, Owner, Recording
+from grader.recording.interaction import Service
+from grader.recording.model import Kind, Owner, Recording
+from grader.spec.nearest_name import nearest
 
 # Every rclpy node has these by itself; they say nothing of what the student wrote.
 OWN_TOPICS = frozenset({"/rosout", "/parameter_events", "/clock"})
-
+_OWN_SERVICE = re.compile(
+    r"(describe|get|list|set)_parameters|set_parameters_atomically|get_parameter_types"
+    r"|get_type_description"
+)
+_SEND_GOAL = "/_action/send_goal"
+_MOST_ROWS = 50
+_MOST_MOMENTS = 5
 # The name becomes an argument, and a DDS participant that is not of ROS may use any.
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
-_CREATE = {Kind.PUBLISHER: "create_publisher", Kind.SUBSCRIPTION: "create_subscription"}
-_DOES = {Kind.PUBLISHER: "publishes on", Kind.SUBSCRIPTION: "subscribes to"}
-_DOES_NOTHING = {Kind.PUBLISHER: "publishes nothing", Kind.SUBSCRIPTION: "subscribes to nothing"}
-_OTHER = {Kind.PUBLISHER: Kind.SUBSCRIPTION, Kind.SUBSCRIPTION: Kind.PUBLISHER}
+
+@dataclass(frozen=True)
+class Word:
+    """How a publisher, a subscription, a service or an action is called, and made.
+
+    Attributes:
+        does: What a node does that has one, before its name.
+        create: The code that makes one; ``{type}`` and ``{name}`` stand for its own.
+    """
+
+    noun: str
+    does: str
+    create: str
+
+
+PUBLISHER = Word("publisher", "publishes on", "self.create_publisher({type}, '{name}', 10)")
+SUBSCRIPTION = Word(
+    "subscription",
+    "subscribes to",
+    "self.create_subscription({type}, '{name}', self.callback, 10)",
+)
+SERVICE = Word(
+    "service", "offers the service", "self.create_service({type}, '{name}', self.callback)"
+)
+ACTION = Word(
+    "action", "offers the action", "ActionServer(self, {type}, '{name}', self.execute_callback)"
+)
+_WORDS = (PUBLISHER, SUBSCRIPTION, SERVICE, ACTION)
+_OTHER = {PUBLISHER: SUBSCRIPTION, SUBSCRIPTION: PUBLISHER, SERVICE: ACTION, ACTION: SERVICE}
 
 
 @dataclass(frozen=True)
 class NoEndpoint(Symptom[Cause]):
-    """A publisher or a subscription is missing."""
+    """A publisher, a subscription, a service or an action is missing.
+
+    Attributes:
+        types: Any of which it may have; empty where any will do.
+    """
 
     recording: Recording
-    kind: Kind
-    topic: str
+    word: Word
+    name: str
+    types: tuple[str, ...] = ()
 
     @property
-    def own(self) -> list[Endpoint]:
-        """The student's endpoints of this kind, without those that every node has."""
-        found = self.recording.student_endpoints(self.kind)
-        return [item for item in found if item.topic not in OWN_TOPICS]
+    def there(self) -> tuple[Service, ...]:
+        """What the student's nodes have of this kind, without what every node has."""
+        return _of_students(self.recording, self.word)
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        return f"there is no {self.word.noun} {code(self.name)}"
 
     @property
     def evidence(self) -> Evidence:
         """What there is instead."""
-        moments = endpoints_seen(self.recording, self.own) or nodes_seen(self.recording)
-        return Evidence(moments=moments, tables=_endpoints_table(self.recording))
+        since_launch_s = self.recording.since_launch_s
+        moments = tuple(
+            Moment(f"{self.word.noun} {item.name} appeared", since_launch_s(item.appeared_ns))
+            for item in self.there[:_MOST_MOMENTS]
+        )
+        rows = [
+            (item.node, word.noun, item.name, item.type)
+            for word in _WORDS
+            for item in _of_students(self.recording, word)
+        ]
+        header = ("node", "kind", "name", "type")
+        table = Table("What the student's nodes have", header, tuple(rows[:_MOST_ROWS]))
+        return Evidence(
+            moments=moments or nodes_seen(self.recording), tables=(table,) if rows else ()
+        )
 
     @property
     def create(self) -> str:
-        """The call that creates such an endpoint."""
-        return f"self.{_CREATE[self.kind]}(...)"
+        """The code that creates it."""
+        type_ = self.types[0].rpartition("/")[2] if self.types else "Type"
+        return code(self.word.create.format(type=type_, name=self.name.lstrip("/")))
+
+
+def offered(recording: Recording, word: Word, name: str) -> tuple[Service, ...]:
+    """What the student's nodes have under a name, parameter services too."""
+    items = recording.services if word is SERVICE else _of_students(recording, word)
+    return tuple(item for item in items if item.name == name)
 
 
 def why_no_endpoint(recording: Recording, kind: Kind, topic: str) -> Cause | None:
     """Why the student has no such endpoint on a topic, or None if there is one."""
     if recording.student_endpoints(kind, topic):
         return None
-    if kind is Kind.PUBLISHER and _only_students_publish(recording, topic):
+    others = [item for item in recording.endpoints if item.topic == topic]
+    # Messages came that only the student can have published.
+    known = any(item.owner is not Owner.STUDENT and item.kind is kind for item in others)
+    if kind is Kind.PUBLISHER and recording.on(topic) and not known:
         return None
-    return cause_of(NoEndpoint(recording, kind, topic))
+    types = tuple(sorted({item.type for item in others if item.owner is Owner.PROBE}))
+    word = PUBLISHER if kind is Kind.PUBLISHER else SUBSCRIPTION
+    return cause_of(NoEndpoint(recording, word, topic, types))
 
 
-@explanation(NoEndpoint)
-def no_node(symptom: NoEndpoint) -> Cause | None:
-    """There is no node at all."""
-    return why_no_node(symptom.recording)
+def why_not_offered(
+    recording: Recording, word: Word, name: str, interface: str | None = None
+) -> Cause | None:
+    """Why no node of the student offers a service or action, or None if one does."""
+    symptom = NoEndpoint(recording, word, name, (interface,) if interface else ())
+    if any(one.name == name and interface in (None, one.type) for one in symptom.there):
+        return None
+    return cause_of(symptom)
 
 
-@explanation(NoEndpoint)
-def misspelt_topic(symptom: NoEndpoint) -> Cause | None:
-    """The topic's name is misspelt, private, in a namespace, or in other case."""
-    ended, topic = crashed(symptom.recording), symptom.topic
-    # What a process that lives has is no misspelling of what a dead one never came to create.
-    suspects = [
-        Named(item.topic, item.node)
-        for item in symptom.own
-        if not ended or declarations.process_of(symptom.recording, item.node) in (None, *ended)
-    ]
-    return why_misnamed(
-        topic,
-        suspects,
-        f"the node {_DOES[symptom.kind]}",
-        f"Write the topic's name as '{topic.rpartition('/')[2]}' in {symptom.create}.",
-        symptom.evidence,
+def is_offered(recording: Recording, word: Word, name: str, interface: str | None) -> Finding:
+    """The finding of a check that a node of the student offers a service or action.
+
+    Args:
+        interface: Its type, or None where any will do.
+    """
+    article = "an" if word is ACTION else "a"
+    type_ = f" of {code(interface)}" if interface else ""
+    expected = f"{article} {word.noun} {code(name)}{type_}"
+    cause = why_not_offered(recording, word, name, interface)
+    if cause is not None:
+        return cause.finding(expected)
+    found = offered(recording, word, name)[0]
+    when_s = recording.since_launch_s(found.appeared_ns)
+    return Finding.passed(
+        expected,
+        f"{code(found.node)} offers it, with the type {code(found.type)}, seen {when_s:.2f} s "
+        "after launch",
+        Evidence(moments=(Moment(f"{word.noun} {found.name} appeared", when_s),)),
     )
 
 
-@explanation(NoEndpoint)
-def process_crashed(symptom: NoEndpoint) -> Cause | None:
-    """The process ended with a failure before it created the endpoint."""
-    ended = crashed(symptom.recording)
-    return why_it_exited(symptom.recording, ended[0]) if ended else None
-
-
-@explanation(NoEndpoint)
-def never_appeared(symptom: NoEndpoint) -> Cause | None:
-    """The process created the endpoint, but it never appeared in the ROS graph."""
-    kind, topic = symptom.kind.value, symptom.topic
-    if not declarations.declares(symptom.recording, kind, "topic", topic):
-        return None
-    return why_never_appeared(symptom.recording, f"a {kind} on {code(topic)}")
-
-
-@explanation(NoEndpoint)
-def exchanged_executables(symptom: NoEndpoint) -> Cause | None:
-    """In setup.py an executable runs the function of another one."""
-    exchanged = why_exchanged(symptom.recording)
-    seen = f"there is no {symptom.kind.value} on {code(symptom.topic)}"
-    return exchanged and exchanged.after(seen)
-
-
-@explanation(NoEndpoint)
-def publisher_and_subscription_exchanged(symptom: NoEndpoint) -> Cause | None:
-    """The node publishes where it should subscribe, or subscribes where it should publish."""
-    kind, other = symptom.kind, _OTHER[symptom.kind]
-    if not symptom.recording.student_endpoints(other, symptom.topic):
-        return None
-    return Cause(
-        f"the node {_DOES[other]} {code(symptom.topic)} instead: found a {other.value} there, "
-        f"no {kind.value}",
-        f"Use {symptom.create} where the node has self.{_CREATE[other]}(...).",
-        symptom.evidence,
-    )
-
-
-@explanation(NoEndpoint)
-def nothing_created(symptom: NoEndpoint) -> Cause | None:
-    """The node has no publisher, or no subscription, at all."""
-    if symptom.own:
-        return None
-    return Cause(
-        f"the node {codes(node.name for node in symptom.recording.student_nodes)} "
-        f"{_DOES_NOTHING[symptom.kind]} (/rosout and /parameter_events belong to every node)",
-        f"Call {symptom.create} in the node's constructor.",
-        symptom.evidence,
-    )
-
-
-@explanation(NoEndpoint)
-def other_topic(symptom: NoEndpoint) -> Cause | None:
-    """The right type of message is on a topic of another name."""
-    wanted = {item.type for item in _probe_endpoints(symptom.recording, symptom.topic)}
-    same = [item.topic for item in symptom.own if item.type in wanted]
-    if not same:
-        return None
-    return Cause(
-        f"the right type of message, but on another topic: the node {_DOES[symptom.kind]} "
-        f"{codes(same)}",
-        f"Write the topic's name as '{symptom.topic.lstrip('/')}' in {symptom.create}.",
-        symptom.evidence,
-    )
-
-
-@explanation(NoEndpoint, general=True)
-def others_only(symptom: NoEndpoint) -> Cause:
-    """The node has other topics only."""
-    return Cause(
-        f"the node {_DOES[symptom.kind]} {codes(item.topic for item in symptom.own)} only",
-        f"Call {symptom.create} with the topic '{symptom.topic.lstrip('/')}'.",
-        symptom.evidence,
+def why_not_met(recording: Recording, word: Word, name: str, what: str, asked_ns: int) -> Cause:
+    """Why something that was offered could not be asked."""
+    items = offered(recording, word, name)
+    return why_destroyed(recording, f"it {what}", f"the {word.noun} {code(name)}", items) or Cause(
+        f"the {word.noun} {code(name)} {what}: it was there, but no client with the usual QoS met "
+        "it",
+        f"Keep the {word.noun} and its node as long as the program runs, and leave its QoS as it "
+        "is.",
+        Evidence(moments=(Moment("given up", recording.since_launch_s(asked_ns)),)),
     )
 
 
 def misnamed(recording: Recording, kind: Kind, topic: str) -> str:
-    """The remapping rule for the one endpoint of the right type on a topic that nobody else has.
+    """The remapping rule for the student's one endpoint of the right type on a topic of its own.
 
     Returns:
         Such as ``/cmdvel:=/cmd_vel``; empty where there is no such endpoint, or more than one, or
@@ -186,28 +195,167 @@ def misnamed(recording: Recording, kind: Kind, topic: str) -> str:
     return "" if rule in recording.remaps else rule
 
 
-def _only_students_publish(recording: Recording, topic: str) -> bool:
-    """Whether messages came that nobody but the student can have published."""
-    others = (
-        item.owner is not Owner.STUDENT and item.kind is Kind.PUBLISHER and item.topic == topic
-        for item in recording.endpoints
+@explanation(NoEndpoint)
+def no_node(symptom: NoEndpoint) -> Cause | None:
+    """There is no node at all."""
+    return why_no_node(symptom.recording)
+
+
+@explanation(NoEndpoint)
+def other_interface(symptom: NoEndpoint) -> Cause | None:
+    """The service or action has another type."""
+    own = next((one for one in symptom.there if one.name == symptom.name), None)
+    if own is None or not symptom.types:
+        return None
+    package, folder, short = symptom.types[0].split("/")
+    return Cause(
+        f"the {symptom.word.noun} {code(own.name)} has the type {code(own.type)}",
+        "A client and a server meet only if their types are the same: "
+        f"`from {package}.{folder} import {short}`.",
+        symptom.evidence,
     )
-    return bool(recording.on(topic)) and not any(others)
 
 
-def _probe_endpoints(recording: Recording, topic: str) -> Iterable[Endpoint]:
-    return (
-        item for item in recording.endpoints if item.owner is Owner.PROBE and item.topic == topic
-    )
-
-
-def _endpoints_table(recording: Recording) -> tuple[Table, ...]:
-    rows = [
-        (item.node, item.kind.value, item.topic, item.type)
-        for item in recording.endpoints
-        if item.owner is Owner.STUDENT and item.topic not in OWN_TOPICS
+@explanation(NoEndpoint)
+def misspelt_name(symptom: NoEndpoint) -> Cause | None:
+    """Its name is misspelt, private, in a namespace, or in other case."""
+    ended, wanted = crashed(symptom.recording), symptom.name
+    # What a process that lives has is no misspelling of what another never came to create.
+    suspects = [
+        item
+        for item in symptom.there
+        if not ended or declarations.process_of(symptom.recording, item.node) in (None, *ended)
     ]
-    if not rows:
-        return ()
-    header = ("node", "endpoint", "topic", "type")
-    return (Table("What the student's nodes publish and subscribe to", header, tuple(rows[:50])),)
+    found = f"the node {symptom.word.does} {{}} instead of {code(wanted)}"
+    for item in suspects:
+        why, hint = _difference(wanted, item)
+        if why:
+            return Cause(f"{found.format(code(item.name))}: {why}", hint, symptom.evidence)
+    match = nearest(wanted, [item.name for item in suspects])
+    base = wanted.rpartition("/")[2]
+    hint = f"Write the name as '{base}': {symptom.create}."
+    return Cause(found.format(code(match)), hint, symptom.evidence) if match else None
+
+
+@explanation(NoEndpoint)
+def process_crashed(symptom: NoEndpoint) -> Cause | None:
+    """The process ended with a failure before it created it."""
+    return why_crashed(symptom.recording)
+
+
+@explanation(NoEndpoint)
+def never_appeared(symptom: NoEndpoint) -> Cause | None:
+    """The process created it, but it never appeared in the ROS graph."""
+    noun, name = symptom.word.noun, symptom.name
+    if not declarations.declares(symptom.recording, noun, "topic", name):
+        return None
+    return why_never_appeared(symptom.recording, f"a {noun} on {code(name)}")
+
+
+@explanation(NoEndpoint)
+def exchanged_executables(symptom: NoEndpoint) -> Cause | None:
+    """In setup.py an executable runs the function of another one."""
+    exchanged = why_exchanged(symptom.recording)
+    return exchanged and exchanged.after(symptom.seen)
+
+
+@explanation(NoEndpoint)
+def exchanged_kind(symptom: NoEndpoint) -> Cause | None:
+    """The node subscribes where it should publish, or offers an action in place of a service."""
+    word, other = symptom.word, _OTHER[symptom.word]
+    if not any(item.name == symptom.name for item in _of_students(symptom.recording, other)):
+        return None
+    return Cause(
+        f"the node {other.does} {code(symptom.name)}, but has no {word.noun} of that name",
+        f"Use {symptom.create} in place of the {other.noun}.",
+        symptom.evidence,
+    )
+
+
+@explanation(NoEndpoint)
+def other_name(symptom: NoEndpoint) -> Cause | None:
+    """The type is right, but the name is another one."""
+    same = [item.name for item in symptom.there if item.type in symptom.types]
+    if not same:
+        return None
+    return Cause(
+        f"the type is right, but the name is another one: the node {symptom.word.does} "
+        f"{codes(same)}",
+        f"Write the name as '{symptom.name.lstrip('/')}': {symptom.create}.",
+        symptom.evidence,
+    )
+
+
+@explanation(NoEndpoint, general=True)
+def nothing_of_that_name(symptom: NoEndpoint) -> Cause:
+    """The node has others only, or none."""
+    nodes = codes(node.name for node in symptom.recording.student_nodes)
+    there = codes(item.name for item in symptom.there)
+    word = symptom.word
+    has = f"{word.does} {there} only" if there else f"has no {word.noun} of its own"
+    return Cause(
+        f"the node {nodes} {has}",
+        f"Call {symptom.create} in the node's constructor.",
+        symptom.evidence,
+    )
+
+
+def _of_students(recording: Recording, word: Word) -> tuple[Service, ...]:
+    if word is SERVICE:
+        return tuple(item for item in recording.services if not _is_own(item))
+    if word is ACTION:
+        goals = (item for item in recording.services if item.name.endswith(_SEND_GOAL))
+        return tuple(_action(item) for item in goals)
+    return tuple(
+        Service(item.topic, item.type, item.node, item.appeared_ns, item.vanished_ns)
+        for item in recording.student_endpoints(Kind(word.noun))
+        if item.topic not in OWN_TOPICS
+    )
+
+
+def _is_own(service: Service) -> bool:
+    """Whether every node has such a service by itself, or an action brings it along."""
+    prefix, _, base = service.name.rpartition("/")
+    return "/_action/" in service.name or (
+        prefix == service.node and _OWN_SERVICE.fullmatch(base) is not None
+    )
+
+
+def _action(service: Service) -> Service:
+    """The action, with its own name and type, by the service that takes its goals."""
+    name, type_ = service.name.removesuffix(_SEND_GOAL), service.type.removesuffix("_SendGoal")
+    return Service(name, type_, service.node, service.appeared_ns, service.vanished_ns)
+
+
+def _difference(wanted: str, item: Service) -> tuple[str, str]:
+    """How a name differs that is the same but for its case or its place, and what to try."""
+    base = wanted.rpartition("/")[2]
+    if item.name.lower() == wanted.lower():
+        return (
+            "upper and lower case differ",
+            f"Names in ROS are case-sensitive: write '{base}'.",
+        )
+    prefix, namespace = item.name.removesuffix(wanted), item.node.rpartition("/")[0]
+    if prefix == item.node:
+        return (
+            "a private name, below the node's own name",
+            f"`~/{base}` puts the node's name in front: write '{base}', without `~/`.",
+        )
+    if prefix != item.name and prefix == namespace:
+        return (
+            f"the node is in the namespace {code(namespace)}, and a relative name goes there "
+            "with it",
+            f"Create the node without namespace, or write the absolute name '{wanted}'.",
+        )
+    if prefix != item.name:
+        return (
+            f"{code(prefix)} stands in front of the name",
+            f"Write '{wanted.lstrip('/')}' in the code, with nothing before it.",
+        )
+    if wanted.endswith(item.name):
+        return (
+            "an absolute name, which stays outside of the node's namespace",
+            f"Begin the name without `/`: '{item.name.lstrip('/')}' is relative, and ROS puts "
+            "the node's namespace in front of it.",
+        )
+    return "", ""

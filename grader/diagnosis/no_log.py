@@ -7,25 +7,28 @@ from dataclasses import dataclass, replace
 
 from grader.checks.field import number_at
 from grader.checks.finding import Evidence, Moment, Table
-from grader.checks.first_seen import first_seen
-from grader.checks.wording import code, codes, counted, listing, value_text
+from grader.checks.first_seen import endpoints_seen, first_seen
+from grader.checks.wording import code, counted, listing, value_text
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.delivery import why_no_history, why_not_delivered
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.misread_log import explain
+from grader.diagnosis.misread_log import what_is_shown
+from grader.diagnosis.no_messages import why_not_delivered
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
 from grader.measure.echo import Echo, Wanted, echoes, output_lines, shown
 from grader.measure.printed import exchanged, logged_text, numbers, quote, unfilled
-from grader.recording.model import NS, Kind, LogLine, Recording
+from grader.recording.model import NS, Endpoint, Kind, LogLine, Recording
 from grader.spec.unit import format_duration
 
 _LOG_LINES = 5
-# Who may log less often than a message comes needs lines for no more than this share of them.
+# Where needed is no more than this share of the messages, the program may log less often.
 _SOME = 0.5
 # Share of the time that the host may take before silence says nothing any more.
 _STARVED = 0.5
+# What a subscription must request for the messages from before it was there.
+_KEEPS = ("transient_local", "unknown")
+_RESENDS = ("reliable", "unknown")
 
 
 @dataclass(frozen=True)
@@ -51,19 +54,19 @@ class NotLogged(Symptom[Cause]):
     def seen(self) -> str:
         """The symptom in words."""
         if self.found:
-            return f"log lines follow {counted(len(self.found), 'message')} on {code(self.topic)}"
+            messages = counted(len(self.wanted), "message")
+            return f"log lines follow only {len(self.found)} of {messages} on {code(self.topic)}"
         return f"no log line shows a message on {code(self.topic)}"
 
     @property
-    def nodes(self) -> set[str]:
-        """The nodes that subscribe to the topic."""
-        subscriptions = self.recording.student_endpoints(Kind.SUBSCRIPTION, self.topic)
-        return {item.node for item in subscriptions}
+    def subscriptions(self) -> tuple[Endpoint, ...]:
+        """The student's subscriptions to the topic."""
+        return self.recording.student_endpoints(Kind.SUBSCRIPTION, self.topic)
 
     @property
-    def begin_ns(self) -> int:
-        """When the first message was sent."""
-        return self.recording.carried(self.topic)[0].stamp_ns
+    def nodes(self) -> set[str]:
+        """The nodes that have them."""
+        return {item.node for item in self.subscriptions}
 
     @property
     def near(self) -> list[LogLine]:
@@ -72,6 +75,12 @@ class NotLogged(Symptom[Cause]):
         end_ns = self.wanted[-1].due_ns + self.within_ns
         lines = output_lines(self.recording)
         return [line for line in lines if begin_ns <= line.time_ns <= end_ns]
+
+    def evidence(self, label: str, line: LogLine) -> Evidence:
+        """A line, and others near the messages."""
+        moment = Moment(label, self.recording.since_launch_s(line.time_ns))
+        log = [one.text for one in self.near if one != line][: _LOG_LINES - 1]
+        return Evidence(moments=(moment,), log=(*log, line.text))
 
 
 def why_not_logged(
@@ -106,7 +115,21 @@ def no_history(symptom: NotLogged) -> Cause | None:
     wanted, recording = symptom.wanted, symptom.recording
     if not wanted or wanted[-1].message.stamp_ns >= recording.launched_ns:
         return None
-    return why_no_history(recording, symptom.topic, symptom.seen)
+    for item in symptom.subscriptions:
+        durability, reliability = item.qos.durability, item.qos.reliability
+        if durability in _KEEPS and reliability in _RESENDS:
+            continue
+        return Cause(
+            f"{symptom.seen}: the messages were published before the subscription was there, and "
+            f"it requests durability {durability} and reliability {reliability}. It matches the "
+            "publisher, but gets only what is published from then on",
+            "A late joiner gets what a transient_local publisher has kept only if it asks for it: "
+            "give create_subscription a QoSProfile with "
+            "durability=DurabilityPolicy.TRANSIENT_LOCAL and "
+            "reliability=ReliabilityPolicy.RELIABLE.",
+            Evidence(moments=endpoints_seen(recording, (item,))),
+        )
+    return None
 
 
 @explanation(NotLogged)
@@ -158,43 +181,44 @@ def never_spun(symptom: NotLogged) -> Cause | None:
 @explanation(NotLogged)
 def blocked_executor(symptom: NotLogged) -> Cause | None:
     """A callback does not return, and blocks the executor."""
-    return why_blocked(symptom.recording, symptom.seen, symptom.nodes, symptom.begin_ns)
+    begin_ns = symptom.recording.carried(symptom.topic)[0].stamp_ns
+    return why_blocked(symptom.recording, symptom.seen, symptom.nodes, begin_ns)
 
 
 @explanation(NotLogged)
 def output_dropped(symptom: NotLogged) -> Cause | None:
     """The program wrote more than is kept; an error, and never a lost point."""
-    recording, topic = symptom.recording, symptom.topic
-    dropped = sum(process.dropped_bytes for process in recording.processes)
+    dropped = sum(process.dropped_bytes for process in symptom.recording.processes)
     if not dropped:
         return None
     return Cause(
-        f"nothing about {code(topic)} is in the output that was kept, but the process wrote "
-        f"{dropped} bytes more",
+        f"nothing about {code(symptom.topic)} is in the output that was kept, but the process "
+        f"wrote {dropped} bytes more",
         "Write less: a line for each message is enough.",
         ours=True,
     )
 
 
 @explanation(NotLogged)
+def callbacks_wait(symptom: NotLogged) -> Cause | None:
+    """The callbacks keep each other waiting, so lines are missing or come too late."""
+    # What a late line shows may look like something else of the message that came before it.
+    limit = format_duration(symptom.within_ns / NS)
+    late = symptom.seen if symptom.found else f"{symptom.seen} within {limit} of it"
+    return why_slow(symptom.recording, late, symptom.nodes)
+
+
+@explanation(NotLogged)
 def only_some_logged(symptom: NotLogged) -> Cause | None:
     """Only some messages are logged: an if, once=True or throttle_duration_sec leave others out."""
-    recording, topic = symptom.recording, symptom.topic
-    wanted, found = symptom.wanted, symptom.found
+    recording, topic, found = symptom.recording, symptom.topic, symptom.found
     if not found:
         return None
     times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
-    seen = (
-        f"log lines follow only {len(found)} of {counted(len(wanted), 'message')} on "
-        f"{code(topic)}, written {written} after launch"
-    )
-    slow = why_slow(recording, seen, symptom.nodes)
-    if slow is not None:
-        return slow
-    seldom_is_right = symptom.needed <= _SOME * len(wanted)
+    seldom_is_right = symptom.needed <= _SOME * len(symptom.wanted)
     return Cause(
-        seen,
+        f"{symptom.seen}, written {written} after launch",
         "Log in every call of the callback"
         + (
             ", or at least once in a second."
@@ -210,123 +234,80 @@ def only_some_logged(symptom: NotLogged) -> Cause | None:
 
 
 @explanation(NotLogged)
-def log_lags_behind(symptom: NotLogged) -> Cause | None:
-    """The log lags behind: a callback takes too long, and newer messages wait."""
-    recording, topic = symptom.recording, symptom.topic
-    wanted, near = symptom.wanted, symptom.near
-    paths = list(wanted[-1].values)
+def logged_late(symptom: NotLogged) -> Cause | None:
+    """The values are logged too late: a callback takes too long, or another callback logs them."""
+    recording, topic, last = symptom.recording, symptom.topic, symptom.wanted[-1]
     carried = [
         Wanted(
-            message,
-            {path: number_at(message.value, path) for path in paths},
-            wanted[-1].ready_ns,
+            message, {path: number_at(message.value, path) for path in last.values}, last.ready_ns
         )
         for message in recording.carried(topic)
     ]
-    for line in reversed(near):
+    for line in reversed(output_lines(recording)):
         printed = numbers(line.text)
-        old = [
-            item
-            for item in carried
-            if item.message.stamp_ns <= line.time_ns
-            and shown(printed, item, symptom.decimals) == set(item.values)
-        ]
-        if not old:
-            continue
-        late_ns = line.time_ns - old[-1].due_ns
-        if late_ns <= symptom.within_ns:
-            return None
-        late = format_duration(late_ns / NS)
-        return Cause(
-            f"the log lags behind the messages on {code(topic)}: {quote(line.text)} was written "
-            f"{late} after that message had come, and newer ones wait",
-            "A callback must return at once: look for time.sleep(), input() or a loop in one of "
-            "the callbacks. What comes meanwhile waits for its end.",
-            Evidence(
-                moments=(Moment("logged too late", recording.since_launch_s(line.time_ns)),),
-                log=tuple(line.text for line in near[:_LOG_LINES]),
+        late_ns = min(
+            (
+                line.time_ns - item.due_ns
+                for item in carried
+                if item.message.stamp_ns <= line.time_ns
+                and shown(printed, item, symptom.decimals) == set(item.values)
             ),
+            default=0,
         )
+        if late_ns > symptom.within_ns:
+            return Cause(
+                f"the values of {code(topic)} are logged too late: {quote(line.text)} was written "
+                f"{format_duration(late_ns / NS)} after that message had come",
+                f"Log in the callback of {code(topic)} itself, from the message that it is given. "
+                "A callback must return at once: look for time.sleep(), input() or a loop in one "
+                "of the callbacks. What comes meanwhile waits for its end.",
+                symptom.evidence("logged too late", line),
+            )
     return None
 
 
 @explanation(NotLogged)
-def callbacks_wait(symptom: NotLogged) -> Cause | None:
-    """The callbacks keep each other waiting, so the lines come too late."""
-    # What a late line shows may look like something else of the message that came before it.
-    limit = format_duration(symptom.within_ns / NS)
-    late = f"no log line shows a message on {code(symptom.topic)} within {limit} of it"
-    return why_slow(symptom.recording, late, symptom.nodes)
-
-
-@explanation(NotLogged)
-def logged_elsewhere(symptom: NotLogged) -> Cause | None:
-    """The values are logged in another callback, and not when the messages come."""
-    recording, topic = symptom.recording, symptom.topic
-    near = symptom.near
-    last = symptom.wanted[-1]
-    for line in output_lines(recording):
-        if line in near or shown(numbers(line.text), last, symptom.decimals) != set(last.values):
-            continue
-        late_s = (line.time_ns - last.message.stamp_ns) / NS
-        others = [name for name in recording.messages if name != topic and recording.on(name)]
-        came = f" in which messages came on {codes(others)}" if others else ""
-        return Cause(
-            f"the values of {code(topic)} are logged, but not when its messages come: "
-            f"{quote(line.text)} was written {format_duration(late_s)} after the last of them, "
-            f"at a time{came}",
-            f"Log in the callback of {code(topic)} itself, from the message that it is given.",
-            Evidence(
-                moments=(Moment("logged too late", recording.since_launch_s(line.time_ns)),),
-                log=(line.text,),
-            ),
-        )
-    return None
+def no_f_string(symptom: NotLogged) -> Cause | None:
+    """The lines show braces in place of values: the f before the quotes is missing."""
+    line = _meant(symptom)
+    braces = unfilled(line.text) if line else None
+    if line is None or braces is None:
+        return None
+    return Cause(
+        f"log lines follow messages on {code(symptom.topic)}, but they show {code(braces)} instead "
+        f"of a value: {quote(line.text)}",
+        "Python fills in braces only where an f stands before the quotes: "
+        "f'... {value}' instead of '... {value}'.",
+        symptom.evidence("other values logged", line),
+    )
 
 
 @explanation(NotLogged)
 def other_values(symptom: NotLogged) -> Cause | None:
-    """Lines come, but they show other values."""
-    recording, topic = symptom.recording, symptom.topic
-    wanted, near, decimals = symptom.wanted, symptom.near, symptom.decimals
-    if not near:
+    """The lines show other values: other fields, exchanged names, a wrong sign, few decimals."""
+    line, item, decimals = _meant(symptom), symptom.wanted[-1], symptom.decimals
+    if line is None:
         return None
-    # What a process writes at Ctrl+C is no answer to a message.
-    near = [line for line in near if line.time_ns <= recording.stop_ns] or near
-    item = wanted[-1]
-    printed = [numbers(line.text) for line in near]
-    carried = {path for line in printed for path in shown(line, item, decimals)}
+    printed = [numbers(one.text) for one in symptom.near]
+    carried = {path for one in printed for path in shown(one, item, decimals)}
     missing = [path for path in item.values if path not in carried] or list(item.values)
     values = listing(f"{code(path)} = {_rounded(item.values[path], decimals)}" for path in missing)
-    # A line with numbers is more likely to be meant than one without.
-    told = next((line for line in reversed(near) if numbers(line.text)), near[-1])
-    braces = unfilled(told.text)
-    if braces is not None:
-        return Cause(
-            f"log lines follow messages on {code(topic)}, but they show {code(braces)} instead of "
-            f"a value: {quote(told.text)}",
-            "Python fills in braces only where an f stands before the quotes: "
-            "f'... {value}' instead of '... {value}'.",
-            Evidence(
-                moments=(Moment("other values logged", recording.since_launch_s(told.time_ns)),),
-                log=tuple(line.text for line in near[:_LOG_LINES]),
-            ),
-        )
-    pair = exchanged("\n".join(logged_text(line.text) for line in near), item.values, decimals)
+    lines = "\n".join(logged_text(one.text) for one in symptom.near)
+    pair = exchanged(lines, item.values, decimals)
     reason = (
         f"names the one where it shows the other: {listing(map(code, pair))} are exchanged"
         if pair
-        else explain(numbers(told.text), item, missing, decimals)
+        else what_is_shown(numbers(line.text), item, missing, decimals)
     )
     rows = tuple((path, value_text(value)) for path, value in item.values.items())
+    fields = listing(code(f"msg.{path}") for path in missing)
     return Cause(
-        f"log lines follow messages on {code(topic)}, but none shows {values}: "
-        f"{quote(told.text)}" + (f", which {reason}" if reason else ""),
-        f"Log the fields of the message that the callback is given: {_fields(missing)}.",
-        Evidence(
-            moments=(Moment("other values logged", recording.since_launch_s(told.time_ns)),),
-            log=tuple(line.text for line in near[:_LOG_LINES]),
-            tables=(Table(f"A message on {topic}", ("field", "value"), rows),),
+        f"log lines follow messages on {code(symptom.topic)}, but none shows {values}: "
+        f"{quote(line.text)}" + (f", which {reason}" if reason else ""),
+        f"Log the fields of the message that the callback is given: {fields}.",
+        replace(
+            symptom.evidence("other values logged", line),
+            tables=(Table(f"A message on {symptom.topic}", ("field", "value"), rows),),
         ),
     )
 
@@ -335,24 +316,28 @@ def other_values(symptom: NotLogged) -> Cause | None:
 def nothing_logged(symptom: NotLogged) -> Cause:
     """Nothing is logged when a message comes."""
     recording, topic = symptom.recording, symptom.topic
-    answers = [call for call in recording.calls if call.answered_ns is not None]
-    spins = ", and its executor spins" if answers else ""
-    wrote = next(iter(output_lines(recording)), None)
-    other = f"; the process wrote {quote(wrote.text)}" if wrote else ""
+    lines = output_lines(recording)
+    spins = any(call.answered_ns is not None for call in recording.calls)
     return Cause(
         f"nothing is logged when messages come on {code(topic)}: the subscription is there, its "
-        f"type and its QoS match{spins}{other}",
+        f"type and its QoS match{', and its executor spins' if spins else ''}"
+        + (f"; the process wrote {quote(lines[0].text)}" if lines else ""),
         "Is the line reached that logs what the message says? What debug() logs is not shown by "
         "default, an `except: pass` hides an error, and an `if` may leave messages out.",
         Evidence(
             moments=first_seen(recording, recording.carried(topic)),
-            log=tuple(line.text for line in output_lines(recording)[:_LOG_LINES]),
+            log=tuple(line.text for line in lines[:_LOG_LINES]),
         ),
     )
 
 
-def _fields(paths: Sequence[str]) -> str:
-    return listing(code(f"msg.{path}") for path in paths)
+def _meant(symptom: NotLogged) -> LogLine | None:
+    """The line near the messages that is most likely meant to show them; None without any."""
+    # What a process writes at Ctrl+C is no answer to a message.
+    running = [line for line in symptom.near if line.time_ns <= symptom.recording.stop_ns]
+    near = running or symptom.near
+    with_numbers = (line for line in reversed(near) if numbers(line.text))
+    return next(with_numbers, near[-1] if near else None)
 
 
 def _rounded(value: float, decimals: int) -> str:

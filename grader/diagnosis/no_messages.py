@@ -1,46 +1,57 @@
-"""Why no message arrived on a topic: one cause, the deepest that can be seen."""
+"""Why no message, or too few, came on a topic, or none reached a subscription of the student's."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Moment
-from grader.checks.first_seen import endpoints_seen, until_the_end
-from grader.checks.wording import code, codes, counted, listing
+from grader.checks.first_seen import endpoints_seen
+from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.delivery import why_not_delivered
-from grader.diagnosis.destroyed_endpoint import why_unpublished
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.no_answer import why_never_awaited, why_raised
+from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribed
+from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
-from grader.diagnosis.process.blocked_executor import left_s, why_blocked, why_never_spun
 from grader.diagnosis.process.process_exit import why_ended
-from grader.diagnosis.process.raised import interrupted_place
-from grader.diagnosis.sim_time import why_time_stands_still
-from grader.measure import compatibility, declarations
+from grader.diagnosis.type_confusion import OtherType
+from grader.measure import compatibility
 from grader.recording.model import NS, Endpoint, Kind, Owner, Recording
 from grader.spec.unit import format_duration
-from grader.submission.record import SourceError
 
-_LOG_LINES = 5
 SECONDS_HINT = "create_timer takes its period in seconds: 0.3 is 300 ms."
 ENDED_HINT = (
     "Publish in every call of the callback. Look for a counter or a condition that ends it, for "
     "timer.cancel() and timer.reset(), and for a callback that does not return."
 )
-# Share of the observation that the host may take before silence says nothing any more.
-_STARVED = 0.5
-# Without what the host took: in so long a node answers what it was asked.
-_OWN_S = 2.0
 
 
 @dataclass(frozen=True)
-class NoMessages(Symptom[Cause]):
-    """No message came on a topic."""
+class OnTopic(Symptom[Cause]):
+    """Something is missing on a topic, as the student's endpoints of a kind have it."""
 
     recording: Recording
     topic: str
+    kind = Kind.PUBLISHER
+
+    @property
+    def own(self) -> tuple[Endpoint, ...]:
+        """The student's endpoints on the topic."""
+        return self.recording.student_endpoints(self.kind, self.topic)
+
+    @property
+    def nodes(self) -> set[str]:
+        """The nodes that have them."""
+        return {item.node for item in self.own}
+
+    @property
+    def others(self) -> list[Endpoint]:
+        """The probe's endpoints at the other end."""
+        return [
+            item
+            for item in self.recording.endpoints
+            if item.owner is Owner.PROBE and item.kind is not self.kind and item.topic == self.topic
+        ]
 
     @property
     def seen(self) -> str:
@@ -48,33 +59,70 @@ class NoMessages(Symptom[Cause]):
         return f"no message on {code(self.topic)}"
 
     @property
-    def publishers(self) -> tuple[Endpoint, ...]:
-        """The student's publishers on the topic."""
-        return self.recording.student_endpoints(Kind.PUBLISHER, self.topic)
+    def moments(self) -> tuple[Moment, ...]:
+        """When the student's endpoints appeared."""
+        return endpoints_seen(self.recording, self.own)
 
     @property
-    def nodes(self) -> set[str]:
-        """The nodes that have them."""
-        return {item.node for item in self.publishers}
+    def begin_ns(self) -> int:
+        """When the observation of the topic began."""
+        return self.recording.matched_ns or self.recording.launched_ns
 
     @property
-    def readers(self) -> list[Endpoint]:
-        """The probe's subscriptions to the topic."""
-        return [
-            item
-            for item in self.recording.endpoints
-            if item.owner is Owner.PROBE
-            and item.kind is Kind.SUBSCRIPTION
-            and item.topic == self.topic
-        ]
+    def stolen_s(self) -> float:
+        """What the machine took from the process meanwhile."""
+        return self.recording.stolen_s(self.begin_ns, self.recording.stop_ns)
+
+    @property
+    def watched_s(self) -> float:
+        """How long the topic was observed."""
+        return (self.recording.stop_ns - self.begin_ns) / NS
+
+
+@dataclass(frozen=True)
+class NoMessages(OnTopic):
+    """No message came on a topic."""
 
     @property
     def asked(self) -> tuple[str, ...]:
-        """Topics that the probe publishes on and that this one answers, as far as it is said."""
+        """Topics that the probe publishes on and that this one answers, as the assignment says."""
         answers = self.recording.answers
         return tuple(
             name for name in self.recording.sent if answers.get(name, self.topic) == self.topic
         )
+
+
+@dataclass(frozen=True)
+class FewMessages(OnTopic):
+    """Too few messages came on a topic."""
+
+    needed: int
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        number = counted(len(self.recording.on(self.topic)), "message")
+        return f"{number} on {code(self.topic)} in {format_duration(self.watched_s)}"
+
+    @property
+    def moments(self) -> tuple[Moment, ...]:
+        """When the first messages came."""
+        return tuple(
+            Moment(f"message {index}", self.recording.since_launch_s(message.stamp_ns))
+            for index, message in enumerate(self.recording.on(self.topic)[:10], start=1)
+        )
+
+
+@dataclass(frozen=True)
+class NotDelivered(OnTopic):
+    """A node does not receive the messages of a topic."""
+
+    kind = Kind.SUBSCRIPTION
+
+    @property
+    def seen(self) -> str:
+        """The symptom in words."""
+        return "its callback is never called"
 
 
 def why_silent(recording: Recording, topic: str) -> Cause:
@@ -82,24 +130,62 @@ def why_silent(recording: Recording, topic: str) -> Cause:
     return cause_of(NoMessages(recording, topic))
 
 
-@explanation(NoMessages)
-def no_publisher(symptom: NoMessages) -> Cause | None:
-    """The node has no publisher on the topic."""
-    return why_no_endpoint(symptom.recording, Kind.PUBLISHER, symptom.topic)
+def why_few(recording: Recording, topic: str, needed: int) -> Cause:
+    """Why fewer messages than needed were recorded on a topic."""
+    if not recording.on(topic):
+        return why_silent(recording, topic)
+    return cause_of(FewMessages(recording, topic, needed))
 
 
-@explanation(NoMessages)
-def other_type(symptom: NoMessages) -> Cause | None:
-    """The publisher has another message type."""
-    wanted = {item.type for item in symptom.readers}
-    found = {item.type for item in symptom.publishers}
-    if not wanted or not found or wanted & found:
+def why_not_delivered(recording: Recording, topic: str) -> Cause | None:
+    """Why no message on a topic can have reached the student, or None if it must have."""
+    return explain(NotDelivered(recording, topic))
+
+
+def why_not_sent(recording: Recording, topic: str) -> Cause:
+    """Why a stimulus published nothing: no subscription of the student's could get it, or ours."""
+    return why_not_delivered(recording, topic) or Cause.to_repeat(
+        f"nothing was sent on {code(topic)}"
+    )
+
+
+def why_unreadable(recording: Recording, topic: str) -> Cause | None:
+    """Why messages on a topic could not be read, or None where all could."""
+    number = recording.unreadable.get(topic, 0)
+    if not number:
         return None
     return Cause(
-        f"no message could be read: {code(symptom.topic)} has the type {codes(sorted(found))}, "
-        f"not {codes(sorted(wanted), last='or')}",
-        "A publisher and a subscription meet only if their types are the same.",
-        Evidence(moments=endpoints_seen(symptom.recording, symptom.publishers)),
+        f"{counted(number, 'message')} on {code(topic)} cannot be read: what was published are "
+        "other bytes than a message of its type has",
+        "Give publish() a message object: bytes are published as they are.",
+        Evidence(
+            moments=endpoints_seen(recording, recording.student_endpoints(Kind.PUBLISHER, topic))
+        ),
+    )
+
+
+@explanation(NoMessages, NotDelivered)
+def no_endpoint(symptom: OnTopic) -> Cause | None:
+    """The node has no publisher, or no subscription, on the topic."""
+    return why_no_endpoint(symptom.recording, symptom.kind, symptom.topic)
+
+
+@explanation(NoMessages, NotDelivered)
+def other_type(symptom: OnTopic) -> Cause | None:
+    """The publisher and the subscription have different message types."""
+    wanted = sorted({item.type for item in symptom.others})
+    found = sorted({item.type for item in symptom.own})
+    if not wanted or not found or set(wanted) & set(found):
+        return None
+    confusion = explain(OtherType(wanted[0], found[0])) or ""
+    package, _, short = wanted[0].split("/")
+    return Cause(
+        f"{symptom.seen}: the {symptom.kind.value} on {code(symptom.topic)} has the type "
+        f"{codes(found)}, not {codes(wanted, last='or')}"
+        + (f" ({confusion})" if confusion else ""),
+        "A publisher and a subscription meet only if their types are the same: "
+        f"`from {package}.msg import {short}`.",
+        Evidence(moments=endpoints_seen(symptom.recording, symptom.own)),
     )
 
 
@@ -110,42 +196,56 @@ def other_definition(symptom: NoMessages) -> Cause | None:
         return None
     return Cause(
         f"no message on {code(symptom.topic)} could be read: its type "
-        f"{code(symptom.publishers[0].type)} has the right name, but another definition",
+        f"{code(symptom.own[0].type)} has the right name, but another definition",
         "Compare the definition with the one that was asked for: the types, names, array bounds "
         "and order of its fields must be the same.",
-        Evidence(moments=endpoints_seen(symptom.recording, symptom.publishers)),
+        Evidence(moments=symptom.moments),
     )
 
 
-@explanation(NoMessages)
-def unreadable(symptom: NoMessages) -> Cause | None:
+@explanation(NoMessages, FewMessages)
+def unreadable(symptom: OnTopic) -> Cause | None:
     """The program publishes bytes that are no message of the type."""
     return why_unreadable(symptom.recording, symptom.topic)
 
 
-@explanation(NoMessages)
-def incompatible_qos(symptom: NoMessages) -> Cause | None:
-    """The publisher offers less (reliability, durability, deadline) than its reader requests."""
-    publishers, readers = symptom.publishers, symptom.readers
-    reasons = [
-        compatibility.refusals(offered=publisher.qos, requested=reader.qos)
-        for publisher in publishers
-        for reader in readers
+@explanation(NoMessages, NotDelivered)
+def incompatible_qos(symptom: OnTopic) -> Cause | None:
+    """The publisher's QoS offers less (reliability, durability, deadline) than is requested."""
+    pairs = [
+        (own.qos, other.qos) if symptom.kind is Kind.PUBLISHER else (other.qos, own.qos)
+        for own in symptom.own
+        for other in symptom.others
     ]
+    reasons = [compatibility.refusals(*pair) for pair in pairs]
     if not reasons or not all(reasons):
         return None
+    other = "its reader" if symptom.kind is Kind.PUBLISHER else "the publisher"
     return Cause(
-        f"no message on {code(symptom.topic)}: the publisher's QoS does not match its reader "
-        f"({', '.join(reasons[0])})",
-        "A subscription receives nothing from a publisher that offers less than it requests.",
+        f"{symptom.seen}: the {symptom.kind.value}'s QoS does not match {other} on "
+        f"{code(symptom.topic)} ({', '.join(reasons[0])})",
+        "A subscription receives nothing from a publisher that offers less than it requests. A "
+        "number as QoS, such as 10, is reliable and volatile, and asks for nothing else.",
         Evidence(
-            moments=endpoints_seen(symptom.recording, publishers),
-            tables=(
-                compatibility.compatibility_table(
-                    offered=publishers[0].qos, requested=readers[0].qos
-                ),
-            ),
+            moments=endpoints_seen(symptom.recording, symptom.own),
+            tables=(compatibility.compatibility_table(*pairs[0]),),
         ),
+    )
+
+
+@explanation(NotDelivered, general=True)
+def nothing_sent(symptom: NotDelivered) -> Cause | None:
+    """Nothing was sent before the process ended or destroyed its subscription, or by a fault."""
+    recording, topic = symptom.recording, symptom.topic
+    carried = recording.carried(topic)
+    if carried and any(
+        (item.vanished_ns or math.inf) > carried[0].stamp_ns for item in symptom.own
+    ):
+        return None
+    return (
+        why_ended(recording)
+        or why_unsubscribed(recording, topic, "nothing was sent while it was there")
+        or Cause.to_repeat(f"nothing was sent on {code(topic)}, so there was nothing to receive")
     )
 
 
@@ -163,14 +263,27 @@ def never_matched(symptom: NoMessages) -> Cause | None:
     )
 
 
-@explanation(NoMessages)
-def process_ended(symptom: NoMessages) -> Cause | None:
-    """The process ended before it published."""
+@explanation(NoMessages, FewMessages)
+def process_ended(symptom: OnTopic) -> Cause | None:
+    """The process ended before it published, or before it published enough."""
     return why_ended(symptom.recording, symptom.seen)
 
 
-@explanation(NoMessages)
-def publisher_destroyed(symptom: NoMessages) -> Cause | None:
+@explanation(FewMessages)
+def too_little_cpu_time(symptom: FewMessages) -> Cause | None:
+    """With the time that the machine took from the process, it may have published enough."""
+    number = len(symptom.recording.on(symptom.topic))
+    left_to_it_s = symptom.watched_s - symptom.stolen_s
+    if symptom.stolen_s <= 0.0 or number * symptom.watched_s < symptom.needed * left_to_it_s:
+        return None
+    return Cause.to_repeat(
+        f"{symptom.seen}, but the machine took {format_duration(symptom.stolen_s)} of them from "
+        "the process"
+    )
+
+
+@explanation(NoMessages, FewMessages)
+def publisher_destroyed(symptom: OnTopic) -> Cause | None:
     """The program destroyed its publisher."""
     return why_unpublished(symptom.recording, symptom.topic, symptom.seen)
 
@@ -184,228 +297,3 @@ def nothing_to_answer(symptom: NoMessages) -> Cause | None:
         f"{symptom.seen}, because what the node should answer, on {code(symptom.asked[0])}, "
         "never reached it"
     )
-
-
-@explanation(NoMessages)
-def slow_timer(symptom: NoMessages) -> Cause | None:
-    """The timer's period is longer than the observation: milliseconds were given as seconds."""
-    timer = None if symptom.asked else _slow_timer(symptom.recording)
-    if timer is None:
-        return None
-    recording = symptom.recording
-    watched_s = recording.since_launch_s(recording.stop_ns)
-    return Cause(
-        f"{symptom.seen} in {format_duration(watched_s)}: the process declared a "
-        f"timer of {format_duration(timer.period_s)}",
-        SECONDS_HINT,
-        Evidence(
-            moments=(
-                Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
-                until_the_end(recording),
-            )
-        ),
-    )
-
-
-@explanation(NoMessages)
-def no_cpu_time(symptom: NoMessages) -> Cause | None:
-    """The machine gave the process too little CPU time; an error, and never a lost point."""
-    recording = symptom.recording
-    begin_ns = recording.matched_ns or recording.launched_ns
-    stolen_s = recording.stolen_s(begin_ns, recording.stop_ns)
-    watched_s = (recording.stop_ns - begin_ns) / NS
-    if stolen_s < _STARVED * watched_s:
-        return None
-    # A callback that never returns burns what CPU the machine leaves it.
-    guilty = blocked_executor(symptom)
-    begins_ns = [recording.sent[name][0].stamp_ns for name in symptom.asked if recording.sent[name]]
-    if not guilty and begins_ns and left_s(recording, min(begins_ns), recording.stop_ns) >= _OWN_S:
-        guilty = no_answer(symptom)
-    if guilty:
-        return replace(guilty, disturbed=True)
-    return Cause.to_repeat(
-        f"{symptom.seen}, but the machine took {format_duration(stolen_s)} of "
-        f"{format_duration(watched_s)} from the process"
-    )
-
-
-@explanation(NoMessages)
-def never_spun(symptom: NoMessages) -> Cause | None:
-    """rclpy.spin() is never called, or the node is not given to the executor that spins."""
-    return why_never_spun(symptom.recording, symptom.seen, symptom.nodes)
-
-
-@explanation(NoMessages)
-def time_stands_still(symptom: NoMessages) -> Cause | None:
-    """The node uses simulated time, which no simulator publishes, so its timers never fire."""
-    return why_time_stands_still(symptom.recording, symptom.seen)
-
-
-@explanation(NoMessages)
-def blocked_executor(symptom: NoMessages) -> Cause | None:
-    """A callback does not return, and blocks the executor."""
-    sent = symptom.recording.sent
-    begin_ns = [sent[name][0].stamp_ns for name in symptom.asked if sent[name]]
-    since_ns = min(begin_ns, default=symptom.recording.launched_ns)
-    return why_blocked(symptom.recording, symptom.seen, symptom.nodes, since_ns)
-
-
-@explanation(NoMessages)
-def never_awaited(symptom: NoMessages) -> Cause | None:
-    """A coroutine is called without `await`, so nothing of it runs."""
-    return why_never_awaited(symptom.recording, symptom.seen)
-
-
-@explanation(NoMessages)
-def no_answer(symptom: NoMessages) -> Cause | None:
-    """The subscription's callback gets its message, but does not publish, or raises."""
-    recording = symptom.recording
-    name = next((name for name in symptom.asked if recording.sent[name]), None)
-    if name is None:
-        return None
-    sent = recording.sent[name]
-    seen = (
-        f"{symptom.seen}, although {counted(len(sent), 'message')} on {code(name)} reached the node"
-    )
-    return why_raised(recording, seen, sent[0].stamp_ns) or Cause(
-        seen,
-        "Is publish(msg) reached in the subscription's callback? An `except: pass` hides the error "
-        "that would tell why not, and a lock or a loop that never ends keeps it waiting.",
-        Evidence(
-            moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
-            places=_interrupted(recording),
-        ),
-    )
-
-
-@explanation(NoMessages)
-def callback_without_publish(symptom: NoMessages) -> Cause | None:
-    """The subscription's callback is called, but a condition keeps it from publishing."""
-    heard = _heard(symptom.recording, symptom.topic)
-    if not heard or declarations.said(symptom.recording, "timer"):
-        return None
-    return Cause(
-        f"{_idle(symptom)}, although {heard} reached the node",
-        "Is publish(msg) reached in the subscription's callback? Look for a condition or a "
-        "`return` before it, and for an `except: pass` that hides an error.",
-        _idle_evidence(symptom),
-    )
-
-
-@explanation(NoMessages)
-def no_timer(symptom: NoMessages) -> Cause | None:
-    """No timer was created, so nothing calls the callback that publishes."""
-    recording = symptom.recording
-    if not declarations.traced(recording) or declarations.said(recording, "timer"):
-        return None
-    return Cause(
-        f"{_idle(symptom)}, and the process declared no timer that would call it",
-        "Is publish(msg) reached? Look for a condition before it, and for a loop that waits "
-        "for what never comes, such as subscriptions. A callback publishes only if something "
-        "calls it: self.create_timer(period_in_seconds, self.callback) does.",
-        _idle_evidence(symptom),
-    )
-
-
-@explanation(NoMessages)
-def lambda_without_call(symptom: NoMessages) -> Cause | None:
-    """The timer's callback is a lambda that names the method and does not call it."""
-    timers = _firing(symptom.recording)
-    if not timers or not all(timer.callback.endswith("<lambda>") for timer in timers):
-        return None
-    return Cause(
-        _idle(symptom) + _although(symptom.recording),
-        "A lambda has to call the method, with brackets: `lambda: self.callback()`. Without a "
-        "lambda it is self.callback, without brackets.",
-        _idle_evidence(symptom),
-    )
-
-
-@explanation(NoMessages, general=True)
-def publish_not_reached(symptom: NoMessages) -> Cause:
-    """The publisher is there, but the program does not come to its publish()."""
-    return Cause(
-        _idle(symptom) + _although(symptom.recording),
-        "Is publish(msg) reached in the callback? Printing or logging a message does not send it, "
-        "an `except: pass` hides the error that would tell why not, a lock that is never free "
-        "keeps it waiting, timer.cancel() ends it, and timer.reset() again and again lets its "
-        "period never end.",
-        _idle_evidence(symptom),
-    )
-
-
-def _idle(symptom: NoMessages) -> str:
-    return f"the publisher on {code(symptom.topic)} is there but silent"
-
-
-def _idle_evidence(symptom: NoMessages) -> Evidence:
-    recording = symptom.recording
-    # What it prints after Ctrl+C tells of its end, which any right node may word as a traceback.
-    complaints = [
-        line.text
-        for line in recording.log
-        if line.stream == "stderr" and line.time_ns <= recording.stop_ns
-    ]
-    return Evidence(
-        moments=(
-            *endpoints_seen(recording, symptom.publishers),
-            until_the_end(recording, "still no message when the observation ended"),
-        ),
-        places=_interrupted(recording),
-        log=tuple(complaints[-_LOG_LINES:]),
-    )
-
-
-def _firing(recording: Recording) -> list[declarations.DeclaredTimer]:
-    return [timer for timer in declarations.timers(recording) if _fires(recording, timer)]
-
-
-def _although(recording: Recording) -> str:
-    runs = [format_duration(timer.period_s) for timer in _firing(recording)]
-    if not runs or not declarations.said(recording, "spin"):
-        return ""
-    return f", although the process declared a timer of {listing(runs)}"
-
-
-def why_unreadable(recording: Recording, topic: str) -> Cause | None:
-    """Why messages on a topic could not be read, or None where all could."""
-    number = recording.unreadable.get(topic, 0)
-    if not number:
-        return None
-    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
-    return Cause(
-        f"{counted(number, 'message')} on {code(topic)} cannot be read: what was published are "
-        "other bytes than a message of its type has",
-        "Give publish() a message object: bytes are published as they are.",
-        Evidence(moments=endpoints_seen(recording, publishers)),
-    )
-
-
-def _slow_timer(recording: Recording) -> declarations.DeclaredTimer | None:
-    """A declared timer that could not fire before the end of the observation, if all are such."""
-    timers = declarations.timers(recording)
-    if not timers or any(_fires(recording, timer) for timer in timers):
-        return None
-    return min(timers, key=lambda timer: timer.period_s)
-
-
-def _fires(recording: Recording, timer: declarations.DeclaredTimer) -> bool:
-    return timer.declared_ns + timer.period_s * NS <= recording.stop_ns
-
-
-def _heard(recording: Recording, topic: str) -> str:
-    """What the node was sent, in words, but for what it answers elsewhere; empty without any."""
-    topics = {item.topic for item in recording.student_endpoints(Kind.SUBSCRIPTION)}
-    told = [
-        f"{counted(len(recording.carried(name)), 'message')} on {code(name)}"
-        for name in sorted(topics)
-        if recording.answers.get(name, topic) == topic
-        and recording.carried(name)
-        and why_not_delivered(recording, name) is None
-    ]
-    return listing(told)
-
-
-def _interrupted(recording: Recording) -> tuple[SourceError, ...]:
-    places = (interrupted_place(recording, process.name) for process in recording.processes)
-    return tuple(place for place in places if place)

@@ -1,4 +1,4 @@
-"""Why no node of the student appeared: nothing launched, died, hangs, or has another name."""
+"""Why no node of the student appeared: nothing launched, crashed, hangs, or has another name."""
 
 from __future__ import annotations
 
@@ -11,13 +11,12 @@ from grader.diagnosis.cause import Cause
 from grader.diagnosis.exchanged_executables import why_exchanged
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.not_built import why_not_built
-from grader.diagnosis.process.process_exit import crashed, why_ended, why_it_exited
-from grader.diagnosis.process.raised import interrupted_place
+from grader.diagnosis.process.process_exit import why_crashed, why_ended
+from grader.diagnosis.process.raised import in_brackets, interrupted_place
 from grader.diagnosis.undeclared import why_never_appeared
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
 from grader.spec.nearest_name import nearest
-from grader.submission.record import SourceError
 
 _LOG_LINES = 10
 # How the cell calls the wait for a process that it could not start.
@@ -48,32 +47,6 @@ class NoNode(Symptom[Cause]):
         return self.recording.processes[0]
 
     @property
-    def who(self) -> str:
-        """The same in words."""
-        return f"the process {code(self.process.name)}"
-
-    @property
-    def place(self) -> SourceError | None:
-        """Where it was when it was interrupted."""
-        return interrupted_place(self.recording, self.process.name)
-
-    @property
-    def where(self) -> str:
-        """The same in words, with a space before."""
-        return f" ({self.place.file}:{self.place.line})" if self.place else ""
-
-    @property
-    def evidence(self) -> Evidence:
-        """The place, and its last lines of output."""
-        name = self.process.name
-        lines = tuple(line.text for line in self.recording.log if line.process == name)
-        return Evidence(
-            moments=(self.nothing,),
-            places=(self.place,) if self.place else (),
-            log=lines[-_LOG_LINES:],
-        )
-
-    @property
     def nothing(self) -> Moment:
         """That there was still no node."""
         return until_the_end(self.recording, "still no node when the observation ended")
@@ -96,8 +69,8 @@ class OtherNode(Symptom[Cause]):
         return [node.name for node in self.recording.student_nodes]
 
     @property
-    def there(self) -> str:
-        """The same in words."""
+    def seen(self) -> str:
+        """The symptom in words."""
         return f"found the node {codes(self.names)}"
 
     @property
@@ -119,21 +92,16 @@ def why_not_node(recording: Recording, name: str) -> Cause | None:
 
 
 @explanation(NoNode)
-def package_not_built(symptom: NoNode) -> Cause | None:
-    """The package was not built."""
-    submission = symptom.recording.submission
-    package = symptom.what.partition(":")[0].partition("/")[0]
-    if symptom.is_launched or not submission.package(package):
-        return None
-    cause = why_not_built(submission, package)
-    return cause and cause.after("nothing was launched")
-
-
-@explanation(NoNode)
-def nothing_built(symptom: NoNode) -> Cause | None:
+def not_built(symptom: NoNode) -> Cause | None:
     """The packages did not build."""
-    build = symptom.recording.submission.build
-    if symptom.is_launched or symptom.what or build is None or build.succeeded:
+    submission = symptom.recording.submission
+    build, package = submission.build, symptom.what.partition(":")[0].partition("/")[0]
+    if symptom.is_launched:
+        return None
+    if submission.package(package):
+        cause = why_not_built(submission, package)
+        return cause and cause.after("nothing was launched")
+    if symptom.what or build is None or build.succeeded:
         return None
     return Cause(
         "nothing was launched, because the packages did not build",
@@ -172,7 +140,8 @@ def other_domain(symptom: NoNode) -> Cause | None:
     if not others:
         return None
     return Cause(
-        f"{symptom.who} joined ROS domain {others} and not the one that it was started in",
+        f"the process {code(symptom.process.name)} joined ROS domain {others} and not the one that "
+        "it was started in",
         "Do not set ROS_DOMAIN_ID or domain_id in the code: the environment chooses it.",
         Evidence(moments=(symptom.nothing,)),
     )
@@ -186,62 +155,27 @@ def never_appeared(symptom: NoNode) -> Cause | None:
     return why_never_appeared(symptom.recording, "a node")
 
 
-@explanation(NoNode)
-def waits_for_input(symptom: NoNode) -> Cause | None:
-    """The program waits for input() before it creates a node."""
-    if symptom.place is None or "input(" not in symptom.place.message:
-        return None
-    return Cause(
-        f"{symptom.who} waits for input(){symptom.where}, and no node appeared",
-        "A launched node has no keyboard: take the value from a ROS parameter.",
-        symptom.evidence,
-    )
-
-
-@explanation(NoNode)
-def init_without_node(symptom: NoNode) -> Cause | None:
-    """The program calls rclpy.init(), and creates no node."""
-    if not symptom.declares("init"):
-        return None
-    return Cause(
-        f"{symptom.who} called rclpy.init() but created no node until the end{symptom.where}",
-        "Create the node right after rclpy.init(): no loop and no sleep before it.",
-        symptom.evidence,
-    )
-
-
-@explanation(NoNode)
-def no_init(symptom: NoNode) -> Cause | None:
-    """The program does not come to rclpy.init()."""
-    if not declarations.traced(symptom.recording, symptom.process.name):
-        return None
-    return Cause(
-        f"{symptom.who} ran until the end but never called rclpy.init(){symptom.where}",
-        "Look for a loop, a sleep or input() at the top level of a module or before "
-        "rclpy.init() in main().",
-        symptom.evidence,
-    )
-
-
 @explanation(NoNode, general=True)
-def no_node_appeared(symptom: NoNode) -> Cause:
-    """The process runs, but no node appears."""
+def main_does_not_come_to_it(symptom: NoNode) -> Cause:
+    """main() creates no node: a loop, time.sleep() or input() comes before it."""
+    recording, name = symptom.recording, symptom.process.name
+    place = interrupted_place(recording, name)
+    done = "created no node"
+    if symptom.declares("init"):
+        done = "called rclpy.init() but created no node"
+    elif declarations.traced(recording, name):
+        done = "never called rclpy.init()"
+    lines = tuple(line.text for line in recording.log if line.process == name)
     return Cause(
-        f"{symptom.who} ran until the end, but no node appeared{symptom.where}",
-        "main() must call rclpy.init() and create the node; nothing may block before that.",
-        symptom.evidence,
-    )
-
-
-@explanation(OtherNode)
-def other_case(symptom: OtherNode) -> Cause | None:
-    """Upper and lower case of the node's name differ."""
-    if not any(name.lower() == symptom.wanted.lower() for name in symptom.names):
-        return None
-    return Cause(
-        f"{symptom.there}: upper and lower case differ",
-        f"Names in ROS are case-sensitive: super().__init__('{symptom.base}').",
-        Evidence(moments=nodes_seen(symptom.recording)),
+        f"the process {code(name)} ran until the end, but {done}{in_brackets(place)}",
+        "main() must call rclpy.init() and create the node right after it. Look for a loop, "
+        "time.sleep() or input() before that, also at the top level of a module: a launched node "
+        "has no keyboard.",
+        Evidence(
+            moments=(symptom.nothing,),
+            places=(place,) if place else (),
+            log=lines[-_LOG_LINES:],
+        ),
     )
 
 
@@ -253,8 +187,7 @@ def in_a_namespace(symptom: OtherNode) -> Cause | None:
     if space is None:
         return None
     return Cause(
-        f"{symptom.there}: the name is right, but the node is in the namespace "
-        f"{code(space or '/')}",
+        f"{symptom.seen}: the name is right, but the node is in the namespace {code(space or '/')}",
         "Leave out the namespace argument of Node.__init__ (and any `__ns` remapping) "
         "unless the assignment asks for it.",
         Evidence(moments=nodes_seen(symptom.recording)),
@@ -264,12 +197,11 @@ def in_a_namespace(symptom: OtherNode) -> Cause | None:
 @explanation(OtherNode)
 def process_crashed(symptom: OtherNode) -> Cause | None:
     """The process of the node ended with a failure before it created the node."""
-    ended = crashed(symptom.recording)
     # Without the namespaces, which make any two names alike.
-    bases = [name.rpartition("/")[2] for name in symptom.names]
-    if not ended or nearest(symptom.base, bases) is not None:
+    bases = [name.rpartition("/")[2].lower() for name in symptom.names]
+    if nearest(symptom.base.lower(), bases) is not None:
         return None
-    return why_it_exited(symptom.recording, ended[0])
+    return why_crashed(symptom.recording)
 
 
 @explanation(OtherNode)
@@ -281,22 +213,23 @@ def node_never_appeared(symptom: OtherNode) -> Cause | None:
     if symptom.wanted not in declared or len(declared) <= len(set(symptom.names)):
         return None
     cause = why_never_appeared(symptom.recording, f"the node {code(symptom.wanted)}")
-    return cause.after(symptom.there)
+    return cause.after(symptom.seen)
 
 
 @explanation(OtherNode)
 def exchanged_executables(symptom: OtherNode) -> Cause | None:
     """In setup.py an executable runs the function of another one."""
     exchanged = why_exchanged(symptom.recording)
-    return exchanged and exchanged.after(symptom.there)
+    return exchanged and exchanged.after(symptom.seen)
 
 
 @explanation(OtherNode, general=True)
 def other_name(symptom: OtherNode) -> Cause:
-    """The node has another name."""
+    """The node has another name, or upper and lower case of its name differ."""
+    same = symptom.wanted.lower() in [name.lower() for name in symptom.names]
     return Cause(
-        symptom.there,
+        f"{symptom.seen}{': upper and lower case differ' if same else ''}",
         f"The node's name is the argument of super().__init__('{symptom.base}') in its "
-        "constructor.",
+        "constructor. Upper and lower case matter.",
         Evidence(moments=nodes_seen(symptom.recording)),
     )

@@ -11,8 +11,8 @@ from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_answer import why_unanswered
+from grader.diagnosis.no_endpoint import SERVICE
 from grader.diagnosis.no_node import why_not_node
-from grader.diagnosis.no_server import SERVICE
 from grader.diagnosis.process.process_exit import why_ended
 from grader.measure.parameter_calls import calls_to, descriptor, names
 from grader.recording.model import Call, Recording

@@ -16,14 +16,13 @@ from grader.submission.intake.paths import is_within
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 
 _LOG_LINES = 15
-_SIDE_BY_SIDE = " A package that lies inside another one is not found: put them side by side."
 # Of a culprit's message, which may join several lines of the log.
 _COMPARED = 60
 _ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 # What colcon says of its own doings around the tool's output.
 _CHATTER = re.compile(r"Starting +>>>|(Finished|Failed|Aborted) +<<<|Summary:|\s+\d+ packages? ")
 # What setuptools says of data_files, as `ros2 pkg create` writes them.
-_NO_MARKER = re.compile(r"can't copy 'resource/([\w-]+)': doesn't exist")
+_NO_MARKER = re.compile(r"can't copy 'resource/[\w-]+': doesn't exist")
 _CMAKE = ("ament_cmake", "cmake")
 # What the build adds at the end when it ended colcon itself.
 _OURS = re.compile(r"\n\[rosgrade: (.+)\]\n\Z")
@@ -56,26 +55,18 @@ def why_no_package(submission: SubmissionRecord, name: str) -> Cause | None:
 
 @explanation(NoPackage)
 def no_workspace(symptom: NoPackage) -> Cause | None:
-    """What was handed in is no workspace: an empty archive, or two packages of one name."""
+    """There is no package.xml: an empty archive; or there are two packages of one name."""
     problem = symptom.submission.problem
-    if problem is None:
+    if problem is None and symptom.names:
         return None
     return Cause(
-        problem,
+        problem or "no package.xml was found",
         "Hand in the packages that are asked for, each of them once; colcon leaves out a "
         "folder with a file COLCON_IGNORE in it."
         if symptom.names
-        else "Hand in the workspace, its src folder or the package itself: a folder with a "
-        "package.xml must be in it.",
+        else "Hand in the workspace, its src folder or the package itself: a ROS package is a "
+        "folder with a package.xml.",
     )
-
-
-@explanation(NoPackage)
-def no_package_xml(symptom: NoPackage) -> Cause | None:
-    """There is no package.xml."""
-    if symptom.names:
-        return None
-    return Cause("no package.xml was found", "A ROS package is a folder with a package.xml.")
 
 
 @explanation(NoPackage)
@@ -97,18 +88,16 @@ def other_package_name(symptom: NoPackage) -> Cause:
         for item in symptom.submission.packages
         if match in (None, item.name)
     )
-    is_cmake = (
-        match is not None and existing_package(symptom.submission, match).build_type in _CMAKE
-    )
+    build_type = existing_package(symptom.submission, match).build_type if match else ""
     others = (
         "in project(...) of CMakeLists.txt"
-        if is_cmake
+        if build_type in _CMAKE
         else "in setup.py, setup.cfg, resource/ and the folder of the Python module"
     )
     return Cause(
         f"found package {code(match)}" if match else f"found {codes(symptom.names)} only",
         f"Write <name>{name}</name> in package.xml, and the same name {others}."
-        + ("" if match else _SIDE_BY_SIDE),
+        + ("" if match else " A package inside another one is not found: put them side by side."),
         Evidence(places=places[:10]),
     )
 
@@ -129,11 +118,7 @@ def _unusable(seen: str, errors: list[SourceError]) -> Cause:
 
 
 def existing_package(submission: SubmissionRecord, name: str) -> PackageRecord:
-    """The package of a name for which :func:`why_no_package` had nothing to say.
-
-    Raises:
-        LookupError: There is none, after all.
-    """
+    """The package of a name for which :func:`why_no_package` had nothing to say."""
     package = submission.package(name)
     if package is None:
         raise LookupError(f"no package {name!r}")
@@ -200,30 +185,23 @@ def machine_lacks_a_package(symptom: NotBuilt) -> Cause | None:
 @explanation(NotBuilt)
 def build_failed(symptom: NotBuilt) -> Cause | None:
     """The build fails: the first error is shown, with its file and line."""
-    if not _failed_itself(symptom.build, symptom.name):
+    build, name = symptom.build, symptom.name
+    if not _failed_itself(build, name):
         return None
-    return _failed(_own(symptom.submission, symptom.build, symptom.name), symptom.name)
+    folder = existing_package(symptom.submission, name).path
+    # Where the first error is another package's, this one has its own.
+    started = f"Starting >>> {name}" in _clean(build).splitlines()
+    if build.culprit and started and not is_within(build.culprit.file, folder):
+        build = replace(build, culprit=None)
+    return _failed(build, name)
 
 
 @explanation(NotBuilt, general=True)
-def rests_on_another(symptom: NotBuilt) -> Cause:
-    """Another package, on which it rests, failed to build."""
-    return _never_begun(symptom.submission, symptom.build, symptom.name)
-
-
-def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
-    """What this machine lacks for a package, or for what the package rests on; else None."""
-    for one in (name, *_rests_on(submission, name)):
-        cause = why_not_built(submission, one)
-        if cause is not None and cause.ours:
-            return cause
-    return None
-
-
-def _never_begun(submission: SubmissionRecord, build: BuildRecord, name: str) -> Cause:
-    """Why colcon did not begin a package: it rests on others that failed."""
+def depends_on_another(symptom: NotBuilt) -> Cause:
+    """Another package, on which it depends, failed to build."""
+    submission, build, name = symptom.submission, symptom.build, symptom.name
     failed = [one for one in build.failed_packages if one != name and _failed_itself(build, one)]
-    blamed = [one for one in _rests_on(submission, name) if one in failed] or failed
+    blamed = [one for one in _needs(submission, name) if one in failed] or failed
     if not blamed:
         return _failed(build, name)
     broken = [one for one in blamed if not _lacking(submission, build, one)]
@@ -235,7 +213,16 @@ def _never_begun(submission: SubmissionRecord, build: BuildRecord, name: str) ->
             _evidence(build, broken[0]),
         )
     lacking = sorted({what for one in blamed for what in _lacking(submission, build, one)})
-    return _not_here(lacking).after(f"it was not built, because it rests on {codes(blamed)}")
+    return _not_here(lacking).after(f"it was not built, because it depends on {codes(blamed)}")
+
+
+def why_lacking(submission: SubmissionRecord, name: str) -> Cause | None:
+    """What this machine lacks for a package, or for what the package rests on; else None."""
+    for one in (name, *_needs(submission, name)):
+        cause = why_not_built(submission, one)
+        if cause is not None and cause.ours:
+            return cause
+    return None
 
 
 def _not_here(lacking: list[str]) -> Cause:
@@ -256,56 +243,28 @@ def _failed_itself(build: BuildRecord, name: str) -> bool:
     return re.search(begins, _clean(build), re.MULTILINE) is not None
 
 
-def _rests_on(submission: SubmissionRecord, name: str) -> list[str]:
+def _needs(submission: SubmissionRecord, name: str) -> list[str]:
     """Other packages of the submission that a package names or imports, and those that they do."""
-    found: list[str] = []
-    ahead = [name]
-    while ahead:
-        package = submission.package(ahead.pop())
-        if package is None:
-            continue
-        named = {item.name for item in package.dependencies}
-        named |= {item.module for item in package.imports}
-        for one in sorted(named & {item.name for item in submission.packages}):
-            if one != name and one not in found:
-                found.append(one)
-                ahead.append(one)
-    return found
-
-
-def _own(submission: SubmissionRecord, build: BuildRecord, name: str) -> BuildRecord:
-    """The build without the culprit, if that only kept another package from being built."""
-    folder = existing_package(submission, name).path
-    if build.culprit is None or is_within(build.culprit.file, folder):
-        return build
-    was_started = f"Starting >>> {name}" in _clean(build).splitlines()
-    return replace(build, culprit=None) if was_started else build
+    found = [name]
+    for one in found:
+        package = submission.package(one)
+        named = {item.name for item in package.dependencies} if package else set()
+        named |= {item.module for item in package.imports} if package else set()
+        found += sorted(named & {item.name for item in submission.packages} - set(found))
+    return found[1:]
 
 
 def _failed(build: BuildRecord, name: str) -> Cause:
     ended = _OURS.search(build.log)
     why = str(build.culprit) if build.culprit else ended[1] if ended else ""
-    marker = _NO_MARKER.search(why)
     return Cause(
         f"`colcon build` failed: {why}" if why else "`colcon build` failed",
-        _mend_marker(marker[1], name)
-        if marker
+        f"Create resource/{name}, an empty file by which ROS finds the package, and write the same "
+        "name in package.xml, setup.py, setup.cfg and for the folder of the Python module."
+        if _NO_MARKER.search(why)
         else f"Run `colcon build --packages-select {name}` in the workspace and correct the first "
         "error that it prints.",
         _evidence(build, name),
-    )
-
-
-def _mend_marker(named: str, name: str) -> str:
-    """What to do about a file in resource/ that setup.py installs and that is not there."""
-    if named == name:
-        return (
-            f"Create resource/{name}: an empty file with the name of the package, by which ROS "
-            "finds it."
-        )
-    return (
-        f"setup.py calls the package {code(named)} and package.xml {code(name)}: write one name in "
-        "both, in setup.cfg, for the file in resource/ and for the folder of the Python module."
     )
 
 
@@ -320,18 +279,14 @@ def _lacking(submission: SubmissionRecord, build: BuildRecord, name: str) -> lis
         one = ahead.pop()
         written = "\n".join(_written(build, one))
         found = modules_not_found(written)
-        if not _is_pure_python(submission, one):
+        package = submission.package(one)
+        if package is None or package.build_type != "ament_python":
             found |= not_found(written) | set(TOOLS.values())
         missing |= found
         # Another package of the submission is not there, which lacks something itself.
         ahead += found & set(build.failed_packages) - seen
         seen |= found
     return sorted(missing & set(build.lacking))
-
-
-def _is_pure_python(submission: SubmissionRecord, name: str) -> bool:
-    package = submission.package(name)
-    return package is not None and package.build_type == "ament_python"
 
 
 def _evidence(build: BuildRecord, name: str) -> Evidence:

@@ -1,53 +1,77 @@
-"""Why an interface was not generated: what CMakeLists.txt or package.xml lacks, deepest first."""
+"""Why an interface is not defined, or no code for it was generated, deepest cause first."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import PurePosixPath
 
 from grader.checks.finding import Evidence
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.explanation import Symptom, explain, explanation
-from grader.diagnosis.no_definition import InterfaceName
+from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
 from grader.recording.interface import PRIMITIVES, DefinitionError, sections_of
 from grader.spec.nearest_name import nearest
 from grader.submission.read.cmake import CMakeCommand, read_commands
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
 
-CMAKE = "CMakeLists.txt"
 GROUP = "rosidl_interface_packages"
-GENERATE = "rosidl_generate_interfaces"
 GENERATORS = "rosidl_default_generators"
-
+_GENERATE = "rosidl_generate_interfaces"
 # Of ament_cmake_auto: it finds what package.xml names.
 _FINDS_ALL = "ament_auto_find_build_dependencies"
 _GENERATE_KEYWORDS = frozenset(
     {"DEPENDENCIES", "LIBRARY_NAME", "SKIP_INSTALL", "SKIP_GROUP_MEMBERSHIP_CHECK"}
     | {"ADD_LINTER_TESTS"}
 )
-_LONG_TYPE = re.compile(r"\w+/msg/\w+")
 _KINDS = (".msg", ".srv", ".action")
 
 
-def is_generated(submission: SubmissionRecord, interface: InterfaceName) -> bool:
-    """Whether the build made code for an interface."""
-    package = submission.package(interface.package)
-    return package is not None and any(item.file == interface.file for item in package.generated)
+@dataclass(frozen=True)
+class InterfaceName:
+    """The parts of an interface's name, such as ``bot_msgs/msg/BotStatus``.
+
+    Attributes:
+        kind: ``msg``, ``srv`` or ``action``; folder and suffix of its definition.
+    """
+
+    package: str
+    kind: str
+    name: str
+
+    @classmethod
+    def of(cls, interface: str) -> InterfaceName:
+        """Take a name apart."""
+        return cls(*interface.split("/"))
+
+    @property
+    def file(self) -> str:
+        """The file of its definition, in the package's folder."""
+        return f"{self.kind}/{self.name}.{self.kind}"
+
+    def __str__(self) -> str:
+        """Write it in full."""
+        return f"{self.package}/{self.kind}/{self.name}"
 
 
-def used_packages(interface: InterfaceName, definition: Definition) -> tuple[str, ...]:
-    """Other packages whose messages a definition contains, in the order of their fields."""
-    try:
-        sections = sections_of(str(interface), definition.text)
-    except DefinitionError:
-        return ()
-    types = (field.type for section in sections for field in section.fields if field.is_message)
-    packages = (kind.partition("/")[0] for kind in types)
-    return tuple(dict.fromkeys(name for name in packages if name != interface.package))
+@dataclass(frozen=True)
+class NoDefinition(Symptom[Cause]):
+    """The definition of an interface is missing."""
+
+    submission: SubmissionRecord
+    package: PackageRecord
+    interface: InterfaceName
+
+    def found(self, item: Definition, what: str) -> Cause:
+        """The cause if a definition lies at another place, or has another name."""
+        wanted, file = self.package.file(self.interface.file), self.interface.file
+        return Cause(
+            f"found {code(item.file)}: {what}",
+            f"Name it {code(wanted)}, and write {code(file)} in CMakeLists.txt.",
+            Evidence(places=(SourceError(item.file, None, what),)),
+        )
 
 
 @dataclass(frozen=True)
@@ -70,14 +94,44 @@ class NotGenerated(Symptom[Cause]):
     def finds(self, package: str) -> bool:
         """Whether find_package() is called for a package."""
         found = [command.arguments[:1] for command in self.calls("find_package")]
-        # A loop over names, or a variable that nobody can know.
+        # A loop over names, or a variable that only CMake knows.
         loop = any("${" in name for names in found for name in names)
         return (package,) in found or loop or bool(self.calls(_FINDS_ALL))
 
     def cause(self, line: int | None, observed: str, hint: str) -> Cause:
         """A cause in CMakeLists.txt."""
-        place = SourceError(self.package.file(CMAKE), line, observed.replace("`", ""))
+        place = SourceError(self.package.file("CMakeLists.txt"), line, observed.replace("`", ""))
         return Cause(f"CMakeLists.txt {observed}", hint, Evidence(places=(place,)))
+
+
+def find_definition(submission: SubmissionRecord, interface: InterfaceName) -> Definition | Cause:
+    """The definition of an interface, as the build took it or else as it was handed in.
+
+    Returns:
+        The definition with its path in the submission, or why there is none.
+    """
+    cause = why_no_package(submission, interface.package)
+    if cause is not None:
+        return cause
+    package = existing_package(submission, interface.package)
+    own = [item for item in package.definitions if item.file == package.file(interface.file)]
+    built = [item for item in package.generated if item.file == interface.file]
+    if built:
+        # Where CMakeLists.txt takes it from is the student's affair.
+        same = [item for item in (*own, *package.definitions) if item.text == built[0].text]
+        return same[0] if same else Definition(package.file(interface.file), built[0].text)
+    return own[0] if own else cause_of(NoDefinition(submission, package, interface))
+
+
+def used_packages(interface: InterfaceName, definition: Definition) -> tuple[str, ...]:
+    """Other packages whose messages a definition contains, in the order of their fields."""
+    try:
+        sections = sections_of(str(interface), definition.text)
+    except DefinitionError:
+        return ()
+    types = (field.type for section in sections for field in section.fields if field.is_message)
+    packages = (kind.partition("/")[0] for kind in types)
+    return tuple(dict.fromkeys(name for name in packages if name != interface.package))
 
 
 def why_not_generated(
@@ -87,36 +141,73 @@ def why_not_generated(
     cause = why_no_package(submission, interface.package)
     if cause is not None:
         return cause
-    if is_generated(submission, interface):
-        return None
     package = existing_package(submission, interface.package)
+    if any(item.file == interface.file for item in package.generated):
+        return None
     cause = explain(NotGenerated(package, interface, definition))
     built = None if package.build_type != "ament_cmake" else why_not_built(submission, package.name)
     if built is not None:
+        if cause is None or built.ours:
+            return built
         # The end of the log shows what became of what is missing.
-        log = built.evidence.log
-        return built if cause is None or built.ours else _with_log(cause, log)
+        return replace(cause, evidence=replace(cause.evidence, log=built.evidence.log))
     return cause or Cause(
         f"the build installed no code for {code(interface.file)}",
-        f"List {code(interface.file)} in {GENERATE}() in CMakeLists.txt.",
-        Evidence(places=(SourceError(package.file(CMAKE), None, GENERATE),)),
+        f"List {code(interface.file)} in {_GENERATE}() in CMakeLists.txt.",
+        Evidence(places=(SourceError(package.file("CMakeLists.txt"), None, _GENERATE),)),
     )
 
 
-def _with_log(cause: Cause, log: tuple[str, ...]) -> Cause:
-    evidence = Evidence(places=cause.evidence.places, log=log)
-    return Cause(cause.observed, cause.hint, evidence)
+@explanation(NoDefinition)
+def in_other_folder(symptom: NoDefinition) -> Cause | None:
+    """The file lies in a wrong folder, or in another package."""
+    wanted = PurePosixPath(symptom.interface.file).name
+    for package in (symptom.package, *symptom.submission.packages):
+        for item in package.definitions:
+            path = PurePosixPath(item.file)
+            if path.name == wanted:
+                return symptom.found(item, f"it lies in the folder {code(str(path.parent))}")
+    return None
+
+
+@explanation(NoDefinition)
+def other_name(symptom: NoDefinition) -> Cause | None:
+    """The file has another suffix, or its name is misspelt or not in CamelCase."""
+    name, suffix = symptom.interface.name, f".{symptom.interface.kind}"
+    stems = {PurePosixPath(item.file).stem: item for item in symptom.package.definitions}
+    folded = {stem.replace("_", "").lower(): stem for stem in stems}
+    match = name if name in stems else folded.get(name.lower()) or nearest(name, stems)
+    if match is None:
+        return None
+    if match == name:
+        return symptom.found(stems[match], f"its suffix is not {code(suffix)}")
+    return symptom.found(stems[match], f"it is not called {code(name)}, in CamelCase")
+
+
+@explanation(NoDefinition, general=True)
+def no_definition(symptom: NoDefinition) -> Cause:
+    """There is no such file."""
+    interface = symptom.interface
+    there = [item.file for item in symptom.package.definitions]
+    return Cause(
+        f"there is no {code(interface.file)}"
+        + (f"; found {codes(there)} only" if there else f", and no .{interface.kind} file at all"),
+        f"Make the folder {code(interface.kind)} beside package.xml, and in it the file "
+        f"{code(f'{interface.name}.{interface.kind}')}.",
+    )
 
 
 @explanation(NotGenerated)
-def no_cmake_package(symptom: NotGenerated) -> Cause | None:
-    """The build type of the package is not ament_cmake."""
+def no_cmake(symptom: NotGenerated) -> Cause | None:
+    """The package is none of CMake, which alone generates code for interfaces."""
     package = symptom.package
-    if package.build_type == "ament_cmake":
+    if package.build_type == "ament_cmake" and package.cmake is not None:
         return None
     return Cause(
         f"the build type of {code(package.name)} is {package.build_type}, and code for "
-        "interfaces is generated by CMake only",
+        "interfaces is generated by CMake only"
+        if package.build_type != "ament_cmake"
+        else "there is no CMakeLists.txt beside package.xml",
         "Make a package of its own for interfaces: "
         f"`ros2 pkg create --build-type ament_cmake {package.name}`.",
         Evidence(places=(SourceError(package.file("package.xml"), None, "build type"),)),
@@ -124,104 +215,56 @@ def no_cmake_package(symptom: NotGenerated) -> Cause | None:
 
 
 @explanation(NotGenerated)
-def no_cmake_file(symptom: NotGenerated) -> Cause | None:
-    """There is no CMakeLists.txt."""
-    if symptom.package.cmake is not None:
-        return None
-    return Cause(
-        "there is no CMakeLists.txt beside package.xml",
-        f"`ros2 pkg create --build-type ament_cmake {symptom.package.name}` makes one.",
-    )
-
-
-@explanation(NotGenerated)
 def generates_nothing(symptom: NotGenerated) -> Cause | None:
-    """CMakeLists.txt does not call rosidl_generate_interfaces()."""
-    if symptom.calls(GENERATE):
+    """CMakeLists.txt does not call rosidl_generate_interfaces(), or after ament_package()."""
+    calls, ended = symptom.calls(_GENERATE), symptom.calls("ament_package")
+    if calls and not (ended and ended[0].line < calls[0].line):
         return None
-    match = nearest(GENERATE, [command.name for command in symptom.commands], cutoff=0.8)
+    call = f'{_GENERATE}(${{PROJECT_NAME}} "{symptom.interface.file}")'
+    hint = f"Write {code(call)} before ament_package(), which comes last."
+    if calls:
+        return symptom.cause(ended[0].line, f"calls ament_package() before {_GENERATE}()", hint)
+    match = nearest(_GENERATE, [command.name for command in symptom.commands], cutoff=0.8)
     line = next((item.line for item in symptom.commands if item.name == match), None)
-    call = f'{GENERATE}(${{PROJECT_NAME}} "{symptom.interface.file}")'
-    there = f"calls {code(match)}, which does not exist" if match else f"never calls {GENERATE}"
-    return symptom.cause(line, there, f"Write {code(call)} before ament_package().")
-
-
-@explanation(NotGenerated)
-def finds_no_generators(symptom: NotGenerated) -> Cause | None:
-    """CMakeLists.txt does not find rosidl_default_generators."""
-    if symptom.finds(GENERATORS):
-        return None
-    return symptom.cause(
-        None,
-        f"does not find {code(GENERATORS)}",
-        f"Write `find_package({GENERATORS} REQUIRED)` before {GENERATE}().",
-    )
-
-
-@explanation(NotGenerated)
-def wrong_order(symptom: NotGenerated) -> Cause | None:
-    """CMakeLists.txt calls ament_package() before rosidl_generate_interfaces()."""
-    ended = symptom.calls("ament_package")
-    if not ended or ended[0].line >= symptom.calls(GENERATE)[0].line:
-        return None
-    return symptom.cause(
-        ended[0].line, f"calls ament_package() before {GENERATE}()", "ament_package() comes last."
-    )
-
-
-@explanation(NotGenerated)
-def other_project(symptom: NotGenerated) -> Cause | None:
-    """The project in CMakeLists.txt has another name than the package."""
-    name = symptom.package.name
-    project = symptom.calls("project")
-    if not project or project[0].arguments[:1] in ((), (name,)):
-        return None
-    return symptom.cause(
-        project[0].line,
-        f"is of the project {code(project[0].arguments[0])}, but package.xml names {code(name)}",
-        f"Write `project({name})`: both names must be the same.",
-    )
+    there = f"calls {code(match)}, which does not exist" if match else f"never calls {_GENERATE}"
+    return symptom.cause(line, there, hint)
 
 
 @explanation(NotGenerated)
 def not_listed(symptom: NotGenerated) -> Cause | None:
     """rosidl_generate_interfaces() does not list the file."""
-    calls, file = symptom.calls(GENERATE), symptom.interface.file
+    calls, file = symptom.calls(_GENERATE), symptom.interface.file
     listed = [item for call in calls for item in call.arguments[1:] if item.endswith(_KINDS)]
     if file in listed or any("${" in item for call in calls for item in call.arguments):
         return None
-    line = calls[0].line
-    hint = f'Write "{file}" in {GENERATE}(): the path from CMakeLists.txt.'
-    name = PurePosixPath(file).name
-    match = next((item for item in listed if item.lower().endswith(name.lower())), None)
-    match = match or nearest(file, listed, cutoff=0.75)
-    if match is not None:
-        return symptom.cause(line, f"lists {code(match)} instead of {code(file)}", hint)
     there = f", but {codes(listed)}" if listed else ""
-    return symptom.cause(line, f"does not list {code(file)}{there} in {GENERATE}()", hint)
+    return symptom.cause(
+        calls[0].line,
+        f"does not list {code(file)}{there} in {_GENERATE}()",
+        f'Write "{file}" in {_GENERATE}(): the path from CMakeLists.txt.',
+    )
 
 
 @explanation(NotGenerated)
 def undeclared_package(symptom: NotGenerated) -> Cause | None:
-    """A package whose messages are used is not under DEPENDENCIES, or is not found."""
-    calls = symptom.calls(GENERATE)
-    declared: set[str] = set()
-    for call in calls:
-        declared |= set(call.after("DEPENDENCIES", _GENERATE_KEYWORDS) or ())
-    unknown = any("${" in name for name in declared)
-    for name in used_packages(symptom.interface, symptom.definition):
-        if name not in declared and not unknown:
-            return symptom.cause(
-                calls[0].line,
-                f"does not name {code(name)} under DEPENDENCIES, although the definition uses "
-                "its messages",
-                f"Write `DEPENDENCIES {name}` at the end of {GENERATE}().",
-            )
+    """A package whose messages are used is not found, or is not under DEPENDENCIES."""
+    calls = symptom.calls(_GENERATE)
+    after = [call.after("DEPENDENCIES", _GENERATE_KEYWORDS) or () for call in calls]
+    declared = {name for names in after for name in names}
+    used = used_packages(symptom.interface, symptom.definition)
+    for name in (GENERATORS, *used):
         if not symptom.finds(name):
             return symptom.cause(
                 calls[0].line,
                 f"does not find {code(name)}",
-                f"Write `find_package({name} REQUIRED)` before {GENERATE}().",
+                f"Write `find_package({name} REQUIRED)` before {_GENERATE}().",
+            )
+        if name in used and name not in declared and not any("${" in one for one in declared):
+            return symptom.cause(
+                calls[0].line,
+                f"does not name {code(name)} under DEPENDENCIES, although the definition uses "
+                "its messages",
+                f"Write `DEPENDENCIES {name}` at the end of {_GENERATE}().",
             )
     return None
 
@@ -241,49 +284,23 @@ def no_member_of_group(symptom: NotGenerated) -> Cause | None:
 
 
 @explanation(NotGenerated)
-def unreadable_line(symptom: NotGenerated) -> Cause | None:
-    """A line of the definition looks right, but ROS cannot read it."""
-    for number, line in enumerate(symptom.definition.text.splitlines(), start=1):
-        written = line.partition("#")[0]
-        what = hint = ""
-        if line[:1].isspace() and written.strip():
-            what = "begins with a blank"
-            hint = "Begin every line of a definition at its first column."
-        elif _LONG_TYPE.match(written):
-            what = "names a type with `msg` in the middle"
-            hint = "In a definition a type is written package/Name, such as geometry_msgs/Pose2D."
-        if what:
-            place = SourceError(symptom.definition.file, number, what.replace("`", ""))
-            return Cause(
-                f"{symptom.definition.file}:{number} {what}, and ROS cannot read that",
-                hint,
-                Evidence(places=(place,)),
-            )
-    return None
-
-
-@explanation(NotGenerated)
 def unknown_type(symptom: NotGenerated) -> Cause | None:
-    """The definition names a type that is neither one of ROS nor of the package."""
-    package, interface, definition = symptom.package, symptom.interface, symptom.definition
-    try:
-        sections = sections_of(str(interface), definition.text)
-    except DefinitionError:
-        return None
+    """The definition names a type that does not exist, or writes a type as in Python."""
+    package, file = symptom.package, symptom.definition.file
     own = {PurePosixPath(item.file).stem for item in package.definitions}
-    for section in sections:
-        for field in section.fields:
-            of_package, _, name = field.type.replace("/msg/", "/").rpartition("/")
-            if of_package != interface.package or name in own:
-                continue
-            line = section.lines.get(field.name)
-            meant = nearest(name, PRIMITIVES)
-            return Cause(
-                f"{definition.file}:{line} names the type {code(name)}, which is neither a type of "
-                f"ROS nor a message of {code(package.name)}",
-                f"Write {code(meant)}."
-                if meant
-                else f"A message of another package has its name in front: `package/{name}`.",
-                Evidence(places=(SourceError(definition.file, line, f"{name} does not exist"),)),
-            )
+    for number, line in enumerate(symptom.definition.text.splitlines(), start=1):
+        written = re.match(r"\s*([A-Za-z][\w/]*)", line.partition("#")[0])
+        name = written[1] if written else "---"
+        if name.count("/") == 1 or name in {"---", *PRIMITIVES, *own}:
+            continue
+        meant = nearest(name, PRIMITIVES)
+        return Cause(
+            f"{file}:{number} names the type {code(name)}, which is neither a type of ROS nor a "
+            f"message of {code(package.name)}",
+            f"Write {code(meant)}."
+            if meant
+            else "A message of another package is written package/Name, such as "
+            "geometry_msgs/Pose2D.",
+            Evidence(places=(SourceError(file, number, f"{name} does not exist"),)),
+        )
     return None

@@ -8,18 +8,13 @@ from grader.checks.wording import code
 from grader.diagnosis.explanation import Symptom, explanation
 from grader.spec.nearest_name import nearest
 
-# Types that are fields of others, and so are taken for the whole.
+# Types that are taken for the whole of which they are a field.
 _PARTS = {
-    ("geometry_msgs/msg/Twist", "geometry_msgs/msg/Vector3"): "linear and angular",
-    ("geometry_msgs/msg/Accel", "geometry_msgs/msg/Vector3"): "linear and angular",
-    ("geometry_msgs/msg/Wrench", "geometry_msgs/msg/Vector3"): "force and torque",
-    ("geometry_msgs/msg/Pose", "geometry_msgs/msg/Point"): "position",
-    ("geometry_msgs/msg/Pose", "geometry_msgs/msg/Quaternion"): "orientation",
-    ("geometry_msgs/msg/Transform", "geometry_msgs/msg/Vector3"): "translation",
-    ("geometry_msgs/msg/Transform", "geometry_msgs/msg/Quaternion"): "rotation",
-    ("nav_msgs/msg/Odometry", "geometry_msgs/msg/Pose"): "pose.pose",
-    ("nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist"): "twist.twist",
-    ("nav_msgs/msg/Path", "geometry_msgs/msg/PoseStamped"): "poses",
+    ("Twist", "Vector3"): "linear and angular",
+    ("Pose", "Point"): "position",
+    ("Pose", "Quaternion"): "orientation",
+    ("Odometry", "Pose"): "pose.pose",
+    ("Odometry", "Twist"): "twist.twist",
 }
 _SUFFIXES = {
     "Stamped": "adds a header with a time and a frame",
@@ -45,41 +40,29 @@ class OtherType(Symptom[str]):
 
 
 @explanation(OtherType)
-def other_package(symptom: OtherType) -> str | None:
-    """The type has the right name, but is of another package."""
+def other_package_or_case(symptom: OtherType) -> str | None:
+    """The type has the right name, but is of another package, or its case differs."""
     wanted, other = symptom.names
-    if wanted != other:
-        return None
-    return f"the same short name, but of the package {code(symptom.found.partition('/')[0])}"
-
-
-@explanation(OtherType)
-def other_case(symptom: OtherType) -> str | None:
-    """Upper and lower case of the type's name differ."""
-    wanted, other = symptom.names
+    if wanted == other:
+        return f"the same short name, but of the package {code(symptom.found.partition('/')[0])}"
     return "upper and lower case differ" if wanted.lower() == other.lower() else None
 
 
 @explanation(OtherType)
 def other_variant(symptom: OtherType) -> str | None:
     """The type is the Stamped, WithCovariance or Array variant, or the plain one."""
-    wanted, other = symptom.names
-    for suffix, words in _SUFFIXES.items():
-        if other == wanted + suffix:
-            return f"{code(other)} {words}, {code(wanted)} is the plain message"
-        if wanted == other + suffix:
-            return f"{code(wanted)} {words}, {code(other)} is the plain message"
-    return None
+    plain, longer = sorted(symptom.names, key=len)
+    words = _SUFFIXES.get(longer.removeprefix(plain))
+    return f"{code(longer)} {words}, {code(plain)} is the plain message" if words else None
 
 
 @explanation(OtherType)
 def part_or_whole(symptom: OtherType) -> str | None:
     """The type is a part of the expected one, such as Vector3 of Twist, or the whole of it."""
     wanted, other = symptom.names
-    part = _PARTS.get((symptom.expected, symptom.found))
+    part, whole = _PARTS.get((wanted, other)), _PARTS.get((other, wanted))
     if part:
         return f"{code(other)} is only a part of {code(wanted)} (its {part})"
-    whole = _PARTS.get((symptom.found, symptom.expected))
     return f"{code(wanted)} is a part of it (its {whole})" if whole else None
 
 

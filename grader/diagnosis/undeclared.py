@@ -5,7 +5,7 @@ from __future__ import annotations
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Moment
 from grader.diagnosis.cause import Cause
-from grader.measure.declarations import changed_environment, traced
+from grader.measure import declarations
 from grader.recording.model import Recording
 
 
@@ -18,7 +18,7 @@ def why_undeclared(recording: Recording, what: str) -> Cause:
     seen = f"the process did not declare {what}"
     compiled = any(item.build_type == "ament_cmake" for item in recording.submission.packages)
     launched = any("launch" in item.name.rpartition("/")[2] for item in recording.processes)
-    if not traced(recording) and (compiled or launched):
+    if not declarations.traced(recording) and (compiled or launched):
         return Cause(f"{seen}: only programs in Python declare what they create", ours=True)
     return Cause(
         f"{seen}: it was created past rclpy, in a program that was started without the "
@@ -32,21 +32,16 @@ def why_undeclared(recording: Recording, what: str) -> Cause:
 def why_never_appeared(recording: Recording, what: str) -> Cause:
     """Why what the process declared is not in the ROS graph."""
     seen = f"the process declared {what}, but it never appeared in the ROS graph"
-    names = changed_environment(recording)
-    if names:
-        return Cause(
-            f"{seen}: the program changed {', '.join(names)}, by which a node finds others",
-            f"Leave {', '.join(names)} as the environment has it, in the code too: no "
-            "os.environ[...] and no domain_id.",
-            Evidence(moments=(Moment("launched", 0.0),)),
-        )
-    if was_held_up(recording):
+    names = declarations.changed_environment(recording)
+    if not names and was_held_up(recording):
         return Cause.to_repeat(f"{seen}, while the machine was busy")
+    changed = f": the program changed {', '.join(names)}, by which a node finds others"
     return Cause(
-        seen,
-        "A node must stay where the environment puts it: set no ROS_DOMAIN_ID, no discovery "
-        "server and no profile of the middleware, and leave the names of rclpy's methods alone.",
+        seen + (changed if names else ""),
+        "A node must stay where the environment puts it: set no ROS_DOMAIN_ID, no domain_id, no "
+        "discovery server and no profile of the middleware, in the code too, and leave the names "
+        "of rclpy's methods alone.",
         Evidence(moments=(Moment("launched", 0.0),)),
         # What was created right before the end may not have been seen yet.
-        disturbed=True,
+        disturbed=not names,
     )

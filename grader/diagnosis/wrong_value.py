@@ -14,8 +14,15 @@ from grader.checks.value import Difference, same
 from grader.checks.wording import value_text
 from grader.diagnosis.explanation import Symptom, explanation
 
-_FACTORS = {1000.0: "1000 times", 100.0: "100 times", 10.0: "10 times"}
-_FACTOR_TOLERANCE = 1e-6
+# How many times too large -> what that is. People type 57.3 and 3.14: three digits must do.
+_FACTORS = {
+    -1.0: "has the wrong sign",
+    math.degrees(1.0): "is in degrees: ROS has angles in radians (REP-103)",
+    math.radians(1.0): "was taken for degrees and converted, but is in radians already",
+    **{10.0**n: f"is {10**n} times too large: look at the units" for n in (1, 2, 3)},
+    **{0.1**n: f"is {10**n} times too small: look at the units" for n in (1, 2, 3)},
+}
+_FACTOR_TOLERANCE = 2e-3
 # As bits of a numpy.float32 this is a number next to nothing, 1e-38.
 _MOST_DIGITS = 1 << 23
 # Python 3.11 has the number of digits of a negative integer with a minus.
@@ -74,15 +81,11 @@ def not_a_number(symptom: WrongValue) -> str | None:
 
 @explanation(WrongValue)
 def fields_swapped(symptom: WrongValue) -> str | None:
-    """Two fields are swapped, or the value stands in the field beside."""
-    for one, other in combinations(symptom.numbers, 2):
-        if same(one.expected, other.observed, symptom.tolerance) and same(
-            other.expected, one.observed, symptom.tolerance
-        ):
-            if one.expected and other.expected:
-                return f"{one.field} and {other.field} are swapped"
-            full, empty = (one, other) if one.expected else (other, one)
-            return _stands_in(full, empty.field)
+    """Two fields are swapped."""
+    for one, other in combinations(symptom.wanted, 2):
+        first = same(one.expected, other.observed, symptom.tolerance)
+        if first and same(other.expected, one.observed, symptom.tolerance):
+            return f"{one.field} and {other.field} are swapped"
     return None
 
 
@@ -101,38 +104,17 @@ def in_another_field(symptom: WrongValue) -> str | None:
     """The value stands in another field."""
     for one, other in product(symptom.wanted, symptom.numbers):
         if other is not one and same(one.expected, other.observed, symptom.tolerance):
-            return _stands_in(one, other.field)
+            return f"the {value_text(one.expected)} stands in {other.field} instead of {one.field}"
     return None
 
 
 @explanation(WrongValue)
 def wrong_sign_or_unit(symptom: WrongValue) -> str | None:
     """The sign is wrong, the value is 10, 100 or 1000 times too large, or in degrees."""
-    found = (_scaled(one, symptom.tolerance) for one in symptom.wanted)
-    return next(filter(None, found), None)
-
-
-def _scaled(one: Difference, tolerance: float) -> str | None:
-    if not one.observed:
-        return None
-    ratio = one.observed / one.expected
-    if same(one.expected, -one.observed, tolerance):
-        return f"the sign of {one.field} is wrong"
-    for factor, words in _FACTORS.items():
-        if math.isclose(ratio, factor, rel_tol=_FACTOR_TOLERANCE):
-            return f"{one.field} is {words} too large: a mistake of units or of the decimal point"
-        if math.isclose(ratio, 1.0 / factor, rel_tol=_FACTOR_TOLERANCE):
-            return f"{one.field} is {words} too small: a mistake of units or of the decimal point"
-    # Three digits, for people type 57.3 and 3.14.
-    if math.isclose(ratio, math.degrees(1.0), rel_tol=2e-3):
-        return f"{one.field} is in degrees: ROS has angles in radians (REP-103)"
-    if math.isclose(ratio, math.radians(1.0), rel_tol=2e-3):
-        return f"{one.field} was taken for degrees and converted, but is in radians already"
+    for one, (factor, words) in product(symptom.wanted, _FACTORS.items()):
+        if math.isclose(one.observed, factor * one.expected, rel_tol=_FACTOR_TOLERANCE):
+            return f"{one.field} {words}"
     return None
-
-
-def _stands_in(item: Difference, field: str) -> str:
-    return f"the {value_text(item.expected)} stands in {field} instead of {item.field}"
 
 
 def was_integer(number: Any) -> bool:

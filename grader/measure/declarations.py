@@ -1,21 +1,19 @@
-"""What the student's processes said of themselves through the tracer.
+"""What the student's processes declared of themselves through the tracer.
 
-All of it is *declared by the process*. Nothing here may be used where the wire can tell,
-absence means something only in a process that the tracer was in (:func:`traced`), and every
-value is read as hostile: the student's process could have written the line itself.
+Nothing here may be used where DDS can tell. Absence means something only in a process that the
+tracer was in (:func:`traced`). Every value is read as hostile: the student's process could have
+written the line itself.
 """
 
 from __future__ import annotations
 
-import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from grader.measure.compatibility import STRENGTH
 from grader.recording.model import Declaration, Kind, Process, Qos, Recording
-
-_RELIABILITIES = ("reliable", "best_effort")
-_DURABILITIES = ("volatile", "transient_local")
 
 
 @dataclass(frozen=True)
@@ -73,20 +71,12 @@ def exiting_ns(recording: Recording, process: str) -> int | None:
     """When Python began to end in its usual way in the process, or None where it did not."""
     began = [item for item in recording.declared("started") if item.process == process]
     # A process may have been started again, and children may have ended under its name.
-    pid = began[-1].data.get("pid") if began else None
-    return next(
-        (
-            item.time_ns
-            for item in recording.declared("exiting")
-            if began and item.process == process and item.data.get("pid") == pid
-        ),
-        None,
-    )
-
-
-def broke_off(recording: Recording, process: str) -> bool:
-    """Whether the tracer was there and Python did not end in its usual way."""
-    return traced(recording, process) and exiting_ns(recording, process) is None
+    ends = [
+        item.time_ns
+        for item in recording.declared("exiting")
+        if began and item.process == process and item.data.get("pid") == began[-1].data.get("pid")
+    ]
+    return ends[0] if ends else None
 
 
 def timers(recording: Recording) -> tuple[DeclaredTimer, ...]:
@@ -111,20 +101,18 @@ def queues(recording: Recording, kind: Kind, topic: str) -> tuple[DeclaredQueue,
     Those that the program destroyed itself, as rclpy's wait_for_message() does, are left out
     where it kept others.
     """
-    found = []
-    declared = [
-        item for item in recording.declared(kind.value) if _text(item.data, "topic") == topic
-    ]
+    declared = _on(recording, kind, topic)
     kept = [item for item in declared if not _was_destroyed(recording, item)]
+    found = []
     for item in kept or declared:
         depth = _number(item.data, "depth")
-        found.append(
-            DeclaredQueue(
-                history=_text(item.data, "history") or "unknown",
-                depth=int(depth) if depth is not None else None,
-            )
-        )
+        history = _text(item.data, "history") or "unknown"
+        found.append(DeclaredQueue(history, None if depth is None else int(depth)))
     return tuple(found)
+
+
+def _on(recording: Recording, kind: Kind, topic: str) -> list[Declaration]:
+    return [item for item in recording.declared(kind.value) if _text(item.data, "topic") == topic]
 
 
 def _was_destroyed(recording: Recording, endpoint: Declaration) -> bool:
@@ -142,36 +130,30 @@ def _was_destroyed(recording: Recording, endpoint: Declaration) -> bool:
 def profiles(recording: Recording, kind: Kind, topic: str) -> tuple[tuple[str, Qos], ...]:
     """Node and QoS of the endpoints that the processes declared on a topic.
 
-    Only reliability and durability are told; any other word than DDS's counts as unknown.
+    Only reliability and durability are declared; any other word than DDS's counts as unknown.
     """
-    return tuple(
-        (
-            _text(item.data, "node") or "unknown",
-            Qos(
-                reliability=_one_of(item.data, "reliability", _RELIABILITIES),
-                durability=_one_of(item.data, "durability", _DURABILITIES),
-            ),
+    found = []
+    for item in _on(recording, kind, topic):
+        reliability, durability = _text(item.data, "reliability"), _text(item.data, "durability")
+        qos = Qos(
+            reliability=reliability if reliability in STRENGTH["reliability"] else "unknown",
+            durability=durability if durability in STRENGTH["durability"] else "unknown",
         )
-        for item in recording.declared(kind.value)
-        if _text(item.data, "topic") == topic
-    )
+        found.append((_text(item.data, "node") or "unknown", qos))
+    return tuple(found)
 
 
 def left_open(recording: Recording, kind: Kind, topic: str, node: str) -> frozenset[str]:
-    """Policies that a node left to the middleware: it asked for the best that is available.
+    """Policies for which a node asked for the best that is available.
 
-    DDS shows only what this came to with those who were there. Of several endpoints of the node
-    on the topic, a policy counts if each of them left it open.
+    DDS shows only what this came to with the endpoints that were there. Of several endpoints of the
+    node on the topic, a policy counts if each of them left it open.
     """
-    own = [
-        item.data
-        for item in recording.declared(kind.value)
-        if _text(item.data, "topic") == topic and _text(item.data, "node") == node
-    ]
+    own = [item for item in _on(recording, kind, topic) if _text(item.data, "node") == node]
     return frozenset(
         policy
         for policy in ("reliability", "durability")
-        if own and all(_text(data, policy) == "best_available" for data in own)
+        if own and all(_text(item.data, policy) == "best_available" for item in own)
     )
 
 
@@ -181,16 +163,19 @@ def declares(recording: Recording, kind: str, key: str, value: str) -> bool:
 
 
 def not_in_callback(recording: Recording, topic: str) -> bool:
-    """Whether no executor had called what published the newest message that was told of.
+    """Whether no executor had called what published the newest message that was declared.
 
     A last message that stops a robot may well be published by main() after Ctrl+C.
     """
-    told = [
-        item.data for item in recording.declared("published") if item.time_ns <= recording.stop_ns
+    published = [
+        item.data.get("in_callback")
+        for item in recording.declared("published")
+        if item.time_ns <= recording.stop_ns and _text(item.data, "topic") == topic
     ]
-    newest = [data.get("in_callback") for data in told if _text(data, "topic") == topic][-1:]
     # What an EventsExecutor calls, it calls from C++.
-    return newest == [False] and not declares(recording, "spin", "executor", "EventsExecutor")
+    return published[-1:] == [False] and not declares(
+        recording, "spin", "executor", "EventsExecutor"
+    )
 
 
 def changed_environment(recording: Recording) -> list[str]:
@@ -201,15 +186,8 @@ def changed_environment(recording: Recording) -> list[str]:
 
 def made_twice(recording: Recording) -> str:
     """Fully qualified name of a node that one operating-system process made twice, or nothing."""
-    seen: set[tuple[str, str]] = set()
-    for item in recording.declared("node"):
-        name = _text(item.data, "node")
-        if name is None:
-            continue
-        if (item.process, name) in seen:
-            return name
-        seen.add((item.process, name))
-    return ""
+    made = Counter((item.process, _text(item.data, "node")) for item in recording.declared("node"))
+    return next((name for (_, name), number in made.items() if name and number > 1), "")
 
 
 def process_of(recording: Recording, node: str) -> Process | None:
@@ -224,19 +202,12 @@ def process_of(recording: Recording, node: str) -> Process | None:
 
 def _number(data: Mapping[str, Any], key: str) -> float | None:
     value = data.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    # A process may declare anything: an integer that is too long for a float is no number.
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 2**63:
         return None
-    # An integer of the process's may be too long for a float.
-    if isinstance(value, int) and abs(value) > 2**63:
-        return None
-    return float(value) if math.isfinite(value) else None
+    return float(value)
 
 
 def _text(data: Mapping[str, Any], key: str) -> str | None:
     value = data.get(key)
     return value if isinstance(value, str) else None
-
-
-def _one_of(data: Mapping[str, Any], key: str, words: tuple[str, ...]) -> str:
-    value = _text(data, key)
-    return value if value in words else "unknown"

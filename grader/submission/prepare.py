@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import threading
@@ -13,27 +12,26 @@ from typing import TYPE_CHECKING
 
 from grader.errors import SubmissionError
 from grader.ros import RosInstallation
-from grader.submission.build.build import build, once_more
+from grader.submission.build.build import Builder, once_more
 from grader.submission.build.build_cache import BuildCache, CacheLimits
 from grader.submission.build.build_error_location import Sources
-from grader.submission.build.build_limits import BuildLimits
+from grader.submission.build.colcon import BuildLimits
 from grader.submission.build.installed import inspect
 from grader.submission.build.standalone_build import standalone
 from grader.submission.build.underlay import completed
 from grader.submission.intake.archive import SUFFIXES
 from grader.submission.intake.locate import Located, check_path, opened, submission_id
 from grader.submission.intake.members import MIB, ArchiveLimits
-from grader.submission.intake.paths import join, shown
-from grader.submission.read import source
-from grader.submission.read.manifest import MANIFEST
+from grader.submission.intake.paths import shown
 from grader.submission.read.package import Package, read_package, record_packages
+from grader.submission.read.source import Allowance
 from grader.submission.record import SubmissionRecord
+from grader.tree import listing
 
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
 
 _MAX_PACKAGES = 200
-_LEFTOVERS = ("build", "install", "log")
 _ARCHIVES = (*SUFFIXES, ".rar", ".7z")
 
 
@@ -42,8 +40,8 @@ class Prepared:
     """A submission that is ready to run, or the record of why it is not.
 
     Attributes:
-        install: Its install space (merged layout), read-only for everybody; also there when
-            only some packages were built. None where nothing was.
+        install: Its install space (merged layout), read-only; also there when only some packages
+            were built. None where nothing was.
     """
 
     record: SubmissionRecord
@@ -77,8 +75,8 @@ def prepare(
 ) -> Prepared:
     """Find the packages of a submission, read them, build them.
 
-    Nothing that a student can do wrong raises: it is told in the record's ``problem``, in a
-    package's ``manifest_error``, or in ``build``.
+    Nothing that a student can do wrong raises: it is in the record's ``problem``, in a package's
+    ``manifest_error``, or in ``build``.
 
     Args:
         sandbox: What it is built in, or None.
@@ -92,13 +90,19 @@ def prepare(
     limits = limits or PrepareLimits()
     source = check_path(path)
     on_progress("reading the submission")
-    builds = BuildCache(cache, limits.cache)
+    builder = Builder(
+        ros=ros,
+        cache=BuildCache(cache, limits.cache),
+        limits=limits.build,
+        sandbox=sandbox,
+        stop=stop,
+        on_progress=on_progress,
+        on_output=on_output,
+    )
 
     def attempt(is_second: bool) -> Prepared:
         with opened(source, limits.archive) as located:
-            return _prepare(
-                located, ros, builds, limits, on_progress, sandbox, stop, on_output, is_second
-            )
+            return _prepare(located, replace(builder, is_second=is_second))
 
     try:
         return once_more(attempt)
@@ -133,15 +137,8 @@ def _hash(source: Path) -> str:
     if source.is_dir():
         # Else one that has no files, or cannot be read, would be the same as an empty one.
         total.update(b"refused\0")
-        ahead = [source]
-        while ahead:
-            # One that is gone by now is not there any more for whoever reads it next.
-            with contextlib.suppress(OSError):
-                for entry in sorted(os.scandir(ahead.pop()), key=lambda entry: entry.name):
-                    total.update(os.fsencode(os.path.relpath(entry.path, source)))
-                    total.update(b"\0%d\0" % entry.stat(follow_symlinks=False).st_size)
-                    if entry.is_dir(follow_symlinks=False):
-                        ahead.append(Path(entry.path))
+        for line in sorted(listing(source)):
+            total.update(os.fsencode(line.rpartition("\0")[0]) + b"\0")
     else:
         with source.open("rb") as file:
             while block := file.read(MIB):
@@ -149,18 +146,8 @@ def _hash(source: Path) -> str:
     return total.hexdigest()
 
 
-def _prepare(
-    located: Located,
-    ros: RosInstallation,
-    cache: BuildCache,
-    limits: PrepareLimits,
-    on_progress: Callable[[str], None],
-    sandbox: Sandbox | None,
-    stop: threading.Event | None,
-    on_output: Callable[[str], None],
-    is_second: bool,
-) -> Prepared:
-    allowance = source.Allowance()
+def _prepare(located: Located, builder: Builder) -> Prepared:
+    ros, allowance = builder.ros, Allowance()
     packages = [
         read_package(located, folder, ros, allowance) for folder in located.packages[:_MAX_PACKAGES]
     ]
@@ -168,36 +155,24 @@ def _prepare(
     if problem is not None:
         records = record_packages(packages, ros, None)
         return Prepared(SubmissionRecord(located.id, located.sha256, problem, records), None)
-    named = {name for package in packages for name in package.named}
-    ros = completed(ros, named - {package.name for package in packages}, cache, on_progress)
+    used = {name for package in packages for name in package.named}
+    used -= {package.name for package in packages}
+    ros = completed(ros, used, builder.cache, builder.on_progress)
     sources = Sources(
         files={file.path for file in located.files},
         folders={package.name: package.folder for package in packages},
         texts={path: lines for package in packages for path, lines in package.texts.items()},
         malformed={package.name: package.setup.malformed for package in packages},
-        manifest_errors={
-            join(package.folder, MANIFEST): package.manifest.error
-            for package in packages
-            if package.manifest.error is not None
-        },
     )
-    built = build(
+    built = replace(builder, ros=ros).build(
         located,
         sources,
-        ros,
         only_python=all(package.build_type == "ament_python" for package in packages),
-        cache=cache,
         standalone=standalone(packages, located.files),
-        limits=limits.build,
-        on_progress=on_progress,
-        sandbox=sandbox,
-        stop=stop,
-        on_output=on_output,
-        is_second=is_second,
     )
     if built.build.cached:
         for line in built.build.log.splitlines():
-            on_output(line)
+            builder.on_output(line)
     installed = None
     if built.install is not None:
         hashes = {path: digest for p in packages for path, digest in p.hashes.items()}
@@ -208,7 +183,7 @@ def _prepare(
 
 
 def find_problem(located: Located, packages: Sequence[Package]) -> str | None:
-    """Say why a submission cannot be built at all, in words for its author; None if it can."""
+    """Why a submission cannot be built at all, in words for its author; None if it can."""
     if not located.files:
         return "the submission is empty"
     if not packages:
@@ -227,31 +202,14 @@ def find_problem(located: Located, packages: Sequence[Package]) -> str | None:
 
 
 def _no_package(located: Located) -> str:
-    names = [file.path.rpartition("/")[2] for file in located.files]
-    if MANIFEST in names:
-        return (
-            "every package.xml is in a hidden folder or below a COLCON_IGNORE, AMENT_IGNORE or "
-            "CATKIN_IGNORE"
-        )
-    problem = "there is no package.xml anywhere, so there is no ROS package"
-    alike = [file.path for file in located.files if _is_nearly_manifest(file.path)]
-    archives = [file.path for file in located.files if file.path.lower().endswith(_ARCHIVES)]
-    leftovers = [path for path in located.skipped if path.rpartition("/")[2] in _LEFTOVERS]
-    if alike:
-        return f"{problem}; {shown(alike[0])} must be called package.xml"
+    paths = [file.path for file in located.files]
+    archives = [path for path in paths if path.lower().endswith(_ARCHIVES)]
+    problem = (
+        "no package.xml was found, so there is no ROS package (hidden folders, build, install, log "
+        "and folders with a COLCON_IGNORE do not count)"
+    )
     if archives:
-        readable = archives[0].lower().endswith(SUFFIXES)
-        how = "and not the archive itself" if readable else "as a .zip"
-        return f"{problem}; hand in what is in {shown(archives[0])}, {how}"
-    if any(file.path == ".gitmodules" for file in located.files):
-        return f"{problem}; git submodules come empty: commit the package itself"
-    if leftovers:
-        return f"{problem} (nobody looks into {shown(leftovers[0])}/: hand in src/)"
-    if all(name.endswith(".py") for name in names):
+        return f"{problem}; unpack {shown(archives[0])}, and hand in what is in it"
+    if all(path.endswith(".py") for path in paths):
         return f"{problem}; hand in the whole package, not only its Python files"
     return problem
-
-
-def _is_nearly_manifest(path: str) -> bool:
-    name = path.rpartition("/")[2].lower()
-    return name in ("package.xml", "package.xml.txt", "packages.xml", "package.xlm", "package")

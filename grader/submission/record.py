@@ -7,7 +7,11 @@ files nor ROS. All paths are relative to the submission, with forward slashes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
+from pydantic import TypeAdapter, ValidationError
+
+from grader.errors import UsageError
 from grader.submission.read.code_facts import Lint, SourceFile
 
 
@@ -25,11 +29,8 @@ class SourceError:
 
     def __str__(self) -> str:
         """Write ``file:line: message``."""
-        return (
-            f"{self.file}:{self.line}: {self.message}"
-            if self.line
-            else f"{self.file}: {self.message}"
-        )
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        return f"{place}: {self.message}"
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Dependency:
     Attributes:
         kind: The tag: ``depend``, ``exec_depend``, ``build_depend``, ``test_depend``, ... An
             ``export/depend`` stands inside <export>, where it does not count.
-        known: True for a ROS package or rosdep key that exists, False for a slip of one or a
+        known: True for a ROS package or rosdep key that exists, False for a mistyped one or a
             name that is known not to exist, None where this machine cannot tell.
     """
 
@@ -139,8 +140,7 @@ class BuildRecord:
     Attributes:
         succeeded: colcon's exit status was 0 and it built every package.
         duration_s: Wall time of the build when it ran, also when taken from the cache now.
-        failed_packages: Packages that colcon did not finish: that failed, or were never begun
-            since one that they need failed or colcon did not take them for packages.
+        failed_packages: Packages that failed, or that colcon never began.
         lacking: Packages of ROS 2 Jazzy that CMake did not find, because they are not installed
             where this was built.
         culprit: The student's file and line that the log blames first, or None.
@@ -185,3 +185,18 @@ class SubmissionRecord:
     def package(self, name: str) -> PackageRecord | None:
         """The package of that name, or None."""
         return next((package for package in self.packages if package.name == name), None)
+
+
+_RECORD = TypeAdapter(SubmissionRecord)
+
+
+def read_record(file: Path) -> SubmissionRecord:
+    """Read a record from a JSON file.
+
+    Raises:
+        UsageError: It cannot be read, or holds no record.
+    """
+    try:
+        return _RECORD.validate_json(file.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise UsageError(f"{file}: is no record of a submission: {error}") from error

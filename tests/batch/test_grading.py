@@ -31,7 +31,7 @@ from grader.recording.mcap_writer import write_recording
 from grader.recording.model import Ending, Endpoint, Kind, Node, Owner, Qos, Recording
 from grader.report.model.facts import Clock
 from grader.run.runner import Runner
-from grader.submission.build.build_limits import BuildLimits
+from grader.submission.build.colcon import BuildLimits
 from grader.submission.prepare import Prepared, PrepareLimits
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 

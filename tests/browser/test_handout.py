@@ -11,7 +11,6 @@ from playwright.sync_api import Browser, expect
 from grader.assignment.load import load_assignment
 from grader.cli.screen.page import ReportPage
 from grader.report.html.handout import make_handout, render_handout
-from grader.report.html.report import render_report
 from tests.report.sample import full_points, lost_points
 
 pytestmark = pytest.mark.slow
@@ -35,8 +34,7 @@ def test_the_page_of_a_watched_submission_follows_by_itself(
     chromium: Browser, tmp_path: Path
 ) -> None:
     def write(sample):
-        html = render_report(sample.grade, sample.recordings, sample.facts)
-        (tmp_path / "report.html").write_text(html, encoding="utf-8")
+        (tmp_path / "report.html").write_text(sample.html(), encoding="utf-8")
 
     write(lost_points())
     served = ReportPage(tmp_path / "report.html")

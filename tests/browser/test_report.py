@@ -9,7 +9,6 @@ from dataclasses import replace
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
-from grader.report.html.report import render_report
 from tests.report.gallery import gallery, reference
 from tests.report.sample import everywhere, lost_points, not_built, not_graded
 
@@ -30,8 +29,7 @@ pytestmark = pytest.mark.slow
 
 
 def html_of(make):
-    sample = make()
-    return render_report(sample.grade, sample.recordings, sample.facts, reference())
+    return make().html(reference())
 
 
 def violations(page):
@@ -101,8 +99,7 @@ class TestReplay:
             for spec in assignment.checks
         )
         grade = replace(sample.grade, assignment=assignment.model_copy(update={"checks": checks}))
-        html = render_report(grade, sample.recordings, sample.facts, reference())
-        found = look(html)
+        found = look(replace(sample, grade=grade).html(reference()))
         sides = found.page.locator(".replay .side")
         for number in range(2):
             side = sides.nth(number)
@@ -243,7 +240,7 @@ def test_a_hostile_log_line_in_a_replay_is_text(look):
     attack = "</script><img src=x onerror=window.hacked=1>"
     log = tuple(replace(entry, text=attack) for entry in run.log)
     recordings = {**sample.recordings, "drive": replace(run, log=log)}
-    html = render_report(sample.grade, recordings, sample.facts)
+    html = replace(sample, recordings=recordings).html()
     found = look(html)
     found.page.locator(".replay input").focus()
     found.page.keyboard.press("End")

@@ -43,11 +43,11 @@ class TestExists:
 
     def test_a_near_miss(self):
         run = acting(services=(action("/fibonaci"),))
-        assert "found the action `/fibonaci` instead of" in failing("action.exists", run, **FIB)
+        assert "offers the action `/fibonaci` instead of" in failing("action.exists", run, **FIB)
 
     def test_a_service_in_its_place(self):
         run = acting(services=(service("/fibonacci"),))
-        assert "is there, but as a service" in failing("action.exists", run, **FIB)
+        assert "but has no action of that name" in failing("action.exists", run, **FIB)
 
 
 class TestResult:
@@ -100,7 +100,7 @@ class TestResult:
 
     def test_no_server_is_told_by_what_there_is(self):
         run = acting(goal(accepted=None, error="no server"), services=())
-        assert "offers no action" in failing("action.result", run, **RESULT)
+        assert "has no action of its own" in failing("action.result", run, **RESULT)
 
 
 class TestFeedback:

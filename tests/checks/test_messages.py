@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.finding import Status
-from grader.recording.model import Ending, Kind, Owner
+from grader.recording.model import Ending
 from tests.checks.builder import (
-    NODE,
     RELIABLE,
     SOURCE,
     STOP_S,
@@ -139,7 +138,7 @@ class TestCount:
     def test_a_stimulus_that_nothing_was_sent_of(self):
         run = recording(sent={"/chatter": ()})
         found = failing("messages.count", run, topic="/cmd_vel", stimulus="/chatter", at_most=1)
-        assert "subscribes to nothing" in found
+        assert "has no subscription of its own" in found
 
     def test_too_few_because_it_died(self):
         run = recording(
@@ -243,23 +242,6 @@ class TestSilence:
         assert "there but silent, although the process declared a timer of 300 ms" in found
         assert "except: pass" in found
 
-    def test_a_lambda_that_calls_nothing(self):
-        timer = declared("timer", 0.4, node=NODE, period_s=0.3, callback="Bot.__init__.<lambda>")
-        found = self.found(declarations=(*declarations(timer_s=None), timer))
-        assert "there but silent, although the process declared a timer of 300 ms" in found
-        assert "A lambda has to call the method, with brackets" in found
-
-    def test_simulated_time_that_is_not_published(self):
-        clock = endpoint("/clock", kind=Kind.SUBSCRIPTION, type="rosgraph_msgs/msg/Clock")
-        found = self.found(endpoints=(endpoint(), reader(), clock))
-        assert "takes its time from `/clock` (`use_sim_time` is true)" in found
-        assert "its timer of 300 ms never fires" in found
-
-    def test_simulated_time_that_the_robot_publishes(self):
-        clock = endpoint("/clock", kind=Kind.SUBSCRIPTION, type="rosgraph_msgs/msg/Clock")
-        told = endpoint("/clock", type="rosgraph_msgs/msg/Clock", owner=Owner.PROBE)
-        assert "use_sim_time" not in self.found(endpoints=(endpoint(), reader(), clock, told))
-
     def test_what_it_printed_is_shown_but_not_how_it_ended(self):
         complained = output("no front beam", time_s=STOP_S - 1.0)
         ended = output(traceback("rcl_shutdown already called"), time_s=STOP_S + 0.1)
@@ -350,7 +332,7 @@ class TestEqual:
             (twist((0.5, 0, 0), (0, 0, 1.0)), "linear.x and angular.z are swapped"),
             (twist((1, 0, 0), (0.5, 0, 0)), "the 0.5 stands in angular.x instead of angular.z"),
             (twist((0, 0, 1), (0, 0, 0.5)), "the 1.0 stands in linear.z instead of linear.x"),
-            (twist((-1, 0, 0)), "the sign of linear.x is wrong"),
+            (twist((-1, 0, 0)), "linear.x has the wrong sign"),
             (twist((1000, 0, 0)), "linear.x is 1000 times too large"),
             (twist((0.01, 0, 0)), "linear.x is 100 times too small"),
             (twist(angular=(0, 0, 28.6478897565)), "angular.z is in degrees"),

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from assignments.p_controller.checks.control_law import examine
 from grader.assignment.load import load_assignment
 from grader.checks.finding import Status
 from grader.diagnosis.motion.misread_yaw import misread_yaw
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.control_law import Sample, examine
 from grader.measure.motion.quantities import degrees
+from grader.measure.motion.steering import Sample
 from sim.motion import Pose
 from tests.checks.builder import (
     INSTALLED,
@@ -391,19 +392,13 @@ class TestMistakes:
 
         run = drive(on_odometry(by_dx), seconds=20)
         said = failing("motion.path_length", run, goal=yaml(BEHIND), most="180 %")
-        assert "it drives backwards" in said and "math.hypot(dx, dy)" in said
+        assert "at -0.22 m/s" in said and "math.hypot(dx, dy), which is never negative" in said
 
-    @pytest.mark.parametrize("start", [(0.0, 0.0, 0.0), (0.3, -0.4, 0.5)])
-    @pytest.mark.parametrize("origin", ["its start", "the origin"])
-    def test_a_direction_that_is_never_computed_anew(self, start, origin):
-        x, y = start[:2] if origin == "its start" else (0.0, 0.0)
-        direction = math.atan2(GOAL[1] - y, GOAL[0] - x)
-
-        def fixed(pose):
-            return 0.22, clamp(1.5 * wrap(direction - pose.yaw_rad), 2.84)
-
-        pose = [start[0], start[1], f"{start[2]} rad"]
-        run = drive(on_odometry(fixed), seconds=30, options={"robot": {"pose": pose}})
+    def test_a_direction_that_is_never_computed_anew(self):
+        direction = math.atan2(GOAL[1], GOAL[0])
+        run = drive(
+            on_odometry(lambda pose: (0.22, 1.5 * wrap(direction - pose.yaw_rad))), seconds=30
+        )
         said = failing("motion.path_length", run, goal=yaml(GOAL), position="2 cm", most="40 %")
         assert "farther than at its start" in said
         assert "changes with the position" in said and "wrap" not in said
@@ -423,53 +418,20 @@ class TestMistakes:
         assert f"a callback was at {SOURCE}:14 when it was interrupted" in said
         assert "compute one command for each" in said
 
-    def test_a_command_that_is_computed_once(self):
-        run = drive(lambda _: (0.2, 0.8), seconds=20)
-        said = failing("motion.path_length", run, goal=yaml(GOAL), position="2 cm", most="40 %")
-        assert "Print yaw, the error and the command while it turns" in said
-
-    def test_half_a_turn_taken_for_no_error(self):
-        def by_half_turns(error):
-            return (error + math.pi / 2) % math.pi - math.pi / 2
-
-        run = run_to(BEHIND, seconds=20, wrap=by_half_turns)
-        said = failing("motion.path_length", run, goal=yaml(BEHIND), most="180 %")
-        assert "farther than at its start" in said and "not atan(dy / dx)" in said
-
-    def test_the_heading_of_the_goal_taken_for_the_direction(self):
-        run = drive(on_odometry(lambda pose: (0.2, wrap(GOAL[2] - pose.yaw_rad))), seconds=20)
-        said = failing("motion.path_length", run, goal=yaml(GOAL), most="40 %")
-        assert "it has turned to the heading that it is to have at the goal" in said
-        assert "math.atan2(dy, dx) - yaw" in said
-
     def test_turns_a_little_too_little(self):
         run = run_to(GOAL, straight=0.08)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.03 rad")
         assert "within the tolerance" in said and "print yaw" in said
 
-    @pytest.mark.parametrize(("gain", "period_s"), [(4.0, None), (4.0, 0.05), (3.0, 0.1)])
-    def test_turns_too_fast_to_stop_where_it_sees_the_goal_s_heading(self, gain, period_s):
-        run = run_to(GOAL, angular=gain, period_s=period_s, once=True)
-        said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.1 rad")
-        assert "when it was there, and beyond it before it stood" in said
-        assert "Make the angular gain smaller, or turn back" in said
-        assert "angle_tolerance" not in said
-
-    def test_turns_to_a_heading_that_is_a_little_beyond(self):
-        run = drive(on_odometry(Student((*GOAL[:2], GOAL[2] + 0.08), straight=0.02)), seconds=40)
-        said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.1 m", heading="0.02 rad")
-        assert "within the tolerance" in said and "print yaw" in said
-
     def test_ends_a_little_before_the_goal(self):
         run = run_to(GOAL)
         said = failing("motion.reaches", run, goal=yaml(GOAL), position="0.03 m", heading="0.1 rad")
-        assert "cm from the goal: it ended a little before it" in said
-        assert "Compare the distance, math.hypot(dx, dy) in metres, with the tolerance" in said
+        assert "cm from the goal" in said and "smaller than the tolerance" in said
 
     @pytest.mark.parametrize(
         ("goal", "words"),
         [
-            ((GOAL[1], GOAL[0], GOAL[2]), "x and y are swapped"),
+            ((GOAL[1], GOAL[0], GOAL[2]), "x and y swapped"),
             ((GOAL[0], -GOAL[1], GOAL[2]), "the sign of y changed"),
             ((GOAL[0], GOAL[1], math.radians(GOAL[2])), "taken for degrees"),
             ((GOAL[0], GOAL[1], 0.0), "as if the goal's heading were 0"),
@@ -500,7 +462,8 @@ class TestMistakes:
         run = run_to(GOAL, align_law=lambda _: 0.5, straight=0.0, seconds=30)
         said = failing("motion.reaches", run, goal=yaml(GOAL), **REACHES)
         assert "still turns at 0.5 rad/s" in said or "not at rest" in said
-        assert "still moves after 29.99 s" in failing("motion.settles", run, within="20 s")
+        said = failing("motion.settles", run, within="20 s")
+        assert "after 29.99 s not at rest when the observation ends" in said
 
     def test_straight_past_the_goal_is_no_second_phase(self):
         """It drives 5 cm past the goal at (0.6, 0) and aligns there."""
@@ -514,11 +477,6 @@ class TestMistakes:
         goal = (0.6, 0.0, 1.5)
         found = lost(drive(on_odometry(law), seconds=20), goal)
         assert list(found) == ["motion.overshoot"]
-
-    def test_far_past_the_goal(self):
-        run = run_to(GOAL, constant=0.22, near=0.0, seconds=15)
-        found = lost(run, GOAL)
-        assert "motion.reaches" in found
 
     def test_a_detour(self):
         run = run_to((-0.8, 0.1, 0.0), angular=0.5, linear=0.3, seconds=60)
@@ -637,9 +595,6 @@ def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_th
         (lambda yaw: math.sin(yaw / 2), "as if yaw were z of the quaternion", "half the angle"),
         (lambda yaw: -yaw, "with its sign changed", "Counter-clockwise"),
         (abs, "as if yaw were never negative", "acos loses the sign"),
-        (lambda yaw: yaw + 0.35, "as if yaw were about 20° more than it is", "needs an offset"),
-        (lambda yaw: yaw + math.pi, "as if yaw were about 180° more", "not atan(dy / dx)"),
-        (lambda yaw: yaw - 1.57, "as if yaw were about 90° less than it is", "needs an offset"),
     ],
 )
 @pytest.mark.parametrize("style", [{}, {"wrap": lambda error: error}, {"spin": 1.0}])
@@ -660,15 +615,15 @@ def test_an_offset_at_the_goal_is_not_said_to_be_another_mistake():
         assert "nothing is added to it" in finding.hint
 
 
-def test_a_yaw_that_knows_half_of_the_circle_is_named():
-    goal = (-0.6, 0.15, 0.0)
-    run = run_to(goal, yaw=lambda yaw: math.asin(math.sin(yaw)))
-    finding = judge("motion.reaches", run, goal=yaml(goal), **REACHES)
-    assert "as if yaw were never beyond -90° and 90°" in finding.observed
-
-
 def test_a_robot_that_turns_on_and_on_is_told_to_look_at_its_yaw():
     """Its commands follow nothing, and say nothing of what it took for its yaw."""
     run = run_to((0.6, 0.4, 1.0), law=lambda error: 0.5 + 0.1 * math.sin(20.0 * error))
     finding = judge("motion.reaches", run, goal=yaml((0.6, 0.4, 1.0)), **REACHES)
     assert "Print yaw, the error and the command while it turns" in finding.hint
+
+
+def test_a_yaw_that_knows_half_of_the_circle_is_named():
+    goal = (-0.6, 0.15, 0.0)
+    run = run_to(goal, yaw=lambda yaw: math.asin(math.sin(yaw)))
+    finding = judge("motion.reaches", run, goal=yaml(goal), **REACHES)
+    assert "as if yaw were never beyond -90° and 90°" in finding.observed

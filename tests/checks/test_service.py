@@ -34,7 +34,7 @@ class TestExists:
     @pytest.mark.parametrize(
         ("there", "words"),
         [
-            ("/enabel", "found the service `/enabel` instead of `/enable`"),
+            ("/enabel", "offers the service `/enabel` instead of `/enable`"),
             ("/Enable", "upper and lower case differ"),
             ("/bot_publisher/enable", "a private name, below the node's own name"),
             ("/robot/enable", "`/robot` stands in front of the name"),
@@ -51,12 +51,14 @@ class TestExists:
 
     def test_an_action_in_its_place(self):
         run = serving(services=(action("/enable"),))
-        assert "`/enable` is there, but as an action" in failing("service.exists", run, **ENABLE)
+        assert "offers the action `/enable`, but has no service" in failing(
+            "service.exists", run, **ENABLE
+        )
 
     def test_parameter_services_are_not_offered_as_what_there_is(self):
         run = serving(services=(service("/bot_publisher/get_parameters"),))
         found = failing("service.exists", run, **ENABLE)
-        assert "`/bot_publisher` offers no service" in found
+        assert "`/bot_publisher` has no service of its own" in found
         assert "self.create_service(Type, 'enable', self.callback)" in found
 
     def test_a_program_that_died_first_is_the_cause(self):

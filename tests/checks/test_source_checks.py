@@ -199,7 +199,6 @@ class TestNoPrint:
             "\nprint(1)",
             "\nprint(1, file=sys.stderr)",
             "\nlist(map(print, [1]))",
-            "import builtins\nbuiltins.print(1)",
             "\nshow = print",
             "from rich import print\nprint(1)",
         ],

@@ -87,7 +87,7 @@ class TestPublished:
     def test_a_message_of_the_simulator_proves_nothing(self):
         simulator = endpoint(node="/simulator", owner=Owner.PROBE)
         run = recording(endpoints=(simulator, reader()), declarations=())
-        assert "publishes nothing" in failing("topic.published", run, topic="/cmd_vel")
+        assert "has no publisher of its own" in failing("topic.published", run, topic="/cmd_vel")
 
     def test_relative_names_are_refused_in_the_assignment(self):
         with pytest.raises(ValueError, match="'cmd_vel' is relative"):
@@ -117,7 +117,7 @@ class TestPublished:
     def test_the_nodes_name_in_front_by_hand(self):
         run = with_endpoints(endpoint("/bot_publisher/cmd_vel", node="/ns/bot_publisher"))
         found = failing("topic.published", run, topic="/cmd_vel")
-        assert "the node's name stands in front" in found
+        assert "`/bot_publisher` stands in front of the name" in found
 
     def test_an_absolute_name_where_the_namespace_was_expected(self):
         run = with_endpoints(endpoint("/cmd_vel", node="/robot/bot_publisher"))
@@ -128,17 +128,17 @@ class TestPublished:
     def test_a_subscription_where_a_publisher_was_expected(self):
         run = with_endpoints(endpoint(kind=Kind.SUBSCRIPTION))
         found = failing("topic.published", run, topic="/cmd_vel")
-        assert "found a subscription there, no publisher" in found
-        assert "self.create_publisher(...)" in found
+        assert "subscribes to `/cmd_vel`, but has no publisher of that name" in found
+        assert "self.create_publisher(Twist, 'cmd_vel', 10)" in found
 
     def test_a_node_that_publishes_nothing(self):
         found = failing("topic.published", with_endpoints(), topic="/cmd_vel")
-        assert "the node `/bot_publisher` publishes nothing" in found
+        assert "the node `/bot_publisher` has no publisher of its own" in found
 
     def test_the_right_type_on_another_topic(self):
         run = with_endpoints(endpoint("/turtle1/drive"))
         found = failing("topic.published", run, topic="/cmd_vel")
-        assert "the right type of message, but on another topic" in found
+        assert "the type is right, but the name is another one" in found
         assert "`/turtle1/drive`" in found
 
     def test_something_else_altogether(self):
@@ -193,12 +193,12 @@ class TestSubscribed:
     def test_the_probes_own_subscription_does_not_count(self):
         run = with_endpoints()
         found = failing("topic.subscribed", run, topic="/cmd_vel")
-        assert "subscribes to nothing" in found
+        assert "has no subscription of its own" in found
 
     def test_a_publisher_instead(self):
         run = with_endpoints(endpoint("/scan"))
         found = failing("topic.subscribed", run, topic="/scan")
-        assert "found a publisher there, no subscription" in found
+        assert "publishes on `/scan`, but has no subscription of that name" in found
 
     def test_near_miss(self):
         run = with_endpoints(endpoint("/scann", kind=Kind.SUBSCRIPTION))
@@ -207,7 +207,9 @@ class TestSubscribed:
 
     def test_messages_of_others_on_the_topic_prove_no_subscription(self):
         run = recording(endpoints=(reader(),))
-        assert "subscribes to nothing" in failing("topic.subscribed", run, topic="/cmd_vel")
+        assert "has no subscription of its own" in failing(
+            "topic.subscribed", run, topic="/cmd_vel"
+        )
 
 
 class TestType:

@@ -18,7 +18,6 @@ from tests.checks.builder import (
     package,
     recording,
     submission,
-    traceback,
 )
 
 PLAIN = """\
@@ -81,18 +80,6 @@ def test_raise_from_leads_to_the_first_cause():
     second = PLAIN.replace("ZeroDivisionError: division by zero", "RuntimeError: wrapped")
     log = output(PLAIN + link + second.partition("\n")[2])
     assert fatal_failure(recording(log=log), BOT).type == "ZeroDivisionError"
-
-
-def test_what_was_raised_without_a_traceback_stands_for_what_came_of_it():
-    """As C code raises it: rclpy's publish() only says that there was an exception."""
-    lines = (
-        "TypeError: 'float' object cannot be interpreted as an integer\n\n"
-        "The above exception was the direct cause of the following exception:\n\n"
-        + traceback("SystemError: <built-in method publish> returned a result with an exception")
-    ).splitlines()
-    (failure,) = parse_failures(lines)
-    assert str(failure) == "TypeError: 'float' object cannot be interpreted as an integer"
-    assert failure.frames and not failure.linked
 
 
 def test_the_last_of_two_unrelated_tracebacks_is_fatal():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from grader.diagnosis.process.missing_library import lacking_package, library_hint
@@ -54,7 +56,7 @@ def test_without_a_sandbox_everything_that_is_installed_is_there() -> None:
 
 @pytest.mark.parametrize("name", ["tf_transformations", "rosidl_runtime_py", "rcl_interfaces"])
 def test_a_package_of_ros_that_is_not_installed_here_is_not_the_student_s_fault(name: str) -> None:
-    assert lacking_package(f"No module named '{name}'", run().submission) == name
+    assert lacking_package(f"No module named '{name}'", run()) == name
 
 
 @pytest.mark.parametrize(
@@ -69,10 +71,11 @@ def test_a_package_of_ros_that_is_not_installed_here_is_not_the_student_s_fault(
     ],
 )
 def test_a_wrong_name_of_a_package_or_module_is_the_student_s(message: str) -> None:
-    assert lacking_package(message, run().submission) is None
+    assert lacking_package(message, run()) is None
 
 
 def test_a_package_that_is_there_lacks_only_where_a_program_hides_it_from_itself() -> None:
     message = "No module named 'nav2_msgs'"
-    assert lacking_package(message, run().submission) == "nav2_msgs"
-    assert lacking_package(message, run().submission, ["nav2_msgs"]) is None
+    assert lacking_package(message, run()) == "nav2_msgs"
+    installed = replace(run(), environment={"ros_imports": "rclpy nav2_msgs"})
+    assert lacking_package(message, installed) is None

@@ -78,11 +78,11 @@ class TestNeverReached:
         assert words in found
 
     def test_no_subscription(self):
-        assert NEVER + "the node `/bot_publisher` subscribes to nothing" in why(asked())
+        assert NEVER + "the node `/bot_publisher` has no subscription" in why(asked())
 
     def test_another_type(self):
         found = why(asked(listener(type="std_msgs/msg/Int64")))
-        assert "`/chatter` carries `std_msgs/msg/String`, but the subscription is to" in found
+        assert "the subscription on `/chatter` has the type `std_msgs/msg/Int64`, not" in found
 
     def test_qos_that_does_not_match(self):
         found = why(asked(listener(qos=LATCHED)))
@@ -101,12 +101,6 @@ class TestNotAnswered:
         assert "although 5 messages on `/chatter` reached the node" in found
         assert "Is publish(msg) reached in the subscription's callback?" in found
         assert "a lock or a loop that never ends" in found
-
-    def test_a_coroutine_that_nobody_awaited(self):
-        warning = "executor.py:12: RuntimeWarning: coroutine 'Bot.reply' was never awaited"
-        found = why(asked(listener(), times_s=every(0.3, 5), log=output(warning, time_s=1.5)))
-        assert "the coroutine `Bot.reply` was never awaited" in found
-        assert "await self.reply(...)" in found
 
     def test_an_exception_that_was_survived(self):
         log = output(traceback("ValueError: no", source="self.publisher.publish(1)"), time_s=1.5)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from functools import cache
 
 from grader.report.model.class_row import ClassRow
-from grader.report.model.result import make_result
 from grader.report.model.result_model import Result
 from tests.report.sample import full_points, lost_points, not_built, not_graded
 
 
 @cache
 def _results() -> tuple[Result, ...]:
-    samples = (full_points(), lost_points(), not_built(), not_graded())
-    return tuple(make_result(item.grade, item.recordings, item.facts) for item in samples)
+    return tuple(make().result for make in (full_points, lost_points, not_built, not_graded))
 
 
 def classroom(size: int) -> list[ClassRow]:

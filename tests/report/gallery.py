@@ -6,14 +6,13 @@ import math
 from dataclasses import replace
 
 from grader.checks.finding import Case, Cases, Comparison, Evidence, Finding, Moment, Plot, Span
-from grader.grade import grade
 from grader.measure.motion.track import speed_plot
 from grader.recording.event import Breach
 from grader.recording.model import Recording
 from grader.report.html.replay import Replay, make_replay
 from tests.checks.builder import drive, endpoint, on_scan, output, reader
-from tests.grade.sample import Told, make_loaded, make_submission
-from tests.report.sample import PERIOD, Sample, at, make_facts, make_run
+from tests.grade.sample import Told, make_submission
+from tests.report.sample import PERIOD, Sample, at, judged_runs, make_run
 
 WALL = "{segments: [[0.6, -0.6, 0.6, 0.6]], moving: [{circle: {radius: 0.1}, path: [{at: 0 s, \
 pose: [0, 0.5]}, {at: 5 s, pose: [0.4, 0.5]}]}]}"
@@ -83,12 +82,11 @@ def gallery() -> Sample:
              Evidence(comparisons=(DEFINITION,), plots=(smooth,))),
              scenarios=("listen",), title="The message is defined as given"),
     ]  # fmt: skip
-    loaded = make_loaded(
-        checks, ("listen", "drive"), {"listen": "It publishes", "drive": "A wall is ahead"}
-    )
     reached = Breach(at(0.9), "disk", "all space in /tmp and home", "256 MiB")
     recordings = {"listen": make_run(breaches=(reached,)), "drive": run}
-    return Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+    return judged_runs(
+        checks, recordings, titles={"listen": "It publishes", "drive": "A wall is ahead"}
+    )
 
 
 def reference() -> dict[str, Replay]:

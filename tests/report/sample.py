@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
+
+from rich.console import Console
 
 from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import Grade, grade
 from grader.recording.event import Breach, Disturbance
 from grader.recording.model import NS, Call, LogLine, Message, Node, Owner, Process, Recording
+from grader.report.html.replay import Replay
+from grader.report.html.report import NO_REFERENCE, render_report
 from grader.report.model.facts import RunFacts
-from grader.submission.record import BuildRecord, SourceError
+from grader.report.model.result import make_result
+from grader.report.model.result_model import Result
+from grader.report.text.terminal import print_grade
+from grader.submission.record import BuildRecord, SourceError, SubmissionRecord
 from tests.grade.sample import (
     LAUNCHED_NS,
     Told,
@@ -47,11 +57,49 @@ PROCESS = "bot_publisher/bot_pub"
 
 @dataclass(frozen=True)
 class Sample:
-    """What a report is made from."""
+    """What a report is made from, and what is made from it."""
 
     grade: Grade
     recordings: dict[str, Recording]
     facts: RunFacts
+
+    @property
+    def result(self) -> Result:
+        return make_result(self.grade, self.recordings, self.facts)
+
+    def html(self, references: Mapping[str, Replay] = NO_REFERENCE) -> str:
+        return render_report(self.grade, self.result, self.recordings, references)
+
+    def printed(self, width: int = 80, **options: Any) -> str:
+        """What a terminal of that width shows, without the spaces at the ends of lines."""
+        stream = io.StringIO()
+        console = Console(file=stream, width=width, highlight=False, emoji=False, **options)
+        print_grade(console, self.grade.assignment.title, self.result)
+        return "\n".join(line.rstrip() for line in stream.getvalue().split("\n"))
+
+
+def judged(
+    checks: Sequence[Told],
+    scenarios: Sequence[str] = ("listen",),
+    submission: SubmissionRecord | None = None,
+    **loaded: Any,
+) -> Sample:
+    """A grade by checks of one ordinary run of each scenario."""
+    runs = {name: make_run(scenario=name) for name in scenarios}
+    return judged_runs(checks, runs, submission, **loaded)
+
+
+def judged_runs(
+    checks: Sequence[Told],
+    recordings: dict[str, Recording],
+    submission: SubmissionRecord | None = None,
+    **loaded: Any,
+) -> Sample:
+    """A grade by checks of these runs, by scenario."""
+    made = make_loaded(checks, tuple(recordings) or ("listen",), **loaded)
+    return Sample(
+        grade(made, submission or make_submission(), recordings), recordings, make_facts()
+    )
 
 
 def make_facts(**changes: object) -> RunFacts:
@@ -118,15 +166,12 @@ def lost_points() -> Sample:
         Told("steady", requires=("period",), points=2, title="The period is steady"),
         Told("ends", title="The node ends after SIGINT", visibility="hidden"),
     ]
-    loaded = make_loaded(checks, titles={"listen": "Listen for two seconds"})
-    recordings = {"listen": make_run()}
-    return Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+    return judged(checks, titles={"listen": "Listen for two seconds"})
 
 
-def full_points() -> Sample:
-    loaded = make_loaded([Told("node"), Told("topic", points=2)])
-    recordings = {"listen": make_run()}
-    return Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+def full_points(**changes: object) -> Sample:
+    """Full points, in a run with these changes."""
+    return judged_runs([Told("node"), Told("topic", points=2)], {"listen": make_run(**changes)})
 
 
 def reached_limits() -> Sample:
@@ -135,9 +180,7 @@ def reached_limits() -> Sample:
         Node(f"/bot_\x1bx{number}/rosgrade_probe", Owner.STUDENT, at(0.4)) for number in range(30)
     )
     reached = Breach(at(0.9), "memory", "1056 MiB of memory", "1024 MiB")
-    recordings = {"listen": make_run(nodes=posing, breaches=(reached,))}
-    loaded = make_loaded([Told("node"), Told("topic", points=2)])
-    return Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
+    return full_points(nodes=posing, breaches=(reached,))
 
 
 def not_built() -> Sample:
@@ -155,7 +198,7 @@ def not_built() -> Sample:
         ),
         Told("node", requires=("builds",)),
     ]
-    return Sample(grade(make_loaded(checks), make_submission(build=build), {}), {}, make_facts())
+    return judged_runs(checks, {}, make_submission(build=build))
 
 
 def not_graded() -> Sample:
@@ -165,10 +208,7 @@ def not_graded() -> Sample:
         Told("depth", KeyError("depth"), title="The queue depth is 10"),
         Told("period", Finding.error("300 ms", "the host took 212 ms", disturbed=True)),
     ]
-    recordings = {"listen": make_run()}
-    return Sample(
-        grade(make_loaded(checks), make_submission(), recordings), recordings, make_facts()
-    )
+    return judged(checks)
 
 
 def everywhere(text: str) -> Sample:
@@ -203,12 +243,11 @@ def everywhere(text: str) -> Sample:
         environment={text: text},
         breaches=(Breach(at(0.2), "memory", text, text),),
     )
-    recordings = {"listen": run}
     facts = make_facts(
         started=text,
         rosgrade_version=text,
         environment={text: text},
         recordings={"listen": text},
     )
-    loaded = make_loaded(checks, titles={"listen": text}, title=text)
-    return Sample(grade(loaded, submission, recordings), recordings, facts)
+    found = judged_runs(checks, {"listen": run}, submission, titles={"listen": text}, title=text)
+    return replace(found, facts=facts)

@@ -8,20 +8,10 @@ import pytest
 
 from grader.checks.finding import Finding
 from grader.errors import GraderFault, UsageError
-from grader.grade import grade
 from grader.report.formats.classroom50 import identity, render_release, render_result, whole_factor
-from grader.report.model.result import make_result
 from tests.assignment.validator import valid
-from tests.grade.sample import Told, make_loaded, make_submission
-from tests.report.sample import (
-    Sample,
-    full_points,
-    lost_points,
-    make_facts,
-    make_run,
-    not_built,
-    not_graded,
-)
+from tests.grade.sample import Told
+from tests.report.sample import full_points, judged, lost_points, not_built, not_graded
 
 ENVIRONMENT = {
     "CLASSROOM": "ros2",
@@ -64,10 +54,6 @@ SCHEMA = {
 }
 
 
-def result_of(sample):
-    return make_result(sample.grade, sample.recordings, sample.facts)
-
-
 def rendered(result):
     return json.loads(render_result(result, identity(ENVIRONMENT), WHEN))
 
@@ -75,15 +61,12 @@ def rendered(result):
 def points(*worth, credit=0.0):
     checks = [Told("first", Finding.failed("e", "o", credit=credit), points=worth[0])]
     checks += [Told(f"c{number}", points=value) for number, value in enumerate(worth[1:])]
-    recordings = {"listen": make_run()}
-    return result_of(
-        Sample(grade(make_loaded(checks), make_submission(), recordings), recordings, make_facts())
-    )
+    return judged(checks).result
 
 
 @pytest.mark.parametrize("make", [full_points, lost_points, not_built])
 def test_it_keeps_the_contract(make):
-    data = rendered(result_of(make()))
+    data = rendered(make().result)
     assert valid(data, SCHEMA, SCHEMA)
     assert data["score"] == sum(test["score"] for test in data["tests"])
     assert data["max-score"] == sum(test["max-score"] for test in data["tests"])
@@ -107,7 +90,7 @@ def test_partial_credit_is_rounded_down_so_that_only_a_passed_check_is_full():
 
 
 def test_hidden_checks_are_neither_named_nor_counted():
-    result = result_of(lost_points())
+    result = lost_points().result
     text = render_result(result, identity(ENVIRONMENT), WHEN) + render_release(result)
     assert "SIGINT" not in text and "ends" not in [t["id"] for t in rendered(result)["tests"]]
     assert "1 hidden check, 1 point, runs at grading" in render_release(result)
@@ -115,7 +98,7 @@ def test_hidden_checks_are_neither_named_nor_counted():
 
 def test_without_a_grade_there_is_no_result():
     with pytest.raises(GraderFault, match="no result for Classroom 50"):
-        rendered(result_of(not_graded()))
+        rendered(not_graded().result)
 
 
 def test_what_the_runner_did_not_say_is_named():

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.finding import Moment, Plot
+from grader.checks.finding import Plot
 from grader.recording.model import Call, Declaration, Ending, Message, Process
 from grader.report.drawing.axes import Scale, ticks
 from grader.report.drawing.flags import Flag, place
@@ -169,7 +169,7 @@ class TestTimeline:
             assert label in shown
 
     def test_every_lane_says_in_words_what_is_in_it(self):
-        svg = draw_timeline(make_run(), (Moment("a gap", 0.75),), "t").wide
+        svg = draw_timeline(make_run(), (0.75,), "t").wide
         description = next(item.text for item in parsed(svg).iter() if item.tag.endswith("desc"))
         for text in (
             "bot_publisher/bot_pub: ran for 1.90 s",

@@ -7,26 +7,18 @@ import re
 import pytest
 
 from grader.checks.finding import Evidence, Finding
-from grader.grade import grade
 from grader.report.formats import github
-from grader.report.model.result import make_result
 from grader.submission.record import SourceError
-from tests.grade.sample import FAIL, Told, make_loaded, make_submission
+from tests.grade.sample import FAIL, Told
 from tests.report.sample import (
-    Sample,
     everywhere,
     full_points,
+    judged,
     lost_points,
-    make_facts,
-    make_run,
     not_graded,
 )
 
 HOSTILE = "100%25 done\n::error::forged\r##[add-mask]x, a:b"
-
-
-def result_of(sample):
-    return make_result(sample.grade, sample.recordings, sample.facts)
 
 
 def many(count, text="observed"):
@@ -39,10 +31,7 @@ def many(count, text="observed"):
         )
         for number in range(1, count + 1)
     ]
-    recordings = {"listen": make_run()}
-    return Sample(
-        grade(make_loaded(checks), make_submission(), recordings), recordings, make_facts()
-    )
+    return judged(checks).result
 
 
 def runner_reads(line):
@@ -62,7 +51,7 @@ def runner_reads(line):
 
 
 def test_an_annotation_is_at_the_student_s_line():
-    (line,) = github.annotation_lines(result_of(lost_points()), "homework/")
+    (line,) = github.annotation_lines(lost_points().result, "homework/")
     kind, properties, message = runner_reads(line)
     assert kind == "error"
     assert properties == {
@@ -75,12 +64,12 @@ def test_an_annotation_is_at_the_student_s_line():
 
 
 def test_without_the_files_in_the_repository_there_is_no_place():
-    (line,) = github.annotation_lines(result_of(lost_points()), None)
+    (line,) = github.annotation_lines(lost_points().result, None)
     assert set(runner_reads(line)[1]) == {"title"}
 
 
 def test_the_runner_shows_ten_so_the_most_useful_come_first():
-    lines = github.annotation_lines(result_of(many(14)))
+    lines = github.annotation_lines(many(14))
     assert len(lines) == 10
     titles = [runner_reads(line)[1]["title"] for line in lines]
     assert titles[0] == "Title of c1 (0 / 1)"
@@ -88,22 +77,20 @@ def test_the_runner_shows_ten_so_the_most_useful_come_first():
 
 
 def test_what_is_only_shown_is_a_notice():
-    recordings = {"listen": make_run()}
     checks = [Told("node"), Told("silence", FAIL, points=0)]
-    told = grade(make_loaded(checks), make_submission(), recordings)
-    (line,) = github.annotation_lines(make_result(told, recordings, make_facts()))
+    (line,) = github.annotation_lines(judged(checks).result)
     kind, properties, _ = runner_reads(line)
     assert kind == "notice"
     assert properties["title"] == "Title of silence (0 / 0)"
 
 
 def test_a_message_stays_below_what_the_runner_cuts():
-    for line in github.annotation_lines(result_of(many(1, "%\n" * 9000))):
+    for line in github.annotation_lines(many(1, "%\n" * 9000)):
         assert len(runner_reads(line)[2]) <= 4096
 
 
 def test_nothing_of_a_student_becomes_a_command():
-    result = result_of(many(3, HOSTILE))
+    result = many(3, HOSTILE)
     for line in github.annotation_lines(result):
         assert "\n" not in line and "\r" not in line
         kind, properties, message = runner_reads(line)
@@ -114,7 +101,7 @@ def test_nothing_of_a_student_becomes_a_command():
 
 def test_a_hostile_name_stays_in_its_property():
     text = "a,line=9::b%0A"
-    result = result_of(everywhere(text)).model_copy(update={"graded": True})
+    result = everywhere(text).result.model_copy(update={"graded": True})
     copy = result.model_copy(
         update={"checks": tuple(c for c in result.checks if c.status.value != "error")}
     )
@@ -127,9 +114,9 @@ def test_a_hostile_name_stays_in_its_property():
 
 
 def test_what_is_not_graded_is_one_warning_and_no_error():
-    (line,) = github.annotation_lines(result_of(not_graded()))
+    (line,) = github.annotation_lines(not_graded().result)
     assert runner_reads(line)[0] == "warning"
-    assert github.annotation_lines(result_of(full_points())) == ()
+    assert github.annotation_lines(full_points().result) == ()
 
 
 def test_commands_are_stopped_and_resumed_by_the_same_token():
@@ -142,7 +129,7 @@ def test_commands_are_stopped_and_resumed_by_the_same_token():
     [(full_points, "3", "passed"), (lost_points, "2.02", "failed"), (not_graded, "", "error")],
 )
 def test_outputs_as_github_reads_them(make, score, status):
-    text = github.outputs(result_of(make()), "EOF_1")
+    text = github.outputs(make().result, "EOF_1")
     values = dict(re.findall(r"(.+)<<EOF_1\n(.*)\nEOF_1\n", text))
     hidden = 1 if make is lost_points else 0
     assert values["score"] == score
@@ -152,7 +139,7 @@ def test_outputs_as_github_reads_them(make, score, status):
 
 
 def test_the_summary_is_cut_before_github_drops_it():
-    result = result_of(many(400, "🐢" * 2000))
+    result = many(400, "🐢" * 2000)
     whole = github.summary(result)
     assert 900_000 < len(whole.encode()) <= 1 << 20
     assert whole.endswith("the rest is in the report.\n")

@@ -8,7 +8,6 @@ import pytest
 from pydantic import BaseModel
 
 from grader.report.model.grade_part import GRADE, differences, grade_json
-from grader.report.model.result import make_result
 from grader.report.model.result_model import CheckPart, Result
 from tests.report.sample import lost_points
 
@@ -24,8 +23,7 @@ MEASURED_OF_A_CHECK = {"observed", "disturbed", "traceback", "evidence"}
 
 
 def result() -> Result:
-    sample = lost_points()
-    return make_result(sample.grade, sample.recordings, sample.facts)
+    return lost_points().result
 
 
 def changed(model: BaseModel, **values: Any) -> Any:

@@ -10,12 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.errors import UsageError
-from grader.grade import grade
 from grader.report.formats.gradebook import canvas_csv, cell, grades_csv, read_canvas
 from grader.report.model.class_row import ClassRow, RowStatus
-from grader.report.model.result import make_result
-from tests.grade.sample import Told, make_loaded, make_recording, make_submission
-from tests.report.sample import full_points, lost_points, make_facts, not_graded
+from tests.grade.sample import Told, make_submission
+from tests.report.sample import full_points, judged, lost_points, not_graded
 
 EXPORT = """\
 Student,ID,SIS User ID,SIS Login ID,Section,ROS 2 Publisher (48211),Final Score
@@ -28,8 +26,7 @@ Student,ID,SIS User ID,SIS Login ID,Section,ROS 2 Publisher (48211),Final Score
 
 
 def result(name, make=full_points):
-    sample = make()
-    found = make_result(sample.grade, sample.recordings, sample.facts)
+    found = make().result
     return found.model_copy(update={"submission": found.submission.model_copy(update={"id": name})})
 
 
@@ -310,10 +307,7 @@ def test_results_of_two_assignments_are_not_mixed():
 def test_no_cell_is_a_formula(text):
     assert not cell(text).lstrip().startswith(("=", "+", "-", "@"))
     assert not cell(f"\N{FULLWIDTH EQUALS SIGN}{text}").startswith("\N{FULLWIDTH EQUALS SIGN}")
-    loaded = make_loaded([Told("a")])
-    found = make_result(
-        grade(loaded, make_submission(id=text), {"listen": make_recording()}), {}, make_facts()
-    )
+    found = judged([Told("a")], submission=make_submission(id=text)).result
     read = rows(grades_csv([ClassRow(text, name=text, result=found, note=text)]))
     assert len(read) == 2 and len({len(row) for row in read}) == 1
     for said in (*read[1][:2], read[1][-1]):

@@ -9,16 +9,15 @@ import pytest
 
 from grader.checks.finding import Finding
 from grader.errors import UsageError
-from grader.grade import grade
 from grader.recording.event import Breach
 from grader.report.formats.gradescope import late_s, read_metadata, render_gradescope, unfinished
-from grader.report.model.result import make_result
 from tests.assignment.validator import valid
-from tests.grade.sample import Told, make_loaded, make_submission
+from tests.grade.sample import Told
 from tests.report.sample import (
-    Sample,
     everywhere,
     full_points,
+    judged,
+    judged_runs,
     lost_points,
     make_facts,
     make_run,
@@ -70,9 +69,7 @@ SCHEMA = {
 
 
 def rendered(make, metadata=None):
-    sample = make()
-    result = make_result(sample.grade, sample.recordings, sample.facts)
-    return json.loads(render_gradescope(result, metadata))
+    return json.loads(render_gradescope(make().result, metadata))
 
 
 @pytest.mark.parametrize(
@@ -122,11 +119,7 @@ def test_gradescope_hides_what_the_author_hides(visibility):
         Told("seen"),
         Told("other", Finding.failed("zq1", "zq2", "zq3"), title="zq4", visibility=visibility),
     ]
-    recordings = {"listen": make_run()}
-    sample = Sample(
-        grade(make_loaded(checks), make_submission(), recordings), recordings, make_facts()
-    )
-    data = rendered(lambda: sample)
+    data = rendered(lambda: judged(checks))
     assert data["tests"][1]["visibility"] == visibility
     if visibility != "visible":
         assert "zq" not in data["output"]
@@ -158,9 +151,7 @@ def test_limits_of_a_run_that_only_hidden_checks_judge_are_not_told():
         "listen": make_run(),
         "secret": make_run(scenario="secret", breaches=(Breach(1, "disk", "zq", "1 MiB"),)),
     }
-    loaded = make_loaded(checks, ("listen", "secret"))
-    sample = Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
-    result = make_result(sample.grade, sample.recordings, sample.facts)
+    result = judged_runs(checks, recordings).result
     assert "zq" in result.scenarios[1].breaches[0]
     assert "zq" not in render_gradescope(result)
 

@@ -8,14 +8,18 @@ import sys
 from itertools import pairwise
 
 import pytest
+from jinja2 import DictLoader, Environment
 
 from grader import resources
 from grader.checks.finding import Finding
-from grader.grade import grade
 from grader.recording.event import Breach
 from grader.recording.model import LogLine
-from grader.report.html.report import render_report
-from tests.grade.sample import FAIL, Told, make_loaded, make_submission
+from grader.report.formats import github
+from grader.report.formats.gradescope import render_gradescope
+from grader.report.formats.junit import render_junit
+from grader.report.formats.markdown import render_markdown
+from grader.report.html.page import compiled_templates
+from tests.grade.sample import FAIL, Told
 from tests.report.page import Page
 from tests.report.sample import (
     PROCESS,
@@ -23,14 +27,21 @@ from tests.report.sample import (
     at,
     everywhere,
     full_points,
+    judged,
     lost_points,
-    make_facts,
-    make_run,
     not_built,
     not_graded,
 )
 
 SAMPLES = [full_points, lost_points, not_built, not_graded]
+FORMATS = {
+    "terminal": Sample.printed,
+    "html": Sample.html,
+    "markdown": lambda sample: render_markdown(sample.result),
+    "junit": lambda sample: render_junit(sample.result),
+    "gradescope": lambda sample: render_gradescope(sample.result),
+    "github": lambda sample: "\n".join(github.annotation_lines(sample.result)),
+}
 ATTACKS = [
     "<script>alert(1)</script>",
     "</script><script src=//example.org/x.js></script>",
@@ -51,11 +62,7 @@ ATTACKS = [
 
 
 def page(sample: Sample) -> Page:
-    return Page(render(sample))
-
-
-def render(sample: Sample) -> str:
-    return render_report(sample.grade, sample.recordings, sample.facts)
+    return Page(sample.html())
 
 
 def sha256(text: str) -> str:
@@ -75,7 +82,7 @@ class TestEveryReport:
         assert len(found.all("h1")) == len(found.all("main")) == len(found.all("footer")) == 1
 
     def test_loads_nothing_and_allows_only_its_own_style_and_script(self, make):
-        html = render(make())
+        html = make().html()
         found = Page(html)
         assert not found.tags & {"link", "iframe", "object", "embed", "form", "img"}
         (policy,) = found.all("meta", http_equiv="Content-Security-Policy")
@@ -89,7 +96,7 @@ class TestEveryReport:
         assert "url(" not in html and "@import" not in html and "style=" not in html
 
     def test_is_the_same_every_time(self, make):
-        assert render(make()) == render(make())
+        assert make().html() == make().html()
 
     def test_names_every_drawing_for_a_screen_reader(self, make):
         found = page(make())
@@ -143,9 +150,7 @@ class TestContent:
 
     def test_a_check_that_waits_for_several_names_each(self):
         checks = [Told("a", FAIL), Told("b", FAIL), Told("c", requires=("a", "b"))]
-        recordings = {"listen": make_run()}
-        judged = grade(make_loaded(checks), make_submission(), recordings)
-        text = squeezed(page(Sample(judged, recordings, make_facts())).text)
+        text = squeezed(page(judged(checks)).text)
         assert "skipped Title of c waits for “Title of a” and “Title of b”" in text
 
     def test_the_check_to_fix_first_is_linked(self):
@@ -176,9 +181,7 @@ class TestContent:
         log = tuple(
             LogLine(at(0.1), PROCESS, "stdout", f"line {i} " + "x" * i) for i in range(3000)
         )
-        sample = full_points()
-        recordings = {"listen": make_run(log=log)}
-        text = squeezed(page(Sample(sample.grade, recordings, sample.facts)).text)
+        text = squeezed(page(full_points(log=log)).text)
         assert "line 149 x" in text and "line 150 x" not in text
         assert "2700 lines left out here; the recording has all of them." in text
         assert "line 2999 x" in text and "… (1,009 more characters)" in text
@@ -198,10 +201,8 @@ class TestContent:
             assert fact in text
 
     def test_limits_of_the_sandbox_that_were_reached_are_told_with_their_time(self):
-        sample = full_points()
         reached = Breach(at(0.8), "processes", "64 processes and threads", "64")
-        run = make_run(breaches=(reached,))
-        found = page(Sample(sample.grade, {"listen": run}, sample.facts))
+        found = page(full_points(breaches=(reached,)))
         text = squeezed(found.text)
         assert "a limit of the sandbox was reached" in text
         assert (
@@ -209,22 +210,16 @@ class TestContent:
             "allowed; anything more is refused" in text
         )
         assert found.all("a", data_time="0.800")
-        assert "sandbox was reached" not in page(sample).text
+        assert "sandbox was reached" not in page(full_points()).text
 
     def test_findings_of_several_scenarios_are_told_apart(self):
         says = {"listen": FAIL, "renamed": Finding.passed("x", "y")}
-        loaded = make_loaded([Told("node", says)], ("listen", "renamed"))
-        recordings = {name: make_run(scenario=name) for name in ("listen", "renamed")}
-        result = grade(loaded, make_submission(), recordings)
-        text = squeezed(page(Sample(result, recordings, make_facts())).text)
+        text = squeezed(page(judged([Told("node", says)], tuple(says))).text)
         assert "In several scenarios 0 / 1 points" in text
         assert "Scenario listen: failed" in text and "Scenario renamed: passed" in text
 
     def test_text_between_backticks_is_code_and_a_single_backtick_is_not(self):
-        loaded = make_loaded([Told("node", Finding.failed("`ros2 run`", "a ` and nothing else"))])
-        recordings = {"listen": make_run()}
-        sample = Sample(grade(loaded, make_submission(), recordings), recordings, make_facts())
-        html = render(sample)
+        html = judged([Told("node", Finding.failed("`ros2 run`", "a ` and nothing else"))]).html()
         assert "<code>ros2 run</code>" in html and "a ` and nothing else" in html
 
 
@@ -248,7 +243,7 @@ class TestHostileText:
                 assert name != "style"
 
     def test_leaves_no_control_character(self, attack):
-        html = render(everywhere(attack))
+        html = everywhere(attack).html()
         assert not re.search("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202e]", html)
 
     def test_is_shown(self, attack):
@@ -257,7 +252,12 @@ class TestHostileText:
 
 
 def test_text_that_cannot_be_encoded_is_still_a_file(tmp_path):
-    (tmp_path / "report.html").write_text(render(everywhere("\udcff")), encoding="utf-8")
+    (tmp_path / "report.html").write_text(everywhere("\udcff").html(), encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_says_how_many_points_wait_for_a_failed_check(name):
+    assert FORMATS[name](lost_points()).count("2 points wait for this") == 1
 
 
 def test_commands_that_write_no_report_do_not_load_jinja2():
@@ -268,3 +268,29 @@ def test_commands_that_write_no_report_do_not_load_jinja2():
     )
     root = resources.PACKAGE.parent
     assert subprocess.run([sys.executable, "-c", code], cwd=root, check=False).returncode == 0
+
+
+def compiled(folder, source):
+    cache = compiled_templates(folder)
+    environment = Environment(loader=DictLoader({"page": source}), bytecode_cache=cache)
+    return environment.get_template("page").render(name="bot")
+
+
+class TestCompiledTemplates:
+    def test_a_template_is_kept_and_a_changed_one_is_compiled_anew(self, tmp_path):
+        folder = tmp_path / "cache" / "templates"
+        assert compiled(folder, "{{ name }} passed") == "bot passed"
+        assert list(folder.iterdir())
+        assert compiled(folder, "{{ name }} passed") == "bot passed"
+        assert compiled(folder, "{{ name }} failed") == "bot failed"
+
+    @pytest.mark.parametrize("content", [b"", b"no bytecode"])
+    def test_a_broken_file_does_no_harm(self, tmp_path, content):
+        compiled(tmp_path, "{{ name }} passed")
+        for file in tmp_path.iterdir():
+            file.write_bytes(content)
+        assert compiled(tmp_path, "{{ name }} passed") == "bot passed"
+
+    def test_a_folder_that_cannot_be_made_does_no_harm(self, tmp_path):
+        (tmp_path / "file").touch()
+        assert compiled(tmp_path / "file" / "templates", "{{ name }} passed") == "bot passed"

@@ -12,17 +12,13 @@ import pytest
 import xmlschema
 
 from grader.checks.finding import Evidence, Finding
-from grader.grade import grade
 from grader.report.formats.junit import render_junit
-from grader.report.model.result import make_result
-from tests.grade.sample import FAIL, Told, make_loaded, make_submission
+from tests.grade.sample import FAIL, Told
 from tests.report.sample import (
-    Sample,
     everywhere,
     full_points,
+    judged,
     lost_points,
-    make_facts,
-    make_run,
     not_built,
     not_graded,
     reached_limits,
@@ -45,9 +41,11 @@ def jenkins() -> xmlschema.XMLSchema:
 
 
 def rendered(make, **options):
-    sample = make()
-    result = make_result(sample.grade, sample.recordings, sample.facts)
-    return render_junit(result, **options)
+    return render_junit(make().result, **options)
+
+
+def cases_of(text):
+    return {case.get("name"): case for case in ET.fromstring(text).iter("testcase")}
 
 
 @pytest.mark.parametrize("name", SAMPLES)
@@ -70,25 +68,18 @@ def test_the_counts_are_those_of_the_elements(name):
 
 
 def test_whose_fault_it_was():
-    cases = {
-        case.get("name"): case for case in ET.fromstring(rendered(lost_points)).iter("testcase")
-    }
+    cases = cases_of(rendered(lost_points))
     assert [child.tag for child in cases["period"]] == ["failure"]
     assert [child.tag for child in cases["steady"]] == ["skipped"]
     assert not list(cases["builds"])
-    cases = {
-        case.get("name"): case for case in ET.fromstring(rendered(not_graded)).iter("testcase")
-    }
+    cases = cases_of(rendered(not_graded))
     assert [child.tag for child in cases["depth"]] == ["error"]
     assert "KeyError" in cases["depth"][0].text
 
 
 @pytest.mark.parametrize("finding", [FAIL, Finding.error("a run", FAIL.observed)])
 def test_what_is_only_shown_makes_no_test_fail(finding):
-    recordings = {"listen": make_run()}
-    checks = [Told("node"), Told("silence", finding, points=0)]
-    told = grade(make_loaded(checks), make_submission(), recordings)
-    text = render_junit(make_result(told, recordings, make_facts()))
+    text = rendered(lambda: judged([Told("node"), Told("silence", finding, points=0)]))
     jenkins().validate(text)
     (suite,) = ET.fromstring(text)
     assert [suite.get(key) for key in ("failures", "errors", "skipped")] == ["0", "0", "1"]
@@ -98,10 +89,8 @@ def test_what_is_only_shown_makes_no_test_fail(finding):
 
 
 def test_what_others_wait_for_is_a_failure_also_without_points():
-    recordings = {"listen": make_run()}
     checks = [Told("starts", FAIL, points=0), Told("node", requires=("starts",))]
-    told = grade(make_loaded(checks), make_submission(), recordings)
-    (suite,) = ET.fromstring(render_junit(make_result(told, recordings, make_facts())))
+    (suite,) = ET.fromstring(rendered(lambda: judged(checks)))
     assert (suite.get("failures"), suite.get("skipped")) == ("1", "1")
 
 
@@ -118,10 +107,7 @@ def test_a_failure_says_what_to_try():
 
 def test_what_was_printed_keeps_its_lines_below_one_another():
     printed = Evidence(log=("Traceback:", "    node.spin()", "    ^^^^"))
-    recordings = {"listen": make_run()}
-    checks = [Told("alive", Finding.failed("e", "o", "h", printed))]
-    found = grade(make_loaded(checks), make_submission(), recordings)
-    text = rendered(lambda: Sample(found, recordings, make_facts()))
+    text = rendered(lambda: judged([Told("alive", Finding.failed("e", "o", "h", printed))]))
     failure = next(ET.fromstring(text).iter("failure"))
     assert "\nprinted:\nTraceback:\n    node.spin()\n    ^^^^" in failure.text
 
@@ -167,7 +153,7 @@ def test_the_time_is_without_offset():
 
 def test_xunit1_has_the_student_s_file_and_line_which_jenkins_forbids():
     text = rendered(lost_points, xunit1=True)
-    cases = {case.get("name"): case for case in ET.fromstring(text).iter("testcase")}
+    cases = cases_of(text)
     assert cases["period"].get("file") == "src/bot_publisher/bot_publisher/node.py"
     assert cases["period"].get("line") == "18"
     properties = {item.get("name"): item.get("value") for item in cases["period"].iter("property")}

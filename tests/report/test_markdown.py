@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -11,18 +10,15 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from grader.checks.finding import Evidence, Finding
-from grader.grade import grade
 from grader.recording.event import Breach
 from grader.report.formats.markdown import COMMENT_BYTES, fence, literal, prose, render_markdown
-from grader.report.model.result import make_result
-from tests.grade.sample import Told, make_loaded, make_submission
+from tests.grade.sample import Told
 from tests.report.sample import (
     at,
     everywhere,
     full_points,
+    judged,
     lost_points,
-    make_facts,
-    make_run,
     not_built,
     not_graded,
 )
@@ -45,7 +41,7 @@ HOSTILE = [
 
 
 def rendered(sample):
-    return render_markdown(make_result(sample.grade, sample.recordings, sample.facts))
+    return render_markdown(sample.result)
 
 
 def kinds(text):
@@ -120,9 +116,7 @@ def test_code_is_code_and_an_unpaired_tick_is_a_tick():
 def test_a_comment_fits_and_still_says_why_however_much_was_printed():
     long = Finding.failed("e", "it died", "h", Evidence(log=("z" * 16_000,) * 30))
     checks = [Told(f"c{number}", long) for number in range(10)]
-    recordings = {"listen": make_run()}
-    found = grade(make_loaded(checks), make_submission(), recordings)
-    text = render_markdown(make_result(found, recordings, make_facts()), COMMENT_BYTES)
+    text = render_markdown(judged(checks).result, COMMENT_BYTES)
     assert len(text.encode()) <= COMMENT_BYTES
     assert text.count("- **observed:** it died") >= 9
     assert "z…" in text
@@ -137,19 +131,12 @@ def test_a_block_of_code_ends_where_it_should(lines):
     ]
 
 
-def test_limits_of_the_sandbox_that_were_reached_are_told_and_are_text():
-    sample = full_points()
+def test_limits_that_were_reached_and_what_is_worth_knowing_are_told_and_are_text():
     reached = Breach(at(0.8), "disk", "all space in <b>@home</b>", "64 MiB")
-    text = rendered(replace(sample, recordings={"listen": make_run(breaches=(reached,))}))
+    text = rendered(full_points(breaches=(reached,), environment={"other_domains": "<b>7</b>"}))
     assert "**Limits of the sandbox that were reached**" in text
     assert "- scenario listen: its processes took all space in &lt;b&gt;" in text
-    assert "Limits" not in rendered(sample)
-
-
-def test_what_is_worth_knowing_of_a_run_is_told_and_is_text():
-    sample = full_points()
-    run = make_run(environment={"other_domains": "<b>7</b>"})
-    text = rendered(replace(sample, recordings={"listen": run}))
     assert "**Worth knowing**" in text
     assert "- scenario listen: the submission joined another ROS domain: &lt;b&gt;7" in text
-    assert "Worth knowing" not in rendered(sample)
+    assert "Limits" not in rendered(full_points())
+    assert "Worth knowing" not in rendered(full_points())

@@ -20,11 +20,10 @@ from grader.report.drawing.path import Target, draw_path
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import simplified
 from grader.report.drawing.timeline import draw_timeline
-from grader.report.html.build_log import arrange
 from grader.report.html.comparison import align
-from grader.report.html.pictures import Gallery
 from grader.report.html.qos_table import pairs
-from grader.submission.record import BuildRecord, SourceError
+from grader.report.html.report import Gallery, build_lines
+from grader.report.model.result_model import BuildPart, PlacePart, PlotPart
 from sim.motion import Pose
 from tests.checks.builder import drive, endpoint, node, on_odometry, reader, recording
 from tests.report.gallery import CALLS, CASES, DEFINITION, ahead_until
@@ -264,31 +263,47 @@ class TestBuildLog:
             "Failed",
         ]
         log = "\n".join([*(f"noise {i}" for i in range(50)), *told])
-        culprit = SourceError("src/b/setup.py", 7, "SyntaxError: '{' was never closed")
-        found = arrange(BuildRecord(False, 1.0, culprit=culprit, log=log))
-        hits = [text for text, hit in found.first if hit]
+        culprit = PlacePart(
+            file="src/b/setup.py", line=7, message="SyntaxError: '{' was never closed"
+        )
+        found = build_lines(build(culprit, log))
+        hits = [text for text, hit in found if hit]
         assert hits == ['File "src/b/setup.py", line 7', "SyntaxError: '{' was never closed"]
-        assert len(found.first) < 15 and found.whole == log
+        assert len(found) < 15
 
     def test_a_log_that_does_not_tell_is_shown_as_it_is(self):
-        assert arrange(BuildRecord(False, 1.0, log="Failed <<< bot")).first == ()
+        assert build_lines(build(None, "Failed <<< bot")) == []
+
+
+def build(culprit, log):
+    return BuildPart(
+        succeeded=False,
+        duration_s=1.0,
+        cached=False,
+        timed_out=False,
+        failed_packages=("b",),
+        culprit=culprit,
+        log=log,
+    )
+
+
+SPEED = PlotPart(
+    title="Speed", x_label="t (s)", y_label="v (m/s)", x=(0.0, 1.0), y=(0.0, 0.1), band=None
+)
 
 
 def test_the_same_plot_of_the_same_run_is_drawn_once():
-    plot = Plot("Speed", "t (s)", "v (m/s)", (0.0, 1.0), (0.0, 0.1))
     gallery = Gallery()
-    assert gallery.plot(plot, "one", "ahead").figure is not None
-    again = gallery.plot(plot, "two", "ahead")
-    assert again.figure is None and again.name == "one"
-    assert gallery.plot(plot, "three", "other").figure is not None
+    assert gallery.plot(SPEED, "one", "ahead")[1] is not None
+    assert gallery.plot(SPEED, "two", "ahead") == ("one", None)
+    assert gallery.plot(SPEED, "three", "other")[1] is not None
 
 
 def test_a_plot_that_is_folded_up_is_drawn_again_where_it_is_open():
-    plot = Plot("Speed", "t (s)", "v (m/s)", (0.0, 1.0), (0.0, 0.1))
     gallery = Gallery()
-    assert gallery.plot(plot, "one", "ahead", folded=True).figure is not None
-    assert gallery.plot(plot, "two", "ahead").figure is not None
-    assert gallery.plot(plot, "three", "ahead", folded=True).name == "two"
+    assert gallery.plot(SPEED, "one", "ahead", folded=True)[1] is not None
+    assert gallery.plot(SPEED, "two", "ahead")[1] is not None
+    assert gallery.plot(SPEED, "three", "ahead", folded=True) == ("two", None)
 
 
 @given(st.lists(st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)), min_size=1, max_size=40))

@@ -9,7 +9,6 @@ import pytest
 
 from grader.assignment.model import RandomRange
 from grader.report.html.replay import DIGITS, NOTHING, embedded, make_replay, with_goals
-from grader.report.html.report import render_report
 from tests.grade.sample import Told, make_loaded
 from tests.report.gallery import ahead_until, gallery, reference
 from tests.report.sample import make_run
@@ -90,6 +89,4 @@ def test_a_report_of_eight_robot_runs_stays_below_a_megabyte(replay):
 
 
 def test_a_report_with_every_kind_of_picture_is_small():
-    sample = gallery()
-    html = render_report(sample.grade, sample.recordings, sample.facts, reference())
-    assert len(html.encode()) < 300_000
+    assert len(gallery().html(reference()).encode()) < 300_000

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -14,14 +15,13 @@ from grader.report.model.result import (
     read_result,
     result_json,
     result_schema,
-    write_result,
 )
 from tests.assignment.lessons import GOOD
-from tests.grade.sample import FAIL, PASS, Told, make_loaded, make_recording, make_submission
+from tests.grade.sample import FAIL, PASS, Told, make_submission
 from tests.report.sample import (
-    Sample,
     everywhere,
     full_points,
+    judged,
     lost_points,
     make_facts,
     not_built,
@@ -29,8 +29,8 @@ from tests.report.sample import (
 )
 
 
-def written(sample: Sample):
-    return json.loads(result_json(make_result(sample.grade, sample.recordings, sample.facts)))
+def written(sample):
+    return json.loads(result_json(sample.result))
 
 
 def test_the_keys_of_the_contract():
@@ -120,10 +120,8 @@ def test_a_run():
 
 
 def test_a_check_of_several_scenarios_tells_the_one_that_decided_and_the_others():
-    loaded = make_loaded([Told("node", {"a": PASS, "b": FAIL, "c": PASS})], ("a", "b", "c"))
-    recordings = {name: make_recording(name) for name in "abc"}
-    result = grade(loaded, make_submission(), recordings)
-    (check,) = written(Sample(result, recordings, lost_points().facts))["checks"]
+    says = {"a": PASS, "b": FAIL, "c": PASS}
+    (check,) = written(judged([Told("node", says)], tuple(says)))["checks"]
     assert (check["scenario"], check["observed"]) == ("b", "no node at all")
     assert [(other["scenario"], other["status"]) for other in check["other_scenarios"]] == [
         ("a", "passed"),
@@ -147,10 +145,8 @@ def test_without_a_verdict_there_is_no_number_that_a_gradebook_could_take():
 def test_numbers_that_json_does_not_know_become_strings():
     values = (float("nan"), float("inf"), float("-inf"), 0.1 + 0.2)
     plot = Plot("", "", "", values, values)
-    loaded = make_loaded([Told("node", Finding.passed("", "", Evidence(plots=(plot,))))])
-    recordings = {"listen": make_recording()}
-    sample = Sample(grade(loaded, make_submission(), recordings), recordings, full_points().facts)
-    text = result_json(make_result(sample.grade, sample.recordings, sample.facts))
+    finding = Finding.passed("", "", Evidence(plots=(plot,)))
+    text = result_json(judged([Told("node", finding)]).result)
     assert not re.search(r"[:\[,]\s*-?(NaN|Infinity)", text)
     plot_part = json.loads(text)["checks"][0]["evidence"]["plots"][0]
     assert plot_part["x"] == ["NaN", "Infinity", "-Infinity", 0.3]
@@ -160,30 +156,17 @@ SAMPLES = [lost_points, full_points, not_built, not_graded, lambda: everywhere("
 
 
 @pytest.mark.parametrize("make", SAMPLES)
-def test_what_is_written_is_read_again(make, tmp_path):
-    sample = make()
-    file = tmp_path / "result.json"
-    result = write_result(sample.grade, sample.recordings, sample.facts, file)
+def test_what_is_written_is_read_again_and_is_the_same_every_time(make, tmp_path):
+    result, file = make().result, tmp_path / "result.json"
+    file.write_text(result_json(result), encoding="utf-8")
     assert read_result(file) == result
-    assert result_json(read_result(file)) == file.read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("make", SAMPLES)
-def test_the_same_grade_gives_the_same_bytes(make):
-    one, other = make(), make()
-    assert result_json(make_result(one.grade, one.recordings, one.facts)) == result_json(
-        make_result(other.grade, other.recordings, other.facts)
-    )
+    assert result_json(read_result(file)) == result_json(make().result)
 
 
 def test_the_order_of_the_environment_does_not_matter():
     sample = lost_points()
     environment = dict(reversed(list(sample.facts.environment.items())))
-    turned = Sample(
-        sample.grade,
-        sample.recordings,
-        type(sample.facts)(**vars(sample.facts) | {"environment": environment}),
-    )
+    turned = replace(sample, facts=make_facts(environment=environment))
     assert json.dumps(written(turned)) == json.dumps(written(sample))
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from rich.console import Console
 
-from grader.assignment.model import SHOWN_FROM, Withheld
+from grader.assignment.model import SHOWN_FROM
 from grader.assignment.selection import visible_part
 from grader.checks.check import Subject
-from grader.checks.finding import Evidence, Finding, Moment, Plot, Status, Table
+from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import grade
 from grader.report.formats import classroom50, github
 from grader.report.formats.foxglove import render_layout
@@ -23,14 +22,12 @@ from grader.report.formats.junit import render_junit
 from grader.report.formats.markdown import render_markdown
 from grader.report.html.report import render_report
 from grader.report.model.class_row import ClassRow
-from grader.report.model.result import make_result, result_json
-from grader.report.model.student import for_student, grade_for_student
-from grader.report.text import explanation
-from grader.report.text.terminal import print_grade
-from grader.report.text.words import headline, summary
+from grader.report.model.result import result_json
+from grader.report.model.student import for_student
+from grader.report.text.explanation import headline
 from grader.submission.record import SourceError
 from tests.grade.sample import FAIL, Told, make_loaded, make_submission
-from tests.report.sample import make_facts, make_run
+from tests.report.sample import Sample, judged, make_facts, make_run
 
 SECRET = "zq"
 """In every text of a hidden check, and in no other."""
@@ -56,6 +53,10 @@ def say(status, mark):
     if status == "failed":
         return Finding.failed(f"{text}expected", f"{text}observed", f"{text}hint", evidence)
     return Finding.error(f"{text}expected", f"{text}observed", hint=f"{text}hint")
+
+
+def hidden(name, points):
+    return Told(name, points=points, visibility="hidden")
 
 
 @st.composite
@@ -97,23 +98,25 @@ def recordings():
     return {name: dataclasses.replace(make_run(), scenario=name) for name in SCENARIOS}
 
 
-def copy_of_report(loaded):
-    """The report that a student is given of a grade with everything in it."""
-    whole = grade(loaded, make_submission(), recordings())
-    return render_report(grade_for_student(whole), recordings(), make_facts(recordings={}))
-
-
-def whole_result(loaded):
+def whole(loaded):
     runs = recordings()
     facts = make_facts(recordings={name: f"recordings/{name}.mcap" for name in runs})
-    return make_result(grade(loaded, make_submission(), runs), runs, facts)
+    return Sample(grade(loaded, make_submission(), runs), runs, facts)
+
+
+def visible_alone(loaded):
+    """What ``check`` makes for a student: of the visible part of an assignment."""
+    part = visible_part(loaded)
+    runs = {scenario.id: recordings()[scenario.id] for scenario in part.assignment.scenarios}
+    return dataclasses.replace(
+        whole(loaded), grade=grade(part, make_submission(), runs), recordings=runs
+    )
 
 
 def formats_of(result):
     """Every text that is made for students from a whole result."""
     copy = for_student(result)
     yield result_json(copy)
-    yield render_junit(copy)
     yield render_junit(copy, xunit1=True)
     yield render_markdown(copy)
     yield grades_csv([ClassRow(copy.submission.id, result=copy)])
@@ -129,27 +132,18 @@ def formats_of(result):
     yield json.dumps(gradescope)
 
 
-def reports_of(loaded):
-    """Every text that `check` makes for a student: of the visible part of an assignment."""
-    part = visible_part(loaded)
-    runs = {scenario.id: recordings()[scenario.id] for scenario in part.assignment.scenarios}
-    graded = grade(part, make_submission(), runs)
-    facts = make_facts(recordings={name: f"recordings/{name}.mcap" for name in runs})
-    stream = io.StringIO()
-    print_grade(Console(file=stream, width=120), graded)
-    yield stream.getvalue()
-    yield render_report(graded, runs, facts)
-    yield result_json(make_result(graded, runs, facts))
-    yield render_layout(runs.values())
-
-
 @settings(max_examples=60, deadline=None)
 @given(assignments())
 def test_no_string_of_a_hidden_check_is_in_anything_for_students(loaded):
+    sample, alone = whole(loaded), visible_alone(loaded)
+    copy = for_student(sample.result)
     for text in (
-        *formats_of(whole_result(loaded)),
-        *reports_of(loaded),
-        copy_of_report(loaded),
+        *formats_of(sample.result),
+        render_report(sample.grade, copy, sample.recordings),
+        alone.printed(120),
+        alone.html(),
+        result_json(alone.result),
+        render_layout(alone.recordings.values()),
     ):
         assert SECRET not in text
 
@@ -157,79 +151,48 @@ def test_no_string_of_a_hidden_check_is_in_anything_for_students(loaded):
 @settings(max_examples=60, deadline=None)
 @given(assignments())
 def test_the_student_s_copy_is_what_the_visible_part_alone_gives(loaded):
-    part = visible_part(loaded)
-    runs = {scenario.id: recordings()[scenario.id] for scenario in part.assignment.scenarios}
-    alone = make_result(grade(part, make_submission(), runs), runs, make_facts())
-    copy = for_student(whole_result(loaded))
+    alone, copy = visible_alone(loaded).result, for_student(whole(loaded).result)
     # The same exception is raised again and again here, and its traceback grows.
     checks = tuple(check.model_copy(update={"traceback": ""}) for check in alone.checks)
     alone = alone.model_copy(update={"checks": checks})
     for name in ("score", "max_score", "graded", "first_to_fix", "checks", "withheld"):
         assert getattr(copy, name) == getattr(alone, name)
     assert {one.id for one in copy.scenarios} <= {one.id for one in alone.scenarios}
+    assert not any(one.recording for one in copy.scenarios)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(assignments())
-def test_the_student_s_report_is_what_the_visible_part_alone_gives(loaded):
-    part = visible_part(loaded)
-    runs = {scenario.id: recordings()[scenario.id] for scenario in part.assignment.scenarios}
-    alone = grade(part, make_submission(), runs)
-    copy = grade_for_student(grade(loaded, make_submission(), recordings()))
-    assert (copy.score, copy.max_score, copy.graded) == (alone.score, alone.max_score, alone.graded)
-    assert copy.withheld == alone.withheld
-    assert [(one.id, one.status, one.waits_for) for one in copy.results] == [
-        (one.id, one.status, one.waits_for) for one in alone.results
-    ]
-    assert not any(item.traceback for one in copy.results for item in one.findings)
-    assert {one.id for one in copy.assignment.scenarios} <= set(runs)
+def test_the_student_s_report_shows_the_runs_that_visible_checks_judge(loaded):
+    sample = whole(loaded)
+    html = render_report(sample.grade, for_student(sample.result), sample.recordings)
+    assert html.count('id="what-') == len(visible_alone(loaded).recordings)
 
 
 def test_a_result_without_hidden_checks_is_its_own_copy():
-    whole = grade(make_loaded([Told("a"), Told("b")]), make_submission(), recordings())
-    assert grade_for_student(whole) is whole
-    result = whole_result(make_loaded([Told("a"), Told("b")]))
+    result = judged([Told("a"), Told("b")]).result
     assert for_student(result) is result
     assert result.withheld.checks == 0
 
 
-def test_hidden_checks_are_announced_with_their_number_and_points():
-    checks = [Told(f"c{n}") for n in range(8)]
-    checks += [Told(f"h{n}", points=2, visibility="hidden") for n in range(3)]
-    part = visible_part(make_loaded(checks))
-    assert headline(grade(part, make_submission(), recordings())) == (
-        "8 of 8 visible checks passed; 3 hidden checks, 6 points, run at grading."
-    )
-
-
-def test_the_announcement_also_stands_behind_what_failed():
-    assert summary(
-        [Status.PASSED, Status.FAILED], Withheld(1, 0.5), graded=True, full_points=False
-    ) == ("1 check failed; 1 hidden check, 0.5 points, runs at grading.")
-
-
-def test_what_is_shown_without_points_is_no_reason_to_worry():
-    told = grade(
-        make_loaded([Told("node"), Told("silence", FAIL, points=0)]),
-        make_submission(),
-        recordings(),
-    )
-    assert headline(told) == "Full points; 1 check without points failed."
-    assert explanation.headline(make_result(told, recordings(), make_facts())) == headline(told)
-
-
-def test_an_error_without_points_is_told_beside_full_points():
-    checks = [Told("node"), Told("silence", Finding.error("", ""), points=0)]
-    told = grade(make_loaded(checks), make_submission(), recordings())
-    assert headline(told) == "Full points; 1 check without points could not be judged."
-    assert explanation.headline(make_result(told, recordings(), make_facts())) == headline(told)
-
-
-def test_where_nothing_has_points_none_are_full():
-    told = grade(
-        make_loaded([Told("node", points=0), Told("silence", FAIL, points=0)]),
-        make_submission(),
-        recordings(),
-    )
-    assert headline(told) == "1 check failed."
-    assert explanation.headline(make_result(told, recordings(), make_facts())) == headline(told)
+@pytest.mark.parametrize(
+    ("checks", "said"),
+    [
+        (
+            [*(Told(f"c{n}") for n in range(8)), *(hidden(f"h{n}", 2) for n in range(3))],
+            "8 of 8 visible checks passed; 3 hidden checks, 6 points, run at grading.",
+        ),
+        (
+            [Told("a"), Told("b", FAIL), hidden("h", 0.5)],
+            "1 check failed; 1 hidden check, 0.5 points, runs at grading.",
+        ),
+        ([Told("a"), Told("b", FAIL, points=0)], "Full points; 1 check without points failed."),
+        (
+            [Told("a"), Told("b", Finding.error("", ""), points=0)],
+            "Full points; 1 check without points could not be judged.",
+        ),
+        ([Told("a", points=0), Told("b", FAIL, points=0)], "1 check failed."),
+    ],
+)
+def test_the_headline_announces_hidden_checks_and_worries_nobody_without_reason(checks, said):
+    assert headline(for_student(judged(checks).result)) == said

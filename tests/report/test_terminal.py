@@ -1,4 +1,4 @@
-"""The grade in a terminal."""
+"""The grade in a terminal, and what changed since the grade before."""
 
 import io
 import unicodedata
@@ -8,20 +8,17 @@ import pytest
 from rich.console import Console
 
 from grader.checks.finding import Evidence, Finding
-from grader.grade import grade
-from grader.recording.event import Breach
-from grader.report.text.terminal import print_grade
-from tests.grade.sample import Told, make_loaded, make_submission
+from grader.report.text.terminal import print_changes, print_grade
+from tests.grade.sample import FAIL, PASS, Told
 from tests.report.sample import (
-    Sample,
-    at,
     everywhere,
     full_points,
+    judged,
     lost_points,
-    make_facts,
     make_run,
     not_built,
     not_graded,
+    reached_limits,
 )
 
 AT_80 = """\
@@ -47,152 +44,93 @@ Fix this first: It publishes every 300 ms
 (src/bot_publisher/bot_publisher/node.py:18). 1 other check waits for it.
 Score: 3.02 of 7 points
 """
-AT_120 = """\
-Publish a Twist every 300 ms   ada_lovelace
-
+TABLE_AT_120 = """\
 ✓ passed   The package builds             1 / 1  built in 1.3 s
 ✗ failed   It publishes every 300 ms   1.02 / 3  a median of 322.4 ms; 2 of 3 periods are longer than 315 ms, the longe…
 – skipped  The period is steady           0 / 2  waits for It publishes every 300 ms
 ✓ passed   The node ends after SIGINT     1 / 1  /bot_publisher
-
-✗ failed  It publishes every 300 ms
-  expected  a period of 300 ms within 5 % (285 to 315 ms)
-  observed  a median of 322.4 ms; 2 of 3 periods are longer than 315 ms, the longest is 612 ms
-  try next  The period grows with the work in the callback. A timer keeps the period.
-  also      Let a timer do the waiting: `create_timer(0.3, callback)`.
-  where     src/bot_publisher/bot_publisher/node.py:18: time.sleep(0.3)
-  printed   loop took 0.31 s
-  waiting   2 points wait for this
-
-Fix this first: It publishes every 300 ms (src/bot_publisher/bot_publisher/node.py:18). 1 other check waits for it.
-Score: 3.02 of 7 points
 """  # noqa: E501
 
 
-def printed(sample, width=80, **options):
-    stream = io.StringIO()
-    console = Console(file=stream, width=width, highlight=False, emoji=False, **options)
-    print_grade(console, sample.grade, sample.recordings)
-    return stream.getvalue()
-
-
-@pytest.mark.parametrize(("width", "text"), [(80, AT_80), (120, AT_120)])
-def test_lost_points_as_a_student_reads_them(width, text):
-    lines = [line.rstrip() for line in printed(lost_points(), width).splitlines()]
-    assert lines == text.splitlines()
-
-
-@pytest.mark.parametrize("width", [40, 80, 120])
-@pytest.mark.parametrize("make", [lost_points, not_built, not_graded, full_points])
-def test_no_line_is_wider_than_the_terminal(make, width):
-    assert max(len(line) for line in printed(make(), width).splitlines()) <= width
+def test_lost_points_as_a_student_reads_them():
+    assert lost_points().printed() == AT_80
 
 
 def test_a_wide_terminal_also_tells_what_was_observed():
-    text = printed(lost_points(), 120)
-    assert "1 / 1  built in 1.3 s" in text
-    assert "0 / 2  waits for It publishes every 300 ms" in text
+    text = lost_points().printed(120)
+    assert TABLE_AT_120 in text
+    assert (
+        "  observed  a median of 322.4 ms; 2 of 3 periods are longer than 315 ms, the longest"
+        in text
+    )
 
 
-def test_full_points():
-    text = printed(full_points())
+@pytest.mark.parametrize("width", [40, 80, 120])
+@pytest.mark.parametrize("make", [lost_points, not_built, not_graded, full_points, reached_limits])
+def test_no_line_is_wider_than_the_terminal(make, width):
+    assert max(map(len, make().printed(width).splitlines())) <= width
+
+
+def test_full_points_end_with_the_score():
+    text = full_points().printed()
     assert text.endswith("\nScore: 3 of 3 points\n")
-    assert "Fix this first" not in text
+    assert "Fix this first" not in text and "Limits" not in text and "Worth knowing" not in text
 
 
-def test_limits_of_the_sandbox_that_were_reached_are_told():
-    sample = full_points()
-    reached = (
-        Breach(at(0.8), "memory", "1056 MiB of memory", "1024 MiB"),
-        Breach(at(1.2), "disk", "all space in /tmp and home", "256 MiB"),
-    )
-    text = printed(replace(sample, recordings={"listen": make_run(breaches=reached)}), 80)
-    assert text.endswith("""
-Limits of the sandbox that were reached
-  reached   the processes of the submission took 1056 MiB of memory, 1024 MiB
-            are allowed; they were ended for it (scenario listen, 0.8 s after
-            launch)
-  reached   the processes of the submission took all space in /tmp and home, 256
-            MiB are allowed; anything more is refused (scenario listen, 1.2 s
-            after launch)
+def test_limits_that_were_reached_and_what_is_worth_knowing_stand_before_the_score():
+    limits = "".join(reached_limits().printed().partition("Limits of")[1:])
+    assert limits.startswith(
+        """Limits of the sandbox that were reached
+  note      scenario listen: its processes took 1056 MiB of memory, 1024 MiB are
+            allowed
 
-Score: 3 of 3 points
-""")
-    assert "Limits" not in printed(sample)
-
-
-def test_what_is_worth_knowing_of_a_run_is_told():
-    sample = full_points()
-    run = make_run(environment={"other_domains": "7"})
-    text = printed(replace(sample, recordings={"listen": run}), 80)
-    assert text.endswith("""
 Worth knowing
-  remark    the submission joined another ROS domain: 7 (scenario listen)
-
-Score: 3 of 3 points
-""")
-    assert "Worth knowing" not in printed(sample)
-
-
-def test_what_is_the_same_in_several_scenarios_is_said_once():
-    sample = lost_points()
-    period = sample.grade.result("period")
-    [item] = period.findings
-    other = replace(item.finding, observed="a median of 310 ms")
-    findings = [
-        replace(item, scenario="near"),
-        replace(item, scenario="far", finding=other),
-        replace(item, scenario="late"),
-    ]
-    results = tuple(
-        replace(result, findings=tuple(findings)) if result is period else result
-        for result in sample.grade.results
+  note      scenario listen: a node of the submission is called"""
     )
-    text = printed(replace(sample, grade=replace(sample.grade, results=results)))
-    assert text.count("  expected  ") == text.count("  try next  ") == text.count("  where  ") == 1
-    assert text.count("  observed  ") == 2
-    assert "  scenario  near and late\n" in text and "  scenario  far\n" in text
+    assert limits.endswith("  note      10 more: see the report\n\nScore: 3 of 3 points\n")
 
 
 def test_a_remark_on_several_runs_is_told_once():
     run = make_run(environment={"other_domains": "7"})
-    runs = {name: replace(run, scenario=name) for name in ("near", "far")}
-    text = printed(replace(full_points(), recordings=runs), 80)
-    assert "ROS domain: 7 (scenarios near and far)\n" in text
+    runs = {"listen": run, "far": replace(run, scenario="far")}
+    sample = judged([Told("node")], ("listen", "far"))
+    text = replace(sample, recordings=runs).printed()
+    assert (
+        "  note      scenarios listen and far: the submission joined another ROS domain:\n" in text
+    )
+
+
+def test_what_is_the_same_in_several_scenarios_is_said_once():
+    evidence = Evidence(log=("killed",))
+    same = Finding.failed("a period of 300 ms", "a median of 322 ms", "Use a timer.", evidence)
+    says = {"near": same, "far": replace(same, observed="a median of 310 ms"), "late": same}
+    text = judged([Told("period", says)], tuple(says)).printed()
+    for name in ("expected", "try next", "printed"):
+        assert text.count(f"  {name:8}  ") == 1
+    assert text.count("  observed  ") == 2
+    assert "  scenario  near and late\n" in text and "  scenario  far\n" in text
 
 
 def test_marks_below_a_line_of_a_traceback_are_left_out():
-    lines = (
-        "    sys.exit(load())",
-        "             ^^^^^^",
-        "    x = a / b",
-        "        ~~^~~",
-        "Error",
-    )
-    failed = Finding.failed("x", "y", "z", Evidence(log=lines))
-    loaded = make_loaded([Told("starts", failed)])
-    result = grade(loaded, make_submission(), {"listen": make_run()})
-    text = printed(Sample(result, {}, make_facts()))
-    assert "printed       sys.exit(load())\n                x = a / b\n            Error\n" in text
+    lines = ("    sys.exit(load())", "             ^^^^^^", "    x = a / b", "        ~~^~~", "End")
+    text = judged([Told("starts", Finding.failed("x", "y", "z", Evidence(log=lines)))]).printed()
+    assert "printed       sys.exit(load())\n                x = a / b\n            End\n" in text
 
 
 def test_what_was_not_graded_has_no_score():
-    text = printed(not_graded())
+    text = not_graded().printed()
     assert "Score" not in text
     assert "! error" in text and "? / 1" in text
     assert "Not graded. Something of the grader or of the machine failed" in text
 
 
-def test_a_file_or_a_pipe_gets_no_escape_sequences():
-    assert "\x1b" not in printed(lost_points())
-
-
 def test_a_terminal_gets_colours_unless_they_are_unwanted(monkeypatch):
     monkeypatch.delenv("NO_COLOR", raising=False)
     options = {"force_terminal": True, "color_system": "standard"}
-    assert "\x1b[32m" in printed(lost_points(), **options)
+    assert "\x1b[32m" in lost_points().printed(**options)
+    assert "\x1b" not in lost_points().printed()
     monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b[32m" not in printed(lost_points(), **options)
+    assert "\x1b[32m" not in lost_points().printed(**options)
 
 
 @pytest.mark.parametrize(
@@ -200,21 +138,106 @@ def test_a_terminal_gets_colours_unless_they_are_unwanted(monkeypatch):
     ["[bold red]passed[/]", "[link=https://example.org]x[/link]", ":smile:", "[/]", "\\[b]"],
 )
 def test_markup_is_printed_as_it_is(attack):
-    assert attack in printed(everywhere(attack), 200)
+    assert attack in everywhere(attack).printed(200)
 
 
 @pytest.mark.parametrize("attack", ["\x1b[2J", "\x1b]0;title\x07", "\x9b31m", "\r\x08", "\u202e"])
 @pytest.mark.parametrize("width", [80, 120])
 def test_nothing_of_a_students_reaches_the_terminal_as_a_command(attack, width):
-    text = printed(everywhere(f"before{attack}after"), width)
+    text = everywhere(f"before{attack}after").printed(width)
     commands = {char for char in text if unicodedata.category(char) in ("Cc", "Cf")}
     assert commands == {"\n"}
 
 
 def test_a_terminal_without_unicode_gets_other_symbols():
     stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    print_grade(Console(file=stream, width=80), everywhere("Grüße").grade)
+    print_grade(Console(file=stream, width=80), "Grüße", everywhere("Grüße").result)
     stream.flush()
     text = stream.buffer.getvalue().decode("ascii")
     assert "x failed" in text and "+ passed" in text
     assert "Gr\\xfc\\xdfe" in text
+
+
+OTHER = Finding.failed("a node /bot_publisher", "a node /bot", "Look at super().__init__().")
+LATE = Finding.failed("on time", "late", "Use a timer.", credit=0.5)
+VERY_LATE = Finding.failed("on time", "very late", "Use a timer.", credit=0.25)
+LOST = """\
+✗ failed   was passed  The node is there  0 / 2
+– skipped  was passed  It is on time      0 / 3
+
+✗ failed  The node is there
+  expected  a node /bot_publisher
+  observed  no node at all
+  try next  Call rclpy.spin(node).
+  waiting   3 points wait for this
+
+Fix this first: The node is there. 1 other check waits for it.
+Score: 1 of 6 points, before 6
+"""
+WON = """\
+✓ passed  was failed   The node is there  2 / 2
+✓ passed  was skipped  It is on time      3 / 3
+
+Score: 6 of 6 points, before 1
+"""
+SAME = """\
+No check changed.
+
+✗ failed  The node is there
+  expected  a node /bot_publisher
+  observed  a node /bot
+  try next  Look at super().__init__().
+  waiting   3 points wait for this
+
+Fix this first: The node is there. 1 other check waits for it.
+Score: 1 of 6 points
+"""
+LESS = """\
+✗ failed  was failed  It is on time  0.75 / 3
+
+✗ failed  It is on time
+  expected  on time
+  observed  very late
+  try next  Use a timer.
+
+Fix this first: It is on time.
+Score: 3.75 of 6 points, before 4.5
+"""
+
+
+def graded(node=PASS, period=PASS, only=3):
+    checks = [
+        Told("builds", points=1),
+        Told("node", node, points=2, title="The node is there"),
+        Told("period", period, points=3, requires=("node",), title="It is on time"),
+    ]
+    return judged(checks[:only]).result
+
+
+def changes(before, after, width=80):
+    stream = io.StringIO()
+    print_changes(Console(file=stream, width=width, highlight=False), before, after)
+    return "\n".join(line.rstrip() for line in stream.getvalue().split("\n"))
+
+
+@pytest.mark.parametrize("width", [80, 120])
+@pytest.mark.parametrize(
+    ("before", "after", "text"),
+    [
+        (graded(), graded(FAIL), LOST),
+        (graded(FAIL), graded(), WON),
+        (graded(FAIL), graded(OTHER), SAME),
+        (graded(period=LATE), graded(period=VERY_LATE), LESS),
+    ],
+)
+def test_what_a_student_reads_after_a_save(before, after, text, width):
+    assert changes(before, after, width) == text
+
+
+def test_a_check_that_was_not_judged_before_is_new():
+    text = changes(graded(only=1), graded())
+    assert text.count("passed  new") == 2 and "Title of builds" not in text
+
+
+def test_changes_fit_into_a_narrow_terminal():
+    assert max(map(len, changes(graded(), graded(FAIL), 40).splitlines())) <= 40

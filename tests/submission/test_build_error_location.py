@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from textwrap import dedent
 
 import pytest
@@ -34,72 +33,35 @@ Traceback (most recent call last):
   File "/venv/setuptools/_distutils/core.py", line 267, in run_setup
     exec(code, g)
 """
+NEVER_CALLED = (
+    f"Starting >>> bot\n{RUN_SETUP}RuntimeError: 'distutils.core.setup()' was never called\n"
+)
 
 
 def culprit(log: str, *failed: str, sources: Sources = SOURCES) -> str:
     return str(find_build_error(dedent(log), failed or ("bot", "c"), sources))
 
 
-def test_setup_py_that_raises_is_blamed_with_its_line() -> None:
-    log = f'Starting >>> bot\n{RUN_SETUP}  File "<string>", line 5, in <module>\nValueError: boom\n'
-    assert culprit(log) == "src/bot/setup.py:5: ValueError: boom"
-
-
-READS_CONFIG = f"""\
-Starting >>> bot
-{RUN_SETUP}  File "<string>", line 7, in <module>
-  File "/venv/setuptools/dist.py", line 448, in _parse_config_files
-    parser.read_file(reader)
-"""
-
-
-@pytest.mark.parametrize(
-    ("error", "said"),
-    [
-        (
-            "MissingSectionHeaderError: File contains no section headers.\n"
-            "file: 'setup.cfg', line: 1\n'\\ufeff[develop]\\n'",
-            "1: begins with a byte order mark (BOM), so its first section is not found: save it "
-            "as UTF-8 without BOM",
-        ),
-        (
-            "MissingSectionHeaderError: File contains no section headers.\n"
-            "file: 'setup.cfg', line: 1\n'[develop\\n'",
-            "1: configparser.MissingSectionHeaderError: File contains no section headers.",
-        ),
-        (
-            "ParsingError: Source contains parsing errors: 'setup.cfg'\n\t[line  2]: 'script_dir'",
-            "2: configparser.ParsingError: Source contains parsing errors: 'setup.cfg'",
-        ),
-        (
-            "DuplicateOptionError: While reading from 'setup.cfg' [line  3]: option 'a' in "
-            "section 'b' already exists",
-            "3: configparser.DuplicateOptionError: While reading from 'setup.cfg' [line  3]: "
-            "option 'a' in section 'b' already exists",
-        ),
-    ],
-    ids=["BOM", "bracket", "no value", "twice"],
-)
-def test_setup_cfg_is_blamed_for_what_is_wrong_in_it_and_not_setup_py(
-    error: str, said: str
-) -> None:
-    sources = replace(SOURCES, files={*FILES, "src/bot/setup.cfg"})
-    log = f"{READS_CONFIG}configparser.{error}\n"
-    assert str(find_build_error(log, ("bot",), sources)) == f"src/bot/setup.cfg:{said}"
-    # Without one of its own it is setup.py that reads something else.
-    assert culprit(log).startswith("src/bot/setup.py:7: configparser.")
-
-
-def test_a_syntax_error_in_setup_py_is_blamed_with_its_line() -> None:
-    log = (
+LOGS = {
+    "setup.py raises": (
+        f'Starting >>> bot\n{RUN_SETUP}  File "<string>", line 5, in <module>\nValueError: boom\n',
+        "src/bot/setup.py:5: ValueError: boom",
+    ),
+    "setup.cfg cannot be read": (
+        f'Starting >>> bot\n{RUN_SETUP}  File "<string>", line 7, in <module>\n'
+        '  File "/venv/setuptools/dist.py", line 448, in _parse_config_files\n'
+        "configparser.MissingSectionHeaderError: File contains no section headers.\n"
+        "file: 'setup.cfg', line: 1\n",
+        "src/bot/setup.py:7: configparser.MissingSectionHeaderError: File contains no section "
+        "headers. file: 'setup.cfg', line: 1",
+    ),
+    "syntax of setup.py": (
         f'Starting >>> bot\n{RUN_SETUP}  File "<string>", line 7\n'
-        "    version='0.0.0'\n            ^^^^^^\nSyntaxError: invalid syntax\n"
-    )
-    assert culprit(log) == "src/bot/setup.py:7: SyntaxError: invalid syntax"
-
-
-def test_of_a_traceback_the_deepest_frame_of_the_student_is_blamed() -> None:
-    log = """\
+        "    version='0.0.0'\n            ^^^^^^\nSyntaxError: invalid syntax\n",
+        "src/bot/setup.py:7: SyntaxError: invalid syntax",
+    ),
+    "deepest frame": (
+        """\
         Starting >>> bot
         Traceback (most recent call last):
           File "src/bot/setup.py", line 3, in <module>
@@ -108,76 +70,50 @@ def test_of_a_traceback_the_deepest_frame_of_the_student_is_blamed() -> None:
             open("x")
           File "/usr/lib/python3.12/somewhere.py", line 1, in inner
         FileNotFoundError: [Errno 2] No such file or directory: 'x'
-    """
-    assert culprit(log) == (
-        "src/bot/bot/node.py:9: FileNotFoundError: [Errno 2] No such file or directory: 'x'"
-    )
-
-
-def test_tracebacks_of_colcon_blame_nobody() -> None:
-    log = """\
+        """,
+        "src/bot/bot/node.py:9: FileNotFoundError: [Errno 2] No such file or directory: 'x'",
+    ),
+    "colcon's own traceback": (
+        """\
         Starting >>> bot
         Traceback (most recent call last):
           File "/venv/colcon_core/executor/__init__.py", line 91, in __call__
             rc = await self.task(*args, **kwargs)
         subprocess.CalledProcessError: Command returned non-zero exit status 1.
-    """
-    assert culprit(log) == "None"
-
-
-def test_a_missing_setup_py_is_told() -> None:
-    log = """\
+        """,
+        "None",
+    ),
+    "no setup.py": (
+        """\
         Starting >>> bot
         AssertionError: Expected [...]: python: can't open file '/s/src/bot/setup.py': [Errno 2]
-    """
-    assert culprit(log) == "src/bot/setup.py: there is no setup.py"
-
-
-def test_what_setuptools_complains_of_is_found_in_setup_py() -> None:
-    log = "Starting >>> bot\nerror: package directory 'resource/' does not exist\n"
-    found = culprit(log)
-    assert found == "src/bot/setup.py:10: package directory 'resource/' does not exist"
-    log = "Starting >>> bot\nerror: can't copy 'resource/bot': doesn't exist\n"
-    assert culprit(log) == "src/bot/setup.py: can't copy 'resource/bot': doesn't exist"
-
-
-NEVER_CALLED = (
-    f"Starting >>> bot\n{RUN_SETUP}RuntimeError: 'distutils.core.setup()' was never called\n"
-)
-
-
-def test_a_setup_that_setuptools_refuses_is_explained_by_its_entry_points() -> None:
-    malformed = {"bot": (SourceError("src/bot/setup.py", 20, "the entry point 'x' is bad"),)}
-    sources = Sources(FILES, SOURCES.folders, SOURCES.texts, malformed)
-    assert (
-        culprit(NEVER_CALLED, sources=sources) == "src/bot/setup.py:20: the entry point 'x' is bad"
-    )
-
-
-def test_a_setup_that_is_never_called_is_told() -> None:
-    assert culprit(NEVER_CALLED) == (
-        "src/bot/setup.py: setup() is never called, or refuses its arguments"
-    )
-
-
-def test_a_setup_py_that_crashes_is_told() -> None:
-    log = "Starting >>> bot\nCommand '['python', 'setup.py']' died with <Signals.SIGSEGV: 11>.\n"
-    assert culprit(log) == "src/bot/setup.py: setup.py died with SIGSEGV"
-
-
-def test_data_files_in_absolute_places_are_told() -> None:
-    log = """\
+        """,
+        "src/bot/setup.py: there is no setup.py",
+    ),
+    "setuptools, quoted in setup.py": (
+        "Starting >>> bot\nerror: package directory 'resource/' does not exist\n",
+        "src/bot/setup.py:10: package directory 'resource/' does not exist",
+    ),
+    "setuptools": (
+        "Starting >>> bot\nerror: can't copy 'resource/bot': doesn't exist\n",
+        "src/bot/setup.py: can't copy 'resource/bot': doesn't exist",
+    ),
+    "setup() never called": (
+        NEVER_CALLED,
+        "src/bot/setup.py: setup() is never called, or refuses its arguments",
+    ),
+    "absolute data_files": (
+        """\
         Starting >>> bot
         Traceback (most recent call last):
           File "/venv/colcon_core/task/python/__init__.py", line 38, in get_data_files_mapping
             assert not os.path.isabs(dest)
         AssertionError
-    """
-    assert "data_files names an absolute folder" in culprit(log)
-
-
-def test_a_setup_py_that_prints_is_told() -> None:
-    log = """\
+        """,
+        "src/bot/setup.py: data_files names an absolute folder; write 'share/<package>'",
+    ),
+    "setup.py prints": (
+        """\
         Starting >>> bot
         Traceback (most recent call last):
           File "/venv/colcon_python_setup_py/python_setup_py.py", line 301, in _get_setup
@@ -185,36 +121,11 @@ def test_a_setup_py_that_prints_is_told() -> None:
           File "<unknown>", line 1
             Hello
         SyntaxError: invalid syntax
-    """
-    assert culprit(log).startswith("src/bot/setup.py: setup.py prints something")
-
-
-def test_while_colcon_looks_for_packages_the_folder_comes_after_the_traceback() -> None:
-    log = (
-        f'{RUN_SETUP}  File "<string>", line 1, in <module>\nZeroDivisionError: division by zero\n'
-        "ERROR:colcon.colcon_core.package_identification:Exception in package identification "
-        "extension 'python_setup_py' in 'src/bot': Command returned 1\nStarting >>> c\n"
-    )
-    assert culprit(log, "bot") == "src/bot/setup.py:1: ZeroDivisionError: division by zero"
-
-
-def test_a_package_that_was_finished_is_not_to_blame() -> None:
-    log = """\
-        Starting >>> bot
-          File "install/lib/python3.11/site-packages/bot/node.py", line 1
-            def main(:
-                     ^
-        SyntaxError: invalid syntax
-        Finished <<< bot
-        Starting >>> c
-        src/c/src/x.cpp:2:9: error: 'foo' was not declared in this scope
-    """
-    assert culprit(log, "c") == "src/c/src/x.cpp:2: 'foo' was not declared in this scope"
-    assert culprit(log, "bot") == "src/bot/bot/node.py:1: SyntaxError: invalid syntax"
-
-
-def test_an_error_of_cmake_is_blamed_with_its_first_paragraph() -> None:
-    log = """\
+        """,
+        "src/bot/setup.py: setup.py prints something, which colcon takes for its answer",
+    ),
+    "CMake": (
+        """\
         Starting >>> c
         CMake Error at CMakeLists.txt:4 (ament_packag):
           Unknown CMake command
@@ -222,29 +133,26 @@ def test_an_error_of_cmake_is_blamed_with_its_first_paragraph() -> None:
 
 
         -- Configuring incomplete, errors occurred!
-    """
-    assert culprit(log) == 'src/c/CMakeLists.txt:4: Unknown CMake command "ament_packag".'
-
-
-def test_a_parse_error_of_cmake_has_no_command() -> None:
-    log = "Starting >>> c\nCMake Error at CMakeLists.txt:4:\n  Parse error.  End of file reached.\n"
-    assert culprit(log) == "src/c/CMakeLists.txt:4: Parse error.  End of file reached."
-
-
-def test_an_error_inside_of_ros_is_blamed_on_who_called_it() -> None:
-    log = """\
+        """,
+        'src/c/CMakeLists.txt:4: Unknown CMake command "ament_packag".',
+    ),
+    "CMake's parser": (
+        "Starting >>> c\nCMake Error at CMakeLists.txt:4:\n  Parse error.  End of file reached.\n",
+        "src/c/CMakeLists.txt:4: Parse error.  End of file reached.",
+    ),
+    "CMake inside of ROS": (
+        """\
         Starting >>> c
         CMake Error at /opt/ros/jazzy/share/x/cmake/x.cmake:95 (message):
           x() was called without a name
         Call Stack (most recent call first):
           /opt/ros/jazzy/share/x/cmake/y.cmake:63 (x)
           CMakeLists.txt:5 (y)
-    """
-    assert culprit(log) == "src/c/CMakeLists.txt:5: x() was called without a name"
-
-
-def test_a_wrong_message_definition_is_blamed_itself() -> None:
-    log = """\
+        """,
+        "src/c/CMakeLists.txt:5: x() was called without a name",
+    ),
+    "interface": (
+        """\
         Starting >>> c
         CMake Error at /opt/ros/share/rosidl_adapter/cmake/adapt.cmake:57 (message):
           execute_process(python3 -m rosidl_adapter) returned error code 1:
@@ -257,36 +165,52 @@ def test_a_wrong_message_definition_is_blamed_itself() -> None:
 
         Call Stack (most recent call first):
           CMakeLists.txt:5 (rosidl_generate_interfaces)
-    """
-    assert culprit(log) == (
+        """,
         "src/c/msg/Bot.msg:2: rosidl_adapter.parser.InvalidResourceName: "
-        "'unit8' is an invalid message name."
-    )
-
-
-@pytest.mark.parametrize(
-    ("files", "message"),
-    [
-        (FILES | {"src/c/setup.py"}, "names no <build_type>; a Python package has ament_python"),
-        (FILES, "there is no CMakeLists.txt beside it"),
-    ],
-)
-def test_a_wrong_build_type_is_blamed_on_package_xml(files: set[str], message: str) -> None:
-    log = 'Starting >>> c\nCMake Error: The source "c" does not appear to contain CMakeLists.txt.\n'
-    found = culprit(log, sources=Sources(files, SOURCES.folders))
-    assert found.startswith(f"src/c/package.xml: {message}")
-
-
-def test_a_manifest_that_ament_refuses_is_blamed_with_the_line_that_we_know() -> None:
-    log = """\
+        "'unit8' is an invalid message name.",
+    ),
+    "no CMakeLists.txt": (
+        'Starting >>> c\nCMake Error: The source "c" does not appear to contain CMakeLists.txt.\n',
+        "src/c/package.xml: there is no CMakeLists.txt beside it, which this build type needs",
+    ),
+    "no build type": (
+        'Starting >>> bot\nCMake Error: "bot" does not appear to contain CMakeLists.txt.\n',
+        "src/bot/package.xml: names no <build_type>; a Python package has ament_python in its "
+        "<export>",
+    ),
+    "package.xml": (
+        """\
         Starting >>> c
         catkin_pkg.package.InvalidPackage: Error(s) in package 'src/c/package.xml':
         Invalid email "a@b.c" for person "Ada"
+        """,
+        'src/c/package.xml: Invalid email "a@b.c" for person "Ada"',
+    ),
+}
+
+
+@pytest.mark.parametrize(("log", "found"), LOGS.values(), ids=LOGS.keys())
+def test_the_first_place_that_a_log_names_is_found(log: str, found: str) -> None:
+    assert culprit(log) == found
+
+
+def test_a_setup_that_setuptools_refuses_is_explained_by_its_entry_points() -> None:
+    malformed = {"bot": (SourceError("src/bot/setup.py", 20, "the entry point 'x' is bad"),)}
+    sources = Sources(FILES, SOURCES.folders, SOURCES.texts, malformed)
+    found = culprit(NEVER_CALLED, sources=sources)
+    assert found == "src/bot/setup.py:20: the entry point 'x' is bad"
+
+
+def test_a_package_that_was_finished_is_no_reason() -> None:
+    log = """\
+        Starting >>> bot
+        error: a warning, in fact
+        Finished <<< bot
+        Starting >>> c
+        src/c/src/x.cpp:2:9: error: 'foo' was not declared in this scope
     """
-    assert culprit(log) == 'src/c/package.xml: Invalid email "a@b.c" for person "Ada"'
-    error = SourceError("src/c/package.xml", 6, "Invalid email")
-    sources = Sources(FILES, SOURCES.folders, manifest_errors={error.file: error})
-    assert culprit(log, sources=sources) == "src/c/package.xml:6: Invalid email"
+    assert culprit(log, "c") == "src/c/src/x.cpp:2: 'foo' was not declared in this scope"
+    assert culprit(log, "bot") == "src/bot/setup.py: a warning, in fact"
 
 
 def test_a_message_is_printable_and_not_endless() -> None:

@@ -26,7 +26,7 @@ def test_commands_have_names_in_lower_case_and_lines() -> None:
         "rosidl_generate_interfaces(bot msg/A.msg;msg/B.msg)",
         "rosidl_generate_interfaces( bot # the name\n\n  msg/A.msg\tmsg/B.msg\n)",
         "rosidl_generate_interfaces(bot [[msg/A.msg]] [=[msg/B.msg]=])",
-        "rosidl_generate_interfaces (bot #[[ no ]] msg/A.msg msg/B.msg)",
+        "rosidl_generate_interfaces (bot #[[ no ]] msg/A.msg msg/B.msg)\n#[[ open",
         'set(files "msg/A.msg" msg/B.msg)\nrosidl_generate_interfaces(bot ${files})',
         'set(files "msg/A.msg;msg/B.msg")\nrosidl_generate_interfaces(bot ${files})',
         "set(files msg/A.msg)\nlist(APPEND files msg/B.msg)\n"

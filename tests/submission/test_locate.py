@@ -192,7 +192,10 @@ def test_a_full_disk_is_no_fault_of_the_student(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr("grader.submission.intake.locate._copy_file", full)
-    with pytest.raises(GraderFault, match="No space left"), opened(tree.write({"a.py": "x"})):
+    with (
+        pytest.raises(GraderFault, match="this machine: the disk is full"),
+        opened(tree.write({"a.py": "x"})),
+    ):
         pass
 
 

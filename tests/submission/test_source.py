@@ -25,12 +25,7 @@ def error(data: bytes) -> SourceError:
 def test_a_syntax_error_is_told_as_python_tells_it() -> None:
     found = error(b"import rclpy\ndef main(:\n    pass\n")
     assert (found.line, found.message) == (2, "SyntaxError: invalid syntax")
-
-
-def test_wrong_indentation_is_told_as_such() -> None:
-    assert error(b"def main():\npass\n").message.startswith(
-        "IndentationError: expected an indented"
-    )
+    assert error(b"def main():\npass\n").message.startswith("IndentationError: expected")
 
 
 @pytest.mark.parametrize(
@@ -76,11 +71,8 @@ def test_source_that_overflows_the_parser_is_an_error(data: bytes) -> None:
     error(data)
 
 
-def test_giant_source_is_not_even_read() -> None:
+def test_giant_source_and_a_huge_tree_are_not_kept() -> None:
     assert "larger than 2 MiB" in error(b"#" * (MAX_BYTES + 1)).message
-
-
-def test_a_small_file_with_a_huge_tree_is_not_kept() -> None:
     assert "holds too much" in error(b"a," * (MAX_BYTES // 2)).message
 
 
@@ -89,9 +81,6 @@ def test_many_files_take_no_more_than_a_submission_may() -> None:
     found = [parse(b"a," * 2000, f"{number}.py", allowance) for number in range(10)]
     assert [isinstance(item, ast.Module) for item in found] == [True] * 3 + [False] * 7
     assert "more Python than anybody writes" in str(found[-1])
-    slow = Allowance(seconds=0.0)
-    assert "more Python" in str(parse(b"#" * 100_000, "node.py", slow))
-    assert isinstance(parse(b"#" * 100, "node.py", slow), ast.Module)
 
 
 def test_a_string_that_is_no_text_can_be_written_down() -> None:

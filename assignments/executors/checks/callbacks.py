@@ -16,7 +16,7 @@ from grader.checks.need import Published, Recorded
 from grader.measure.period import Interval, PeriodLimits, forgiven, judge
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, codes, counted, listing
-from grader.diagnosis.delivery import why_not_sent
+from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.process.process_exit import why_ended
 from grader.recording.model import NS, Recording

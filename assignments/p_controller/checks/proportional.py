@@ -12,14 +12,12 @@ from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
-from grader.measure.motion.answer import MOST_BEHIND, answers
+from grader.measure.motion.steering import MOST_BEHIND, Sample, answers
 from grader.measure.motion.approach import Approach
 from grader.diagnosis.motion.no_motion import approach
 from grader.measure.motion.command import command_topic, commands
-from grader.measure.motion.control_law import Law, Sample, LawVerdict, examine
 from grader.measure.motion.quantities import metres
 from grader.checks.motion.robot_check import RobotParameters
-from grader.measure.motion.steering import LEAST_SAMPLES, at_the_goal, on_the_way
 from grader.checks.reference import GoalPose
 from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
@@ -31,6 +29,8 @@ from grader.diagnosis.no_messages import why_silent
 from grader.recording.model import NS, Recording
 from grader.spec.quantity import Frequency, PositiveLength, Ratio
 from grader.spec.unit import format_duration
+
+from .control_law import LEAST_SAMPLES, Law, LawVerdict, at_the_goal, examine, on_the_way
 
 _GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 _MOST_POINTS = 400

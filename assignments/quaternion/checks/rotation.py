@@ -18,7 +18,7 @@ from grader.checks.need import Published, Recorded
 from grader.checks.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.wrong_value import was_integer, what_was_put
-from grader.diagnosis.delivery import why_not_sent
+from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_answer import why_raised
 from grader.diagnosis.no_messages import why_silent

@@ -30,7 +30,7 @@ from grader.checks.value import EXACT
 from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_raised, why_unanswered
-from grader.diagnosis.no_server import ACTION, is_offered
+from grader.diagnosis.no_endpoint import ACTION, is_offered
 from grader.recording.interaction import Goal
 from grader.recording.model import NS, Recording
 from grader.spec.name import InterfaceName, TopicName

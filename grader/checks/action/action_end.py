@@ -10,7 +10,7 @@ from grader.checks.finding import Finding
 from grader.checks.need import GoalSent
 from grader.checks.requests import the_goal, why_late
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_server import ACTION
+from grader.diagnosis.no_endpoint import ACTION
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.unended_goal import ended_alone, why_no_end, why_not_canceled
 from grader.recording.interaction import Goal

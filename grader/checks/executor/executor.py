@@ -29,7 +29,6 @@ from grader.spec.unit import format_duration
 _FORGIVING_FROM = 3
 _MOST_MOMENTS = 5
 _LONG_NS = NS
-"""In this time the graph tells which services a node has, several times over."""
 _MOST_HELD_NS = 3 * NS
 """Longer than the tracer holds a publisher; a process could declare any time."""
 
@@ -68,8 +67,8 @@ class _Answers:
     """Calls to one node, and those of them that were not answered in time."""
 
     node: str
-    judged: tuple[Call, ...]
-    late: tuple[Call, ...]
+    judged: list[Call]
+    late: list[Call]
 
     def enough(self, share: float, late: int) -> bool:
         """Whether so many late calls are allowed."""
@@ -111,12 +110,12 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
         if parameters.typically is not None:
             expected += f", the median within {format_duration(parameters.typically)}"
         busy = _why_mostly_late(recording, parameters, groups)
-        if busy is not None:
-            return busy.finding(expected)
-        return Finding.passed(expected, _summary(groups, parameters), _evidence(recording, groups))
-    if all(
-        group.enough(parameters.share, _unexcused(recording, group, parameters)) for group in bad
-    ):
+        summary = _summary(groups, parameters)
+        evidence = _evidence(recording, groups)
+        return busy.finding(expected) if busy else Finding.passed(expected, summary, evidence)
+    # Of the late calls, those that were late for another reason than what the host took.
+    own = [sum(_own_s(recording, call) > parameters.within for call in one.late) for one in bad]
+    if all(one.enough(parameters.share, late) for one, late in zip(bad, own, strict=True)):
         return Finding.to_repeat(
             expected, f"{_summary(bad, parameters)}, but the machine took the time from the process"
         )
@@ -134,15 +133,12 @@ def _answers(recording: Recording, node: str, parameters: Responsive) -> _Answer
         # An answer in its place, by a service of another node's, says nothing of this one.
         if call.service not in executor_services(node) or call.service in others:
             continue
-        answered = call.answered_ns is not None and (
-            call.answered_ns - call.requested_ns <= within_ns
-        )
+        answered = call.answered_ns is not None and _wait_s(recording, call) <= parameters.within
         # An answer in time is one, however late or early it was asked for.
         if answered or begin_ns <= call.requested_ns <= recording.stop_ns - within_ns:
             judged.append(call)
-            if not answered:
-                late.append(call)
-    return _Answers(node, tuple(judged), tuple(late))
+            late += [] if answered else [call]
+    return _Answers(node, judged, late)
 
 
 def _working_from(recording: Recording, node: str) -> int:
@@ -173,11 +169,6 @@ def _working_from(recording: Recording, node: str) -> int:
     return max([begin_ns, *(time_ns for time_ns in held if time_ns < begin_ns + _MOST_HELD_NS)])
 
 
-def _unexcused(recording: Recording, group: _Answers, parameters: Responsive) -> int:
-    """How many calls were late for another reason than what the host took."""
-    return sum(_own_s(recording, call) > parameters.within for call in group.late)
-
-
 def _wait_s(recording: Recording, call: Call) -> float:
     """How long a call waited for its answer."""
     return ((call.answered_ns or recording.stop_ns) - call.requested_ns) / NS
@@ -200,7 +191,7 @@ def _why_mostly_late(
         observed = f"{code(group.node)} answered after {format_duration(median_s)} (median)"
         if median(_own_s(recording, call) for call in group.judged) <= allowed_s:
             return Cause.to_repeat(f"{observed}, but the machine took the time from the process")
-        late = tuple(call for call in group.judged if _wait_s(recording, call) > allowed_s)
+        late = [call for call in group.judged if _wait_s(recording, call) > allowed_s]
         return Cause(
             f"{observed}: callbacks keep the executor busy most of the time",
             "A callback does its work and returns at once: no time.sleep() in it. The timer calls "
@@ -257,7 +248,18 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
     ended = why_ended(recording)
     if ended is not None:
         return ended.finding(expected)
-    lacking = [name for name in names if _is_without_services(recording, name)]
+    # In this time the graph tells which services a node has, several times over.
+    seen = {
+        item.name
+        for item in recording.student_nodes
+        if recording.stop_ns - item.appeared_ns > _LONG_NS
+    }
+    offered = {(service.node, service.name) for service in recording.services}
+    lacking = [
+        name
+        for name in names
+        if name in seen and offered.isdisjoint((name, one) for one in executor_services(name))
+    ]
     if lacking:
         # What a process declares would be all that there is, and it can declare anything.
         busy = was_held_up(recording)
@@ -282,14 +284,6 @@ def _unasked(recording: Recording, names: list[str], expected: str) -> Finding:
         f"no call to {codes(executor_services(name)[0] for name in names)} could be judged, of "
         f"{counted(len(recording.calls), 'call')} that the probe sent",
     )
-
-
-def _is_without_services(recording: Recording, name: str) -> bool:
-    """Whether a node was there for long, and offered nothing that its executor answers."""
-    offered = {service.name for service in recording.services if service.node == name}
-    appeared = [node.appeared_ns for node in recording.student_nodes if node.name == name]
-    long = bool(appeared) and recording.stop_ns - min(appeared) > _LONG_NS
-    return long and offered.isdisjoint(executor_services(name))
 
 
 def _summary(groups: list[_Answers], parameters: Responsive) -> str:

@@ -16,11 +16,12 @@ from grader.checks.interface.definition_differences import (
 )
 from grader.checks.wording import code, codes, listing
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_definition import InterfaceName, find_definition
 from grader.diagnosis.not_built import existing_package, why_no_manifest
 from grader.diagnosis.not_generated import (
     GENERATORS,
     GROUP,
+    InterfaceName,
+    find_definition,
     used_packages,
     why_not_generated,
 )

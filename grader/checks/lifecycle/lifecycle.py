@@ -15,8 +15,8 @@ from grader.checks.requests import timeline
 from grader.checks.service.service import judged_calls, why_slow
 from grader.checks.wording import code, listing
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_endpoint import SERVICE, offered
 from grader.diagnosis.no_node import why_not_node
-from grader.diagnosis.no_server import SERVICE, offered
 from grader.recording.model import Call, Recording
 from grader.spec.name import QualifiedNodeName
 

@@ -138,49 +138,38 @@ def contains(recording: Recording, parameters: Contains) -> Finding:
 
 
 def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]) -> Cause:
-    missing = parameters.why_no_node(recording)
-    if missing is not None:
-        return missing
-    method = {"WARN": "warning"}.get(
-        parameters.level or "INFO", (parameters.level or "INFO").lower()
-    )
-    call = f"self.get_logger().{method}('...')"
+    level = parameters.level or "INFO"
+    call = f"self.get_logger().{'warning' if level == 'WARN' else level.lower()}('...')"
     records = parameters.of(recording)
     other = [item for item in records if parameters.says(item.text) and item not in found]
     if other:
-        return Cause(
-            f"{quote(other[0].text)} is logged as {other[0].level}, not as {parameters.level}",
-            f"Call {call}.",
-            _evidence(recording, other),
-        )
+        observed = f"{quote(other[0].text)} is logged as {other[0].level}, not as {level}"
+        return Cause(observed, f"Call {call}.", _evidence(recording, other))
     seen = f"only {len(found)} of them" if found else "none"
-    ended = why_ended(recording, seen)
-    if ended is not None:
-        return ended
     lost = sum(process.dropped_bytes for process in recording.processes)
-    if lost:
+    cause = parameters.why_no_node(recording) or why_ended(recording, seen)
+    if cause is None and lost:
         return Cause(f"{seen}, but {lost} bytes of output were not kept", "Log less.", ours=True)
-    idle = why_not_called(recording, seen, {node.name for node in recording.student_nodes})
-    if idle is not None:
-        return idle
+    nodes = {node.name for node in recording.student_nodes}
+    cause = cause or why_not_called(recording, seen, nodes)
+    if cause is not None:
+        return cause
     lines = [line for line in printed(recording) if parameters.says(line.text)]
     if lines and not found:
+        moment = Moment("printed", recording.since_launch_s(lines[0].time_ns))
         return Cause(
             f"{quote(lines[0].text)} is printed, not logged",
             f"Write {call} in place of print().",
-            Evidence(
-                moments=(Moment("printed", recording.since_launch_s(lines[0].time_ns)),),
-                log=tuple(line.text for line in lines[:_SHOWN]),
-            ),
+            Evidence(moments=(moment,), log=tuple(line.text for line in lines[:_SHOWN])),
         )
     hint = f"Is the line reached that calls {call} with such a text?"
     if not records:
         nothing = until_the_end(recording, "nothing logged when the observation ended")
         return Cause("the node logs nothing", hint, Evidence(moments=(nothing,)))
     if not found:
+        near = nearest(parameters.text or "", [item.text for item in records])
         seen = f"{counted(len(records), 'log message')}, but none of these"
-    near = nearest(parameters.text or "", [item.text for item in records])
-    seen += f"; similar is {quote(near)}" if near and not found else ""
+        seen += f"; similar is {quote(near)}" if near else ""
     return Cause(seen, hint, _evidence(recording, found or records[-_SHOWN:]))
 
 
@@ -207,11 +196,10 @@ def level(recording: Recording, parameters: Worst) -> Finding:
     severe = [item for item in records if item.level in above]
     if not severe:
         return Finding.passed(expected, f"{counted(len(records), 'log message')}, none above it")
-    first = severe[0]
+    observed = f"{counted(len(severe), 'log message')} above it, the first {severe[0].level}"
     return Finding.failed(
         expected,
-        f"{counted(len(severe), 'log message')} above it, the first {first.level}: "
-        f"{quote(first.text)}",
+        f"{observed}: {quote(severe[0].text)}",
         "Correct what it warns about; what is no problem is logged with "
         "self.get_logger().info('...') or debug('...').",
         _evidence(recording, severe),
@@ -240,7 +228,15 @@ class Rate(Matching):
         """Lowest and highest rate."""
         if self.rate is not None:
             return self.rate * (1.0 - self.tolerance), self.rate * (1.0 + self.tolerance)
-        return self.at_least or 0.0, self.at_most if self.at_most is not None else float("inf")
+        return self.at_least or 0.0, math.inf if self.at_most is None else self.at_most
+
+    @property
+    def often(self) -> str:
+        """How often, in words."""
+        if self.rate is not None:
+            return f"{self.rate:g} Hz (within {percent(self.tolerance)})"
+        bounds = {"at least": self.at_least, "at most": self.at_most}
+        return " and ".join(f"{name} {hz:g} Hz" for name, hz in bounds.items() if hz is not None)
 
 
 @check("log.rate", Subject.RECORDING, Rate)
@@ -252,13 +248,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     node must log until the end of the observation: the last two periods may be silent.
     """
     low_hz, high_hz = parameters.bounds_hz
-    if parameters.rate is not None:
-        often = f"{parameters.rate:g} Hz (within {percent(parameters.tolerance)})"
-    else:
-        parts = [f"at least {low_hz:g} Hz"] if parameters.at_least is not None else []
-        parts += [f"at most {high_hz:g} Hz"] if parameters.at_most is not None else []
-        often = " and ".join(parts)
-    expected = f"{parameters.words} at {often}"
+    expected = f"{parameters.words} at {parameters.often}"
     found = parameters.found(recording)
     begin_ns, end_ns = recording.matched_ns or recording.launched_ns, recording.stop_ns
     periods = float(len(found))

@@ -21,6 +21,9 @@ _YAW = re.compile(r"yaw\((?P<path>.*)\)")
 _PATH: TypeAdapter[str] = TypeAdapter(FieldPath)
 _QUATERNION = ("x", "y", "z", "w")
 
+Row = tuple[float, ...]
+"""A number for each field."""
+
 
 @dataclass(frozen=True)
 class SourceValue:
@@ -113,15 +116,17 @@ class Sample:
         number: Which message on its topic, from 1.
         values: The numbers in its fields; NaN for an item that its array does not have.
         window: Indices of those sources; the last one is the newest that there was.
-        excused: How many of them, the oldest, are right only by what the host took.
+        errors: How far the values are off, a row for each source with a number for each field.
+        excused: How many of the sources, the oldest, are right only by what the host took.
         is_known: Whether the recording has all of those sources. It may lack one that was lost
             on its way, and what was published after the newest one that it has.
     """
 
     number: int
     message: Message
-    values: tuple[float, ...]
+    values: Row
     window: range
+    errors: tuple[Row, ...]
     excused: int
     is_known: bool
 
@@ -132,82 +137,68 @@ class DerivedMessages:
 
     Attributes:
         sources: The messages that they come from, oldest first; at least one.
-        table: The right numbers of each source, one for each field.
+        table: The right numbers, a row for each source with a number for each field.
     """
 
     fields: tuple[str, ...]
     values: tuple[SourceValue, ...]
     tolerance: float
     sources: tuple[Message, ...]
-    table: tuple[tuple[float, ...], ...]
-    samples: tuple[Sample, ...]
+    table: tuple[Row, ...]
 
     @classmethod
     def of(
-        cls,
-        recording: Recording,
-        messages: Sequence[Message],
-        sources: tuple[Message, ...],
-        fields: Mapping[str, str],
-        tolerance: float,
-        within_s: float,
+        cls, sources: tuple[Message, ...], fields: Mapping[str, str], tolerance: float
     ) -> DerivedMessages:
+        """Read the sources; raises NoSuchField where a field is not there, or holds no number."""
+        values = tuple(map(SourceValue.of, fields.values()))
+        table = tuple(tuple(one.number(item.value) for one in values) for item in sources)
+        return cls(tuple(fields), values, tolerance, sources, table)
+
+    def samples(
+        self, recording: Recording, messages: Sequence[Message], within_s: float
+    ) -> list[Sample]:
         """Look up which sources each message may be made of.
 
         Args:
             recording: The run; what the host took from the node makes older sources right.
-            sources: Oldest first; at least one.
-
-        Raises:
-            NoSuchField: A field does not exist, or holds no number.
         """
-        values = tuple(map(SourceValue.of, fields.values()))
-        table = tuple(tuple(one.number(item.value) for one in values) for item in sources)
-        stamps = [item.stamp_ns for item in sources]
-        lost_before = [0, *accumulate(lost(a, b) for a, b in pairwise(sources))]
-        within_ns = round(within_s * NS)
+        stamps = [item.stamp_ns for item in self.sources]
+        lost_before = [0, *accumulate(lost(a, b) for a, b in pairwise(self.sources))]
         samples = []
         for number, message in enumerate(messages, start=1):
-            numbers = tuple(_number(message, field) for field in fields)
+            values = tuple(_number(message, field) for field in self.fields)
             last = bisect_right(stamps, message.stamp_ns)
             if not last:
                 continue
-            due_ns = message.stamp_ns - within_ns
+            due_ns = message.stamp_ns - round(within_s * NS)
             begin_ns = due_ns - round(recording.stolen_s(due_ns, message.stamp_ns) * NS)
             # Where the source is silent its newest values stay the right ones.
             first, due = (min(bisect_left(stamps, at), last - 1) for at in (begin_ns, due_ns))
-            is_known = last < len(sources) and lost_before[first] == lost_before[last]
+            is_known = last < len(stamps) and lost_before[first] == lost_before[last]
             window = range(first, last)
-            samples.append(Sample(number, message, numbers, window, due - first, is_known))
-        return cls(tuple(fields), values, tolerance, sources, table, tuple(samples))
+            errors = self.errors(values, window)
+            samples.append(Sample(number, message, values, window, errors, due - first, is_known))
+        return samples
 
-    def fits(
-        self, sample: Sample, window: range | None = None, fields: Sequence[int] | None = None
-    ) -> bool:
-        """Whether the values of a message are those of one source.
+    def errors(self, values: Row, window: range) -> tuple[Row, ...]:
+        """How far values are off from those of some sources."""
+        return tuple(
+            tuple(one.error(*pair) for one, *pair in zip(self.values, values, right, strict=True))
+            for right in self.table[window.start : window.stop]
+        )
 
-        Args:
-            window: Sources to look at; by default its own window.
-            fields: Indices of the fields to look at; by default all.
+    def fitting(self, errors: Sequence[Row], field: int | None = None) -> list[int]:
+        """The rows of errors in which one field, or every field, is within the tolerance.
+
+        NaN never is.
         """
-        indices = range(len(self.fields)) if fields is None else fields
-        # NaN is never small enough.
-        return any(
-            all(
-                abs(self.values[index].error(sample.values[index], self.table[row][index]))
-                <= self.tolerance
-                for index in indices
-            )
-            for row in reversed(sample.window if window is None else window)
-        )
-
-    def error(self, sample: Sample, index: int) -> float:
-        """How far the value of one field is off, at best."""
-        errors = (
-            self.values[index].error(sample.values[index], self.table[row][index])
-            for row in sample.window
-        )
-        return min(errors, key=abs)
+        fields = slice(None) if field is None else slice(field, field + 1)
+        return [
+            index
+            for index, row in enumerate(errors)
+            if all(abs(error) <= self.tolerance for error in row[fields])
+        ]
 
 
 def _number(message: Message, field: str) -> float:

@@ -10,7 +10,6 @@ from pydantic import Field
 from grader.checks.check import NamedFields, Parameters, Subject, check
 from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
-from grader.checks.first_seen import endpoints_seen
 from grader.checks.messages.derived_messages import (
     DerivedMessages,
     Sample,
@@ -20,14 +19,13 @@ from grader.checks.messages.derived_messages import (
 from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField
 from grader.checks.wording import code, codes, counted, listing
-from grader.diagnosis.few_messages import why_few
-from grader.diagnosis.no_messages import why_silent
-from grader.recording.model import NS, Kind, Recording
+from grader.diagnosis.no_messages import why_few, why_silent
+from grader.recording.model import NS, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
 from grader.spec.unit import format_duration
 
-# What varies by fewer tolerances cannot tell one value from another.
+# A source that varies by fewer tolerances cannot tell a right value from a wrong one.
 _CONCLUSIVE = 4.0
 _MOST_EXPLAINED = 100
 # Share of the messages for which an explanation must hold.
@@ -75,7 +73,7 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
 
     Every message must hold the values of one message of the source that was published at most
     `within` before it; what the machine took from the node is not held against it. Angles are
-    compared on the circle. What is published before the source has said anything does not count.
+    compared on the circle. What is published before the first message of the source does not count.
     """
     topic, source = code(parameters.topic), code(parameters.source)
     pairs = listing(f"{code(field)} = {code(value)}" for field, value in parameters.fields.items())
@@ -86,37 +84,30 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
     if not sources:
         return Finding.error(expected, f"nothing was recorded on {source}, so it cannot be judged")
     try:
-        derived = DerivedMessages.of(
-            recording,
-            messages,
-            sources,
-            parameters.fields,
-            parameters.tolerance,
-            parameters.within,
-        )
+        derived = DerivedMessages.of(sources, parameters.fields, parameters.tolerance)
+        samples = derived.samples(recording, messages, parameters.within)
     except NoSuchField as error:
         return Finding.error(expected, f"the assignment expects what does not exist: {error}")
     columns = zip(*derived.table, strict=True)
     if not all(_spread(column) > _CONCLUSIVE * parameters.tolerance for column in columns):
-        return _inconclusive(recording, parameters, expected)
-    judged, wrong = _judged(recording, parameters, derived)
+        return Finding.error(expected, f"the values on {source} hardly change: it cannot be judged")
+    right = {sample.number for sample in samples if derived.fitting(sample.errors)}
+    judged = _judged(recording, parameters, samples, right)
     if len(judged) < parameters.at_least:
         if len(messages) < parameters.at_least:
             return why_few(recording, parameters.topic, parameters.at_least).finding(expected)
+        last_s = recording.since_launch_s(messages[-1].stamp_ns)
         return Finding.failed(
             expected,
             f"of {counted(len(messages), 'message')} only {len(judged)} came after the first one "
             f"on {source}",
             f"Publish from the callback of {source}, or from a timer that goes on.",
-            Evidence(
-                moments=(
-                    Moment("the last message", recording.since_launch_s(messages[-1].stamp_ns)),
-                )
-            ),
+            Evidence(moments=(Moment("the last message", last_s),)),
         )
+    wrong = [sample for sample in judged if sample.number not in right]
     if wrong:
-        return _failure(recording, parameters, derived, judged, wrong, expected)
-    late = [one for one in judged if not derived.fits(one, one.window[one.excused :])]
+        return _failure(recording, source, derived, judged, wrong, expected)
+    late = [one for one in judged if not derived.fitting(one.errors[one.excused :])]
     if late:
         return Finding.to_repeat(
             expected,
@@ -129,88 +120,63 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
 
 
 def _judged(
-    recording: Recording, parameters: Follows, derived: DerivedMessages
-) -> tuple[list[Sample], list[Sample]]:
-    """The messages that count, and those of them that are wrong."""
+    recording: Recording, parameters: Follows, samples: list[Sample], right: set[int]
+) -> list[Sample]:
+    """The messages that count."""
     # One that fits nothing may be made of a message that was not recorded.
-    fits = {sample.number: derived.fits(sample) for sample in derived.samples}
-    known = [sample for sample in derived.samples if sample.is_known or fits[sample.number]]
-    begin_ns = derived.sources[0].stamp_ns
+    known = [sample for sample in samples if sample.is_known or sample.number in right]
+    begin_ns = recording.on(parameters.source)[0].stamp_ns
     settled_ns = begin_ns + round(parameters.settle * NS)
     settled_ns += round(recording.stolen_s(begin_ns, settled_ns) * NS)
-    first = next((index for index, sample in enumerate(known) if fits[sample.number]), 0)
+    first = next((index for index, sample in enumerate(known) if sample.number in right), 0)
     if first and known[first - 1].message.stamp_ns > settled_ns:
         first = 0
-    judged = known[first:]
-    return judged, [sample for sample in judged if not fits[sample.number]]
-
-
-def _spread(numbers: Sequence[float]) -> float:
-    return max(numbers) - min(numbers)
-
-
-def _inconclusive(recording: Recording, parameters: Follows, expected: str) -> Finding:
-    """The finding where the source hardly changes: so a wrong value would not show."""
-    scene, source = recording.scene, code(parameters.source)
-    own = recording.student_endpoints(Kind.PUBLISHER, scene.command_topic) if scene else ()
-    if scene is None or not own:
-        return Finding.error(expected, f"the values on {source} hardly change: it cannot be judged")
-    command = code(scene.command_topic)
-    return Finding.failed(
-        expected,
-        f"the node publishes on {command} itself and keeps the robot from moving as it should, so "
-        f"that nothing can be followed on {source}",
-        f"Remove the publisher on {command}: this node only listens.",
-        Evidence(moments=endpoints_seen(recording, own)),
-    )
+    return known[first:]
 
 
 def _failure(
     recording: Recording,
-    parameters: Follows,
+    source: str,
     derived: DerivedMessages,
-    judged: Sequence[Sample],
-    wrong: Sequence[Sample],
+    judged: list[Sample],
+    wrong: list[Sample],
     expected: str,
 ) -> Finding:
-    first = wrong[len(wrong) // 2]
-    newest = derived.table[first.window[-1]]
+    sample = wrong[len(wrong) // 2]
+    newest = derived.table[sample.window[-1]]
     some = wrong[:: max(1, len(wrong) // _MOST_EXPLAINED)]
     seen = judged[:: max(1, len(judged) // _MOST_EXPLAINED)]
     bad = [
         index
         for index in range(len(derived.fields))
-        if any(not derived.fits(sample, fields=[index]) for sample in some)
+        if not all(derived.fitting(one.errors, index) for one in some)
     ]
     late_s = _lag_s(derived, some)
     if late_s is not None:
-        observed = (
-            f"the values are those of {code(parameters.source)} {format_duration(late_s)} earlier"
-        )
+        observed = f"the values are those of {source} {format_duration(late_s)} earlier"
         hint = (
-            f"Publish from the callback of {code(parameters.source)}, or store its newest message "
-            "there and publish that. A callback that sleeps lets the newer ones wait."
+            f"Publish from the callback of {source}, or store its newest message there and "
+            "publish that. A callback that sleeps lets the newer ones wait."
         )
     elif not bad:
-        observed = f"the values are of different moments of {code(parameters.source)}"
+        observed = f"the values are of different moments of {source}"
         hint = "Fill all fields from one message: `msg` of the callback."
     else:
         observed = listing(
-            f"{code(derived.fields[index])} = {first.values[index]:.4g} instead of "
+            f"{code(derived.fields[index])} = {sample.values[index]:.4g} instead of "
             f"{newest[index]:.4g}{_explanation(derived, seen, some, index)}"
             for index in bad
         )
         hint = (
-            f"Set {codes(derived.fields[index] for index in bad)} in the callback of "
-            f"{code(parameters.source)}, from {codes(derived.values[index].text for index in bad)} "
-            "of its message."
+            f"Set {codes(derived.fields[index] for index in bad)} in the callback of {source}, "
+            f"from {codes(derived.values[index].text for index in bad)} of its message."
         )
     rows = tuple(
         (field, f"{wanted:.6g}", f"{value:.6g}")
-        for field, wanted, value in zip(derived.fields, newest, first.values, strict=True)
+        for field, wanted, value in zip(derived.fields, newest, sample.values, strict=True)
     )
-    label = f"message {first.number}"
-    moment = Moment(f"{label} is wrong", recording.since_launch_s(first.message.stamp_ns))
+    label = f"message {sample.number}"
+    moment = Moment(f"{label} is wrong", recording.since_launch_s(sample.message.stamp_ns))
     shown = bad or range(len(derived.fields))
     return Finding.failed(
         expected,
@@ -224,22 +190,21 @@ def _failure(
     )
 
 
-def _lag_s(derived: DerivedMessages, wrong: Sequence[Sample]) -> float | None:
+def _lag_s(derived: DerivedMessages, wrong: list[Sample]) -> float | None:
     """How old the values are, if all wrong messages have those of an older source."""
     ages = []
     for sample in wrong:
-        older = reversed(range(sample.window[0]))
-        row = next((row for row in older if derived.fits(sample, range(row, row + 1))), None)
-        if row is None:
+        older = derived.fitting(derived.errors(sample.values, range(sample.window[0])))
+        if not older:
             return None
-        ages.append((sample.message.stamp_ns - derived.sources[row].stamp_ns) / NS)
+        ages.append((sample.message.stamp_ns - derived.sources[older[-1]].stamp_ns) / NS)
     still = _spread([sample.values[0] for sample in wrong]) <= derived.tolerance
     # A value that never changes is old as well, but that says less.
     return None if still and len(wrong) > 1 else sorted(ages)[len(ages) // 2]
 
 
 def _explanation(
-    derived: DerivedMessages, seen: Sequence[Sample], wrong: Sequence[Sample], index: int
+    derived: DerivedMessages, seen: list[Sample], wrong: list[Sample], index: int
 ) -> str:
     """What stands in a wrong field, as a clause; empty where the messages do not tell.
 
@@ -252,13 +217,13 @@ def _explanation(
         return f": it is not a finite number{short if '[' in derived.fields[index] else ''}"
     if len(numbers) > 1 and _spread(numbers) <= 0.0:
         return ": it is always the same" if numbers[0] else ": it is always 0, and perhaps not set"
-    wrong = [sample for sample in wrong if not derived.fits(sample, fields=[index])]
+    wrong = [sample for sample in wrong if not derived.fitting(sample.errors, index)]
     rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
-    mistakes = [list(derived.values[index].mistakes(derived.sources[row].value)) for row in rows]
+    mistakes = [derived.values[index].mistakes(derived.sources[row].value) for row in rows]
     # Arrays of the sources may have other lengths, which come last: those are left out.
     for same_mistake in zip(*mistakes, strict=False):
         series = {row: number for row, (_, number) in zip(rows, same_mistake, strict=True)}
-        if _spread(tuple(series.values())) > derived.tolerance and all(
+        if _spread(list(series.values())) > derived.tolerance and all(
             _share(samples, index, series, derived.tolerance) >= _NEARLY_ALL
             for samples in (seen, wrong)
         ):
@@ -266,8 +231,12 @@ def _explanation(
     return ""
 
 
+def _spread(numbers: Sequence[float]) -> float:
+    return max(numbers) - min(numbers)
+
+
 def _share(
-    samples: Sequence[Sample], index: int, series: Mapping[int, float], tolerance: float
+    samples: list[Sample], index: int, series: Mapping[int, float], tolerance: float
 ) -> float:
     """Share of the messages in which a field holds one of the numbers of a mistake."""
     hits = sum(
@@ -277,11 +246,10 @@ def _share(
     return hits / len(samples)
 
 
-def _plot(
-    recording: Recording, derived: DerivedMessages, judged: Sequence[Sample], index: int
-) -> Plot:
+def _plot(recording: Recording, derived: DerivedMessages, judged: list[Sample], index: int) -> Plot:
     field = derived.fields[index]
-    errors = [derived.error(sample, index) for sample in judged]
+    # The least error is that of the source that the value comes from.
+    errors = [min((row[index] for row in sample.errors), key=abs) for sample in judged]
     finite = [(s, e) for s, e in zip(judged, errors, strict=True) if math.isfinite(e)]
     return Plot(
         f"{field}: how far it is off",

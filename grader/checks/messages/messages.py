@@ -22,10 +22,8 @@ from grader.checks.value import (
     tolerance_of,
 )
 from grader.checks.wording import code, codes, counted, value_text
-from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.explanation import explain
-from grader.diagnosis.few_messages import why_few
-from grader.diagnosis.no_messages import why_silent, why_unreadable
+from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
 from grader.measure.numbering import published
 from grader.recording.model import Kind, Message, Recording

@@ -14,8 +14,7 @@ from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Recorded
 from grader.checks.value import NoSuchField, same
 from grader.checks.wording import code, counted, value_text
-from grader.diagnosis.few_messages import why_few
-from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_messages import why_few, why_silent
 from grader.measure.numbering import is_numbered
 from grader.recording.model import Recording
 from grader.spec.name import TopicName
@@ -100,9 +99,8 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
             expected, f"the assignment expects what {messages[0].type} cannot be: {error}"
         )
     # Place of each message in all that its writer published, from 0.
-    places = list(range(len(messages)))
-    if is_numbered(messages):
-        places = [message.sequence - 1 for message in messages]
+    numbered = is_numbered(messages)
+    places = [m.sequence - 1 if numbered else index for index, m in enumerate(messages)]
     wanted = _wanted(parameters, found, places)
     wrong = [
         index
@@ -139,22 +137,21 @@ def _failed(
     wanted: Sequence[Any],
     first: int,
 ) -> Finding:
-    message = recording.on(parameters.topic)[first]
     why, hint = _explanation(parameters, found)
+    when_s = recording.since_launch_s(recording.on(parameters.topic)[first].stamp_ns)
     rows = tuple(
         (str(number), "any" if want is None else _text(want), _text(have))
         for number, (want, have) in enumerate(zip(wanted, found, strict=True), start=1)
     )
-    title = f"{parameters.field} of {parameters.topic}"
-    moment = Moment(f"message {first + 1} is wrong", recording.since_launch_s(message.stamp_ns))
+    title, header = f"{parameters.field} of {parameters.topic}", ("message", "expected", "observed")
     return Finding.failed(
         parameters.words,
         f"{code(parameters.field)} is {_text(found[first])} instead of {_text(wanted[first])} in "
         f"message {first + 1} of {len(found)}{why}",
         hint,
         Evidence(
-            moments=(moment,),
-            tables=(Table(title, ("message", "expected", "observed"), rows[:50]),),
+            moments=(Moment(f"message {first + 1} is wrong", when_s),),
+            tables=(Table(title, header, rows[:50]),),
         ),
     )
 
@@ -163,6 +160,7 @@ def _explanation(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
     """What the values tell, as a clause, and what to try."""
     if parameters.step is None:
         return "", "Publish the values that are asked for, each once and in this order."
+    hint = "Change the value once for every message, by what is asked for."
     steps = [b - a for a, b in pairwise(found)]
     if steps and not any(steps):
         return (
@@ -171,29 +169,14 @@ def _explanation(parameters: Series, found: Sequence[Any]) -> tuple[str, str]:
             "timer's callback.",
         )
     if steps and all(same(steps[0], item, parameters.tolerance) for item in steps):
-        if same(parameters.step, steps[0], parameters.tolerance):
-            return (
-                f": it begins with {_text(found[0])}",
-                "Set the first value in the node's constructor, and change it after publish(msg), "
-                "not before.",
-            )
-        return (
-            f": it grows by {_text(steps[0])} from message to message, not by "
-            f"{_text(parameters.step)}",
-            "Change the value once for every message, by what is asked for.",
-        )
+        grows = f"it begins with {_text(found[0])} and grows by {_text(steps[0])}"
+        return f": {grows} from message to message", hint
     if found[0] in found[1:] and steps[0]:
         return (
             f": it begins anew with message {found.index(found[0], 1) + 1}",
             "Is the value set back, does it overflow, or do two publishers count?",
         )
-    if 0 in steps:
-        return (
-            f": message {steps.index(0) + 2} repeats the value before it",
-            "Publish once each time the value has changed: is publish(msg) there twice, or do two "
-            "timers or two publishers send it?",
-        )
-    return "", "Change the value by the same step for every message."
+    return "", hint
 
 
 def _text(value: Any) -> str:

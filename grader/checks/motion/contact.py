@@ -7,7 +7,7 @@ from pydantic import Field
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding
 from grader.checks.motion.robot_check import RobotParameters
-from grader.diagnosis.motion.contact import touch, why_touched
+from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.no_node import why_no_node
 from grader.measure.motion.quantities import metres
@@ -20,7 +20,7 @@ class NoContact(RobotParameters):
 
     moving: bool = Field(
         True,
-        description="Whether the robot must also have moved: one that always stands touches "
+        description="Whether the robot must also have moved: a robot that always stands touches "
         "nothing.",
     )
 
@@ -33,18 +33,16 @@ def no_contact(recording: Recording, parameters: NoContact) -> Finding:
     A robot that never moved does not pass, unless `moving` is false.
     """
     expected = "touches nothing"
-    cause = why_not_moved(recording) if parameters.moving else why_not_judged(recording)
-    if cause is None and not parameters.moving:
-        cause = why_no_node(recording) or (
-            None if has_moved(recording.truth) else why_cut_short(recording)
-        )
-    if cause is not None and touch(recording) is None:
-        return cause.finding(expected)
     touched = why_touched(recording)
     if touched is not None:
         cause = why_cut_short(recording)
         return (cause.after(touched.observed) if cause else touched).finding(expected)
-    way = metres(way_m(recording.truth))
-    return Finding.passed(
-        expected, f"no contact on {way}", Evidence(plots=(speed_plot(recording),))
-    )
+    cause = why_not_moved(recording) if parameters.moving else why_not_judged(recording)
+    if cause is None and not parameters.moving:
+        cause = why_no_node(recording)
+        if cause is None and not has_moved(recording.truth):
+            cause = why_cut_short(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    evidence = Evidence(plots=(speed_plot(recording),))
+    return Finding.passed(expected, f"no contact on {metres(way_m(recording.truth))}", evidence)

@@ -1,4 +1,4 @@
-"""Checks of driving ahead: the speed and the way."""
+"""Checks of driving ahead: the speed, the way, and no curve."""
 
 from __future__ import annotations
 
@@ -14,39 +14,41 @@ from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.motion.contact import why_touched
-from grader.diagnosis.motion.no_motion import why_cut_short, why_not_moved
-from grader.measure.motion.ground import ahead, nearest
-from grader.measure.motion.lateness import stolen_s
-from grader.measure.motion.quantities import metres, speed
+from grader.diagnosis.motion.no_motion import why_not_moved
+from grader.diagnosis.motion.off_course import why_interrupted
+from grader.measure.motion.command import stolen_s
+from grader.measure.motion.ground import ahead
+from grader.measure.motion.quantities import degrees, metres, speed, turn
 from grader.measure.motion.scan import misreading
 from grader.measure.motion.track import (
     MOVED_M,
     REST_M_S,
-    REST_RAD_S,
     departure,
     final_rest,
     gone_ahead_m,
+    over_time,
     speed_plot,
     way_m,
 )
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
-from grader.spec.quantity import PositiveLength, Ratio, Speed
+from grader.spec.quantity import Angle, AngularSpeed, PositiveLength, Ratio, Speed
 from grader.spec.unit import format_duration
+from sim.motion import wrap_angle
 
 _LEAST_SHARE = 0.9
 _LEAST_STEPS = 30
 # Besides what the robot needs to speed up, a node may bring its commands up in steps.
 _IN_STEPS_S = 0.5
 _WAY_TOLERANCE_M = 2e-3
-_TURN_HINT = "The speed ahead is linear.x, the turn is angular.z."
-_SPEED_HINT = "linear.x is the speed in metres per second."
+_FIELDS_HINT = (
+    "linear.x is the speed in metres per second, and forward is positive (REP-103). angular.z is "
+    "the turn."
+)
 _IN_BETWEEN_HINT = (
     "Log what makes it stop: a range that is not measured (inf, 0.0) may count as an obstacle, and "
     "a second place that publishes, such as a timer, may contradict the callback."
 )
-_BACKWARDS_HINT = "Forward is a positive linear.x (REP-103)."
 
 
 class Drives(RobotParameters):
@@ -78,16 +80,21 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     steps = _free(recording.truth, recording.scene, parameters)
     evidence = Evidence(plots=(speed_plot(recording, (low, high)),))
     if not steps:
-        return _too_short(recording).finding(expected)
+        cause = why_interrupted(recording) or Cause(
+            f"the robot drove too shortly to judge: {metres(way_m(recording.truth))} in all",
+            "Drive on as long as nothing is near ahead; one command holds until the next.",
+            _since_departure(recording),
+        )
+        return cause.finding(expected)
     middle = median(step.linear_m_s for step in steps)
     good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
     seen = f"median {speed(middle)}, in that range for {percent(round(good, 3))} of the time"
     if low <= middle <= high and good >= _LEAST_SHARE:
         return Finding.passed(expected, seen, evidence)
-    deeper = why_cut_short(recording) or why_touched(recording)
+    deeper = why_interrupted(recording)
     if deeper is not None and low <= middle <= high:
         return deeper.finding(expected)
-    words, hint = _wrong_speed(steps, recording.scene, wanted, middle, (low, high))
+    words, hint = _wrong_speed(steps, recording.scene, wanted, middle)
     off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
     moment = Moment("first out of that range", recording.since_launch_s(off.time_ns))
     evidence = Evidence(moments=(moment,), plots=evidence.plots)
@@ -120,64 +127,29 @@ def _free(truth: Sequence[Truth], scene: Scene, parameters: Drives) -> list[Trut
     return found if len(found) >= _LEAST_STEPS else []
 
 
-def _too_short(recording: Recording) -> Cause:
-    cause = why_cut_short(recording) or why_touched(recording)
-    if cause is not None:
-        return cause
-    way = metres(way_m(recording.truth))
-    return Cause(
-        f"the robot drove too shortly to tell its speed: {way} in all",
-        "Drive on as long as nothing is near ahead; one command holds until the next.",
-        _since_departure(recording),
-    )
-
-
 def _wrong_speed(
-    steps: Sequence[Truth], scene: Scene, wanted: float, middle: float, band: tuple[float, float]
+    steps: Sequence[Truth], scene: Scene, wanted: float, middle: float
 ) -> tuple[str, str]:
     """What is wrong with the speed, and what to try."""
-    low, high = band
     command = median(step.command_m_s for step in steps)
-    if abs(middle) < 1e-3 and any(abs(step.angular_rad_s) > 0.01 for step in steps):
-        return (
-            "the robot turns on the spot instead of driving",
-            _TURN_HINT,
-        )
-    pauses = [
-        list(pause)
-        for rests, pause in groupby(steps, key=lambda step: abs(step.linear_m_s) < REST_M_S)
-        if rests
-    ]
-    if pauses:
-        turned = any(abs(step.angular_rad_s) > REST_RAD_S for pause in pauses for step in pause)
-        did = "turned on the spot" if turned else "stood still"
-        return f"the robot {did} in between, {counted(len(pauses), 'time')}", _IN_BETWEEN_HINT
-    told = groupby(steps, key=lambda step: step.command_m_s == 0.0)
-    halts = sum(1 for stops, _ in told if stops)
-    if halts >= 2:
-        return (
-            f"the robot was told {halts} times to stop, and to drive on before it stood",
-            _IN_BETWEEN_HINT,
-        )
-    if middle * wanted < 0.0:
-        return "the robot drives backwards", _BACKWARDS_HINT
     limit = scene.max_linear_m_s
+    pauses = groupby(steps, lambda step: abs(step.linear_m_s) < REST_M_S or not step.command_m_s)
+    number = sum(pausing for pausing, _ in pauses)
+    if abs(middle) < REST_M_S and any(abs(step.angular_rad_s) > 0.01 for step in steps):
+        return "the robot turns on the spot instead of driving", _FIELDS_HINT
+    if number:
+        return f"the robot paused in between, {counted(number, 'time')}", _IN_BETWEEN_HINT
+    if middle * wanted < 0.0:
+        return "the robot drives backwards", _FIELDS_HINT
     if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
-        return (
-            f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}",
-            _SPEED_HINT,
-        )
-    if low <= middle <= high:
-        slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)
-        return (
-            f"the speed varies between {speed(slowest)} and {speed(fastest)}",
-            "Publish the same speed every time, as long as nothing is near ahead.",
-        )
-    factor = middle / wanted
-    words = f"{factor:.3g} times the expected speed"
-    if abs(command - middle) > 0.05 * abs(command):
-        words += f", although {speed(command)} was commanded"
-    return words, _SPEED_HINT
+        words = f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}"
+        return words, _FIELDS_HINT
+    slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)
+    return (
+        f"{middle / wanted:.3g} times the expected speed, between {speed(slowest)} and "
+        f"{speed(fastest)}",
+        f"Publish the same speed as long as nothing is near ahead. {_FIELDS_HINT}",
+    )
 
 
 class KeepsDriving(RobotParameters):
@@ -204,44 +176,37 @@ def keeps_driving(recording: Recording, parameters: KeepsDriving) -> Finding:
     if gone_m >= wanted_m - _WAY_TOLERANCE_M:
         evidence = Evidence(plots=(speed_plot(recording),))
         return Finding.passed(expected, f"went {metres(gone_m)} ahead", evidence)
-    cause = why_cut_short(recording) or why_touched(recording)
-    if cause is None:
-        cause = _why_not_ahead(recording, gone_m)
+    cause = why_interrupted(recording) or _why_not_ahead(recording, gone_m)
     return cause.finding(expected)
 
 
 def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
+    truth = recording.truth
+    if way_m(truth) < MOVED_M:
+        words = "the robot only turned on the spot"
+        return Cause(words, _FIELDS_HINT, _since_departure(recording))
     if gone_m < -_WAY_TOLERANCE_M:
-        return Cause(
-            f"the robot drove {metres(-gone_m)} backwards",
-            _BACKWARDS_HINT,
-            _since_departure(recording),
-        )
-    if way_m(recording.truth) < MOVED_M:
-        return Cause("the robot only turned on the spot", _TURN_HINT, _since_departure(recording))
-    rest = final_rest(recording.truth)
-    seen = f"{metres(gone_m)} in all"
-    return _too_slow(recording, seen) if rest is None else _stopped(recording, rest, seen)
-
-
-def _stopped(recording: Recording, rest: int, seen: str) -> Cause:
-    step = recording.truth[rest]
-    when_s = recording.since_launch_s(step.time_ns)
+        words = f"the robot drove {metres(-gone_m)} backwards"
+        return Cause(words, _FIELDS_HINT, _since_departure(recording))
+    rest = final_rest(truth)
+    if rest is None:
+        return _too_slow(recording, gone_m)
+    when_s = recording.since_launch_s(truth[rest].time_ns)
+    misread = misreading(recording, truth[rest])
     evidence = Evidence(
         moments=(Moment("the robot stopped", when_s),), plots=(speed_plot(recording),)
     )
-    around = nearest(recording.scene, step) if recording.scene is not None else None
-    misread = misreading(recording, step.time_ns, around)
+    seen = f"stopped after {metres(gone_m)} in all"
     if misread is not None:
-        return Cause(f"stopped after {seen}: {misread.words}", misread.hint, evidence)
+        return Cause(f"{seen}: {misread.words}", misread.hint, evidence)
     return Cause(
-        f"stopped after {seen}, {when_s:.2f} s after launch",
+        f"{seen}, {when_s:.2f} s after launch",
         "Which message made it stop? Log what the callback compares.",
         evidence,
     )
 
 
-def _too_slow(recording: Recording, seen: str) -> Cause:
+def _too_slow(recording: Recording, gone_m: float) -> Cause:
     truth = recording.truth
     begin = departure(truth) or 0
     driven_s = (truth[-1].time_ns - truth[begin].time_ns) / NS
@@ -249,13 +214,13 @@ def _too_slow(recording: Recording, seen: str) -> Cause:
     average = way_m(truth) / driven_s if driven_s else 0.0
     lost_s = stolen_s(recording, truth[0].time_ns, truth[-1].time_ns)
     words = (
-        f"was still on its way when the observation ended: {seen}, at {speed(average)} on "
-        f"average, {format_duration(waited_s)} after the beginning"
+        f"was still on its way when the observation ended: {metres(gone_m)} in all, at "
+        f"{speed(average)} on average, {format_duration(waited_s)} after the beginning"
     )
     if lost_s > 0.25 * (driven_s + waited_s):
         return Cause.to_repeat(f"{words}; the machine took {format_duration(lost_s)} from the run")
     evidence = Evidence(moments=(until_the_end(recording),), plots=(speed_plot(recording),))
-    return Cause(words, _SPEED_HINT, evidence)
+    return Cause(words, _FIELDS_HINT, evidence)
 
 
 def _since_departure(recording: Recording) -> Evidence:
@@ -266,3 +231,63 @@ def _since_departure(recording: Recording) -> Evidence:
         moments=(Moment("set off", recording.since_launch_s(begin.time_ns)),),
         plots=(speed_plot(recording),),
     )
+
+
+class Straight(RobotParameters):
+    """Parameters of motion.straight."""
+
+    tolerance: AngularSpeed = Field(
+        0.01, description="Largest angular.z that still counts as zero, either way."
+    )
+    heading: Angle = Field(
+        0.035, description="How far the heading may be off that of the start, either way."
+    )
+
+
+@check("motion.straight", Subject.RECORDING, Straight)
+def straight(recording: Recording, parameters: Straight) -> Finding:
+    """The robot drives straight ahead.
+
+    Judged by the commands in force and by the true heading: `angular.z` is zero all the time,
+    and the heading stays that of the start.
+    """
+    expected = f"drives straight: angular.z is zero (within {turn(parameters.tolerance)})"
+    cause = why_not_moved(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    truth = recording.truth
+    evidence = Evidence(
+        plots=(
+            over_time(
+                recording,
+                "Commanded turn",
+                "angular.z (rad/s)",
+                lambda step: step.command_rad_s,
+                (-parameters.tolerance, parameters.tolerance),
+            ),
+        )
+    )
+    turning = [step for step in truth if abs(step.command_rad_s) > parameters.tolerance]
+    if turning:
+        worst = max((step.command_rad_s for step in turning), key=abs)
+        when_s = recording.since_launch_s(turning[0].time_ns)
+        return Finding.failed(
+            expected,
+            f"angular.z = {turn(worst)} was commanded (from {when_s:.2f} s after launch, "
+            f"{percent(len(turning) / len(truth))} of the time)",
+            "The speed ahead is linear.x, the turn is angular.z: leave angular.z at 0.0.",
+            Evidence(moments=(Moment("first turn commanded", when_s),), plots=evidence.plots),
+        )
+    turned = [wrap_angle(step.yaw_rad - truth[0].yaw_rad) for step in truth]
+    off_rad = max(turned, key=abs)
+    if abs(off_rad) > parameters.heading:
+        first = next(i for i, angle in enumerate(turned) if abs(angle) > parameters.heading)
+        when_s = recording.since_launch_s(truth[first].time_ns)
+        return Finding.failed(
+            expected,
+            f"the heading changed by {degrees(off_rad)}, through commands of less than "
+            f"{turn(parameters.tolerance)} that add up",
+            "Leave angular.z at exactly 0.0.",
+            Evidence(moments=(Moment("the heading is too far off", when_s),), plots=evidence.plots),
+        )
+    return Finding.passed(expected, f"heading within {degrees(off_rad)} of the start", evidence)

@@ -10,32 +10,29 @@ from pydantic import Field, model_validator
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
-from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.reference import GoalPose
+from grader.checks.motion.robot_check import GoalParameters, RobotParameters
 from grader.checks.wording import percent
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.missed_heading import why_not_aligned
-from grader.diagnosis.motion.no_motion import approach, why_cut_short, why_not_moved
-from grader.diagnosis.motion.off_course import why_off_course, why_unsteered
+from grader.diagnosis.motion.no_motion import approach, why_not_moved
+from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, why_unsteered
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.lateness import stolen_s
+from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import degrees, metres, point, speed, turn
 from grader.measure.motion.track import final_rest, is_at_rest, speed_plot, way_m
 from grader.recording.model import NS, Recording
+from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, Duration, PositiveLength, Ratio
 from grader.spec.unit import format_duration
 
-# Who looks at the goal comes nearer by most of what it drives.
+# A robot that looks at the goal comes nearer by most of what it drives.
 _ASTRAY_RAD = math.radians(45.0)
-_GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 
 
-class Reaches(RobotParameters):
+class Reaches(GoalParameters):
     """Parameters of motion.reaches."""
 
-    goal: GoalPose = Field(description=_GOAL)
     position: PositiveLength = Field(description="How far from the goal it may end.")
     heading: Angle | None = Field(
         None, description="How far off its heading may be; by default it does not count."
@@ -58,33 +55,29 @@ def reaches(recording: Recording, parameters: Reaches) -> Finding:
     )
     if heading is not None:
         expected += f" and {degrees(heading)} of the heading {degrees(run.goal.yaw_rad)}"
+    last = run.truth[-1]
     cause = why_not_there(run, parameters.position)
     if cause is None and heading is not None:
         cause = why_not_aligned(run, parameters.position, heading)
-    if cause is None and not is_at_rest(run.truth[-1]):
-        cause = _restless(run)
+    if cause is None and not is_at_rest(last):
+        cause = why_off_course(recording) or _restless(recording, last, "is at the goal, but")
     if cause is not None:
         return cause.finding(expected)
-    last = run.truth[-1]
     seen = f"{metres(run.distance_m(last))} from it"
     if heading is not None:
         seen += f", {degrees(abs(run.heading_error_rad(last)))} off its heading"
     return Finding.passed(expected, seen, Evidence(plots=(run.distance_plot, run.heading_plot)))
 
 
-def _restless(run: Approach) -> Cause:
-    deeper = why_off_course(run.recording)
-    if deeper is not None:
-        return deeper
-    last = run.truth[-1]
+def _restless(recording: Recording, last: Truth, place: str) -> Cause:
     return Cause(
-        f"is at the goal, but not at rest when the observation ends: {speed(last.linear_m_s)} and "
+        f"{place} not at rest when the observation ends: {speed(last.linear_m_s)} and "
         f"{turn(last.angular_rad_s)}",
         "Publish a Twist of zeros where both errors are below your tolerances: the last command "
         "holds until the next.",
         Evidence(
-            moments=(until_the_end(run.recording, "not at rest when the observation ended"),),
-            plots=(speed_plot(run.recording), run.heading_plot),
+            moments=(until_the_end(recording, "not at rest when the observation ended"),),
+            plots=(speed_plot(recording),),
         ),
     )
 
@@ -116,7 +109,7 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
     took_s = (end.time_ns - truth[0].time_ns) / NS
     if rest is not None and took_s <= parameters.within:
         return Finding.passed(expected, f"after {format_duration(took_s)}", evidence)
-    deeper = why_cut_short(recording) or why_touched(recording)
+    deeper = why_interrupted(recording)
     if deeper is not None:
         return deeper.finding(expected)
     lost_s = stolen_s(recording, truth[0].time_ns, end.time_ns)
@@ -126,36 +119,23 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
             expected, f"{seen}; the machine took up to {format_duration(lost_s)} from the run"
         )
     deeper = why_unsteered(recording)
+    if deeper is None and rest is None:
+        deeper = _restless(recording, end, f"after {format_duration(took_s)}")
     if deeper is not None:
         return deeper.finding(expected)
-    if rest is None:
-        return Finding.failed(
-            expected,
-            f"still moves after {format_duration(took_s)}, when the observation ends: "
-            f"{speed(end.linear_m_s)} and {turn(end.angular_rad_s)}",
-            "Publish a Twist of zeros where the errors are below your tolerances.",
-            Evidence(
-                moments=(until_the_end(recording, "not at rest when the observation ended"),),
-                plots=evidence.plots,
-            ),
-        )
+    moment = Moment("at rest", recording.since_launch_s(end.time_ns))
     return Finding.failed(
         expected,
         f"after {format_duration(took_s)}",
         "Larger gains are faster, until it overshoots.",
-        Evidence(
-            moments=(Moment("at rest", recording.since_launch_s(end.time_ns)),),
-            plots=evidence.plots,
-        ),
+        Evidence(moments=(moment,), plots=evidence.plots),
     )
 
 
-class PathLength(RobotParameters):
+class PathLength(GoalParameters):
     """Parameters of motion.path_length."""
 
-    goal: GoalPose = Field(description=_GOAL)
     most: Ratio = Field(description="How much longer than the straight line the path may be.")
-    position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
 
 
 @check("motion.path_length", Subject.RECORDING, PathLength)
@@ -180,19 +160,25 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
     if cause is not None:
         return cause.finding(expected)
     gone_m = way_m(run.truth)
-    seen = f"{metres(gone_m)} for {metres(straight_m)}, {_longer(gone_m / straight_m)}"
+    longer = gone_m / straight_m - 1.0
+    words = f"{percent(round(longer, 3))} longer" if longer >= 0.0 else "no longer"
+    seen = f"{metres(gone_m)} for {metres(straight_m)}, {words}"
     evidence = Evidence(plots=(run.distance_plot,))
-    allowed_m = straight_m * (1.0 + parameters.most)
-    if gone_m <= allowed_m:
+    more_m = gone_m - straight_m * (1.0 + parameters.most)
+    if more_m <= 0.0:
         return Finding.passed(expected, seen, evidence)
-    late = _why_far(run, seen, gone_m - allowed_m)
-    if late is not None:
-        return late.finding(expected)
-    astray_m = _astray_m(run, parameters.position)
+    lost_s = stolen_s(recording, run.truth[0].time_ns, run.truth[-1].time_ns)
+    # What it drives on without a command, it has to come back.
+    if lost_s > 0.0 and 2.0 * lost_s * max(abs(step.linear_m_s) for step in run.truth) >= more_m:
+        return Finding.to_repeat(
+            expected,
+            f"{seen}; the machine took up to {format_duration(lost_s)} from the run, which may "
+            "explain it",
+        )
     return Finding.failed(
         expected,
-        f"{seen}; {metres(astray_m)} of it with the goal more than {degrees(_ASTRAY_RAD)} to the "
-        "side",
+        f"{seen}; {metres(_astray_m(run, parameters.position))} of it with the goal more than "
+        f"{degrees(_ASTRAY_RAD)} to the side",
         "Look at its heading on the way: does it turn to the goal at once, and by the short way? "
         "The error atan2(dy, dx) - yaw is wrapped, and its gain is large against that of the "
         "distance.",
@@ -210,34 +196,26 @@ def _astray_m(run: Approach, position_m: float) -> float:
     )
 
 
-def _why_far(run: Approach, seen: str, more_m: float) -> Cause | None:
-    """The cause if commands that came late by the machine's doing may explain a long path."""
-    lost_s = stolen_s(run.recording, run.truth[0].time_ns, run.truth[-1].time_ns)
-    fastest = max(abs(step.linear_m_s) for step in run.truth)
-    # What it drives on without a command, it has to come back.
-    if lost_s <= 0.0 or 2.0 * lost_s * fastest < more_m:
-        return None
-    return Cause.to_repeat(
-        f"{seen}; the machine took up to {format_duration(lost_s)} from the run, which may "
-        "explain it"
+def _farthest(run: Approach) -> Moment:
+    """Where the robot was farthest from the straight line to the goal."""
+    first, goal = run.truth[0], run.goal
+    dx, dy = goal.x_m - first.x_m, goal.y_m - first.y_m
+    worst = max(
+        run.truth, key=lambda step: abs(dx * (step.y_m - first.y_m) - dy * (step.x_m - first.x_m))
     )
+    when_s = run.recording.since_launch_s(worst.time_ns)
+    return Moment("farthest from the straight line to the goal", when_s)
 
 
-def _longer(ratio: float) -> str:
-    return f"{percent(round(ratio - 1.0, 3))} longer" if ratio >= 1.0 else "no longer"
-
-
-class Overshoot(RobotParameters):
+class Overshoot(GoalParameters):
     """Parameters of motion.overshoot."""
 
-    goal: GoalPose = Field(description=_GOAL)
     most: PositiveLength | None = Field(
         None, description="How far it may go away again from where it came nearest."
     )
     heading: Angle | None = Field(
         None, description="How far it may turn beyond the goal's heading after it arrived."
     )
-    position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
 
     @model_validator(mode="after")
     def _something(self) -> Overshoot:
@@ -254,16 +232,13 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     the robot has come near. Heading: how far it turns beyond the goal's heading after it has
     stopped driving.
     """
-    expected = " and ".join(
-        [
-            *([f"at most {metres(parameters.most)} past the goal"] if parameters.most else []),
-            *(
-                [f"at most {degrees(parameters.heading)} beyond its heading"]
-                if parameters.heading is not None
-                else []
-            ),
-        ]
-    )
+    most_m, most_rad = parameters.most, parameters.heading
+    limits = []
+    if most_m is not None:
+        limits.append(f"at most {metres(most_m)} past the goal")
+    if most_rad is not None:
+        limits.append(f"at most {degrees(most_rad)} beyond its heading")
+    expected = " and ".join(limits)
     run = approach(recording, parameters.goal)
     if isinstance(run, Cause):
         return run.finding(expected)
@@ -274,17 +249,14 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     past_m = _past_m(run, arrival)
     beyond_rad = _beyond_rad(run, parameters.position)
     seen, plots = [], []
-    if parameters.most is not None:
+    if most_m is not None:
         seen.append(f"{metres(past_m)} past it")
         plots.append(run.distance_plot)
-    if parameters.heading is not None:
+    if most_rad is not None:
         seen.append(f"{degrees(beyond_rad)} beyond its heading")
         plots.append(run.heading_plot)
     evidence = Evidence(plots=tuple(plots))
-    good = (parameters.most is None or past_m <= parameters.most) and (
-        parameters.heading is None or beyond_rad <= parameters.heading
-    )
-    if good:
+    if (most_m is None or past_m <= most_m) and (most_rad is None or beyond_rad <= most_rad):
         return Finding.passed(expected, " and ".join(seen), evidence)
     deeper = why_off_course(recording)
     if deeper is not None:
@@ -299,17 +271,6 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
             plots=evidence.plots,
         ),
     )
-
-
-def _farthest(run: Approach) -> Moment:
-    """Where the robot was farthest from the straight line to the goal."""
-    first, goal = run.truth[0], run.goal
-    dx, dy = goal.x_m - first.x_m, goal.y_m - first.y_m
-    worst = max(
-        run.truth, key=lambda step: abs(dx * (step.y_m - first.y_m) - dy * (step.x_m - first.x_m))
-    )
-    when_s = run.recording.since_launch_s(worst.time_ns)
-    return Moment("farthest from the straight line to the goal", when_s)
 
 
 def _past_m(run: Approach, arrival: int) -> float:

@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from itertools import pairwise
 
 from pydantic import Field
 
 from grader.checks.check import Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.reference import GoalPose
+from grader.checks.motion.robot_check import GoalParameters
 from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import approach
 from grader.diagnosis.motion.off_course import why_off_course
-from grader.measure.motion.approach import Approach
-from grader.measure.motion.detour import WRAP_HINT, Detour, away
+from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.quantities import degrees, metres, speed
-from grader.measure.motion.track import speed_plot
+from grader.measure.motion.track import speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, PositiveLength, Speed
 
-_GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 # Way that the delay of odometry may still cost after the position is reached: 2 cm of the slowest
 # robot, and as much as a faster one goes in a tenth of a second.
 _RUN_OUT_M = 0.02
@@ -35,10 +31,9 @@ _STRAIGHT_RAD_S = 0.01
 _PAUSE_NS = NS // 5
 
 
-class TwoPhases(RobotParameters):
+class TwoPhases(GoalParameters):
     """Parameters of motion.two_phases."""
 
-    goal: GoalPose = Field(description=_GOAL)
     position: PositiveLength = Field(description="How near the goal counts as reached.")
     speed: Speed = Field(0.01, description="Commanded speed that still counts as none.")
 
@@ -65,7 +60,7 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
         return (cause or Cause("never near the goal")).finding(expected)
     stray = _stray(run, arrival, parameters.speed)
     evidence = Evidence(plots=(speed_plot(recording), run.distance_plot))
-    way = sum(_way_m(before, after) for before, after in stray)
+    way = sum(way_m(pair) for pair in stray)
     fastest = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
     if way <= max(_RUN_OUT_M, _RUN_OUT_S * fastest):
         return Finding.passed(expected, f"{metres(way)} after it had begun to turn", evidence)
@@ -104,7 +99,7 @@ def _stray(run: Approach, arrival: int, none_m_s: float) -> list[tuple[Truth, Tr
 def _turns_away(run: Approach, step: Truth) -> bool:
     """Whether it turns away from the goal's position, as no robot on its way there does.
 
-    In the first phase it turns towards the goal, also where it comes in by a curve; one that
+    In the first phase it turns towards the goal, also where it comes in by a curve; a robot that
     drives straight past the goal overshoots, but does not align yet.
     """
     error_rad, turn_rad_s = run.bearing_error_rad(step), step.command_rad_s
@@ -114,15 +109,9 @@ def _turns_away(run: Approach, step: Truth) -> bool:
     )  # fmt: skip
 
 
-def _way_m(before: Truth, after: Truth) -> float:
-    return math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
-
-
-class ShortWay(RobotParameters):
+class ShortWay(GoalParameters):
     """Parameters of motion.short_way."""
 
-    goal: GoalPose = Field(description=_GOAL)
-    position: PositiveLength = Field(0.1, description="How near the goal counts as reached.")
     tolerance: Angle = Field(
         math.radians(30.0),
         description="How far it may turn the wrong way before it passes half a turn: near half "
@@ -142,27 +131,35 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
     run = approach(recording, parameters.goal)
     if isinstance(run, Cause):
         return run.finding(expected)
-    detours = list(_detours(run, parameters))
+    arrival, driven = run.arrival(parameters.position), run.driven(parameters.position)
+    tolerance_rad = parameters.tolerance
+    detours = [
+        ("the goal", run.bearing_error_rad(step), step)
+        for step in long_turns(run.truth[:arrival], run.bearing_error_rad, tolerance_rad)
+    ]
+    if driven is not None:
+        detours += [
+            ("the goal's heading", run.heading_error_rad(step), step)
+            for step in long_turns(run.truth[driven:], run.heading_error_rad, tolerance_rad)
+        ]
     evidence = Evidence(plots=(run.heading_plot,))
     if not detours:
-        # One that drives off has shown nothing of how it turns to this goal.
-        arrived = run.arrival(parameters.position) is not None
-        cause = None if arrived else why_not_there(run, parameters.position)
+        # A robot that drives off has shown nothing of how it turns to this goal.
+        cause = why_not_there(run, parameters.position) if arrival is None else None
         if cause is not None:
             return cause.finding(expected)
         return Finding.passed(expected, "no long way", evidence)
     deeper = why_off_course(recording)
     if deeper is not None:
         return deeper.finding(expected)
-    first = detours[0]
-    when_s = recording.since_launch_s(first.step.time_ns)
-    long_rad = math.tau - abs(first.error_rad)
+    what, error_rad, step = detours[0]
+    when_s = recording.since_launch_s(step.time_ns)
     more = f", and {counted(len(detours) - 1, 'more time')}" if len(detours) > 1 else ""
     return Finding.failed(
         expected,
-        f"turned away from {first.what} through half a turn: {degrees(long_rad)} "
-        f"{_sense(-first.error_rad)} where {degrees(abs(first.error_rad))} "
-        f"{_sense(first.error_rad)} would do ({when_s:.2f} s after launch{more})",
+        f"turned away from {what} through half a turn: {degrees(math.tau - abs(error_rad))} "
+        f"{_sense(-error_rad)} where {degrees(abs(error_rad))} {_sense(error_rad)} would do "
+        f"({when_s:.2f} s after launch{more})",
         WRAP_HINT,
         Evidence(moments=(Moment("turns the long way", when_s),), plots=evidence.plots),
     )
@@ -170,15 +167,3 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
 
 def _sense(angle_rad: float) -> str:
     return "counter-clockwise" if angle_rad > 0.0 else "clockwise"
-
-
-def _detours(run: Approach, parameters: ShortWay) -> Iterator[Detour]:
-    truth = run.truth
-    arrival = run.arrival(parameters.position)
-    driven = run.driven(parameters.position)
-    first = truth if arrival is None else truth[:arrival]
-    yield from away(first, run.bearing_error_rad, parameters.tolerance, "the goal")
-    if driven is not None:
-        yield from away(
-            truth[driven:], run.heading_error_rad, parameters.tolerance, "the goal's heading"
-        )

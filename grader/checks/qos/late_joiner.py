@@ -13,7 +13,7 @@ from grader.checks.need import Joined
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unpublished
-from grader.diagnosis.few_messages import why_few
+from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.process.process_exit import why_ended
 from grader.measure import declarations
 from grader.measure.compatibility import compatibility_table, refusals
@@ -42,6 +42,14 @@ class LateJoiner(Parameters):
         ge=0, description="So many of the messages before it joined it must get, and no more."
     )
 
+    @property
+    def words(self) -> str:
+        """What is expected, in words."""
+        who = f"a late joiner on {code(self.topic)} gets"
+        if self.last == 0:
+            return f"{who} nothing of what was before it"
+        return f"{who} the last {counted(self.last, 'message')} of those before it, and no more"
+
 
 @check("qos.late_joiner", Subject.RECORDING, LateJoiner)
 def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
@@ -57,7 +65,7 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     that the publisher's middleware gives them. So a publisher is found out that publishes only
     while there is a subscription.
     """
-    expected = _expected_words(parameters)
+    expected = parameters.words
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)
     if join is None:
         return _why_not_judged(recording, parameters, "the run ended before it joined").finding(
@@ -86,15 +94,6 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     return _why_too_few(case).finding(expected)
 
 
-def _expected_words(parameters: LateJoiner) -> str:
-    if parameters.last == 0:
-        return f"a late joiner on {code(parameters.topic)} gets nothing of what was before it"
-    return (
-        f"a late joiner on {code(parameters.topic)} gets the last "
-        f"{counted(parameters.last, 'message')} of those before it, and no more"
-    )
-
-
 @dataclass(frozen=True)
 class _Case:
     """What a late joiner got, and what had been published before it joined.
@@ -117,7 +116,6 @@ class _Case:
 
     @classmethod
     def of(cls, recording: Recording, parameters: LateJoiner, join: Join) -> _Case:
-        """Sort the messages by whether they were published before the join."""
         got = recording.joined.get(join.name, ())
         heard = recording.on(parameters.topic)
         history = _published_until(got, join.joined_ns)
@@ -134,7 +132,6 @@ class _Case:
 
     @property
     def seen(self) -> str:
-        """What was seen, in words."""
         return f"it got {len(self.history)} of the {counted(self.number, 'message')} before it"
 
     @property
@@ -145,7 +142,6 @@ class _Case:
 
     @property
     def publishers(self) -> tuple[Endpoint, ...]:
-        """The student's publishers on the topic."""
         return self.recording.student_endpoints(Kind.PUBLISHER, self.parameters.topic)
 
     @property
@@ -163,7 +159,6 @@ class _Case:
 
     @property
     def hint(self) -> str:
-        """The profile that keeps what is asked for."""
         if self.parameters.last == 0:
             return "A volatile publisher keeps nothing for late joiners: that is the default."
         return (
@@ -174,7 +169,6 @@ class _Case:
 
     @property
     def evidence(self) -> Evidence:
-        """When it joined and was matched, and which messages it got."""
         got = {item.stamp_ns for item in self.history}
         rows = tuple(
             (

@@ -19,7 +19,7 @@ from grader.checks.value import EXACT
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_one_cpu
-from grader.diagnosis.no_server import SERVICE, is_offered
+from grader.diagnosis.no_endpoint import SERVICE, is_offered
 from grader.recording.model import NS, Call, Recording
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration

@@ -13,9 +13,8 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.need import Published, Recorded
 from grader.checks.wording import code, counted
-from grader.diagnosis.delivery import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
-from grader.diagnosis.no_messages import why_silent
+from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.recording.model import NS, Message, Recording
 from grader.spec.name import TopicName
@@ -82,6 +81,23 @@ class Latency(Parameters):
                 raise ValueError(f"'{name}' is more than 'within': raise 'within'")
         return self
 
+    @property
+    def words(self) -> str:
+        """What is expected, in words."""
+        limits = {"median": self.median, "each": self.most}
+        texts = [f"{name} {format_duration(most)}" for name, most in limits.items() if most]
+        return (
+            f"an answer on {code(self.topic)} to each message on {code(self.stimulus)}: "
+            f"{', '.join(texts)} at most"
+        )
+
+    def is_too_slow(self, times_s: Sequence[float]) -> bool:
+        """Whether answers after these times are too slow."""
+        if not times_s:
+            return False
+        over_median = self.median is not None and median(times_s) > self.median
+        return over_median or (self.most is not None and max(times_s) > self.most)
+
 
 @check("timing.latency", Subject.RECORDING, Latency)
 def latency(recording: Recording, parameters: Latency) -> Finding:
@@ -91,15 +107,7 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     the node's answer. Answers are taken in their order, one for each message. What the machine
     took from the process meanwhile is measured, and never costs a point.
     """
-    limits = [
-        f"{words} {format_duration(limit)}"
-        for words, limit in (("median", parameters.median), ("each", parameters.most))
-        if limit is not None
-    ]
-    expected = (
-        f"an answer on {code(parameters.topic)} to each message on {code(parameters.stimulus)}: "
-        f"{', '.join(limits)} at most"
-    )
+    expected = parameters.words
     sent = recording.sent.get(parameters.stimulus, ())
     answers = recording.on(parameters.topic)
     if not answers:
@@ -114,7 +122,7 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
     figures = _figures(times)
     evidence = _evidence(recording, parameters, answered, times, missing)
     is_missing = len(missing) > parameters.unanswered
-    if not is_missing and not _too_slow(times, parameters):
+    if not is_missing and not parameters.is_too_slow(times):
         return Finding.passed(expected, figures, evidence)
     observed = (
         f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
@@ -131,7 +139,7 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
         for item in missing
         if recording.stolen_s(item.sent.stamp_ns, item.end_ns(parameters.within)) <= 0.0
     ]
-    if len(unexcused) <= parameters.unanswered and not _too_slow(own_s, parameters):
+    if len(unexcused) <= parameters.unanswered and not parameters.is_too_slow(own_s):
         stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
         return Finding.to_repeat(
             expected,
@@ -139,35 +147,25 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
             "meanwhile, which may explain it",
         )
     if is_missing:
-        return Finding.failed(
-            expected,
-            observed + (f"; of the others {figures}" if times else ""),
+        hint = (
             "Publish one answer in every call of the subscription's callback, with no condition "
-            "that leaves one out.",
-            evidence,
+            "that leaves one out."
         )
-    return Finding.failed(
-        expected,
-        figures,
+        observed += f"; of the others {figures}" if times else ""
+        return Finding.failed(expected, observed, hint, evidence)
+    hint = (
         "Publish the answer in the subscription's callback itself, not from a timer. Let the "
-        "callback return soon: no time.sleep(), no wait, no loop over what is there already.",
-        evidence,
+        "callback return soon: no time.sleep(), no wait, no loop over what is there already."
     )
+    return Finding.failed(expected, figures, hint, evidence)
 
 
-def _too_slow(times: Sequence[float], parameters: Latency) -> bool:
-    if not times:
-        return False
-    over_median = parameters.median is not None and median(times) > parameters.median
-    return over_median or (parameters.most is not None and max(times) > parameters.most)
-
-
-def _figures(times: Sequence[float]) -> str:
-    if not times:
+def _figures(times_s: Sequence[float]) -> str:
+    if not times_s:
         return "no answers"
     return (
-        f"median {format_duration(median(times))}, largest {format_duration(max(times))}, over "
-        f"{counted(len(times), 'answer')}"
+        f"median {format_duration(median(times_s))}, largest {format_duration(max(times_s))}, over "
+        f"{counted(len(times_s), 'answer')}"
     )
 
 
@@ -175,25 +173,25 @@ def _evidence(
     recording: Recording,
     parameters: Latency,
     answered: Sequence[Reaction],
-    times: Sequence[float],
+    times_s: Sequence[float],
     missing: Sequence[Reaction],
 ) -> Evidence:
-    label = f"sent on {parameters.stimulus}, not answered"
-    moments = [Moment(label, recording.since_launch_s(item.sent.stamp_ns)) for item in missing[:10]]
-    if not times:
-        return Evidence(moments=tuple(moments))
-    sent_s = [recording.since_launch_s(item.sent.stamp_ns) for item in answered]
-    worst_s = max(times)
-    moments.append(
-        Moment(f"slowest answer: after {format_duration(worst_s)}", sent_s[times.index(worst_s)])
-    )
-    limit_s = parameters.most or parameters.median or 0.0
+    late = [(f"sent on {parameters.stimulus}, not answered", item) for item in missing[:10]]
+    if times_s:
+        worst_s = max(times_s)
+        slowest = f"slowest answer: after {format_duration(worst_s)}"
+        late.append((slowest, answered[times_s.index(worst_s)]))
     plot = Plot(
         title=f"From a message on {parameters.stimulus} to its answer",
         x_label="time since launch (s)",
         y_label="latency (ms)",
-        x=tuple(sent_s),
-        y=tuple(value * _MS for value in times),
-        band=(0.0, limit_s * _MS),
+        x=tuple(recording.since_launch_s(item.sent.stamp_ns) for item in answered),
+        y=tuple(seconds * _MS for seconds in times_s),
+        band=(0.0, (parameters.most or parameters.median or 0.0) * _MS),
     )
-    return Evidence(moments=tuple(moments), plots=(plot,))
+    return Evidence(
+        moments=tuple(
+            Moment(label, recording.since_launch_s(item.sent.stamp_ns)) for label, item in late
+        ),
+        plots=(plot,) if times_s else (),
+    )

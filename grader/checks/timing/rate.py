@@ -13,7 +13,7 @@ from grader.checks.need import Recorded
 from grader.checks.timing.stamps import why_not_believed
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.few_messages import why_few
+from grader.diagnosis.no_messages import why_few
 from grader.diagnosis.wrong_rhythm import why_paused
 from grader.measure.numbering import is_numbered, lost
 from grader.recording.model import NS, Message, Recording

@@ -13,8 +13,7 @@ from grader.checks.timing.stamps import why_not_believed
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, counted
 from grader.diagnosis.explanation import cause_of
-from grader.diagnosis.few_messages import why_few
-from grader.diagnosis.no_messages import ENDED_HINT
+from grader.diagnosis.no_messages import ENDED_HINT, why_few
 from grader.diagnosis.wrong_rhythm import WrongRhythm, why_paused
 from grader.measure import declarations
 from grader.measure.period import (

@@ -153,16 +153,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _outer_page() -> bytes:
-    from markupsafe import Markup
+    from grader.report.html.page import render_page
 
-    from grader.report.html.policy import content_security_policy
-    from grader.report.html.report import asset, environment
-
-    style, script = asset("watch.css"), asset("watch.js")
-    policy = content_security_policy(style, script)
-    page = environment().get_template("watch.html.j2")
-    return page.render(
-        style=Markup(style),
-        script=Markup(script),
-        policy=f"{policy}; connect-src 'self'; frame-src 'self'",
-    ).encode()
+    policy = "; connect-src 'self'; frame-src 'self'"
+    return render_page("watch.html.j2", ("watch.css",), "watch.js", policy).encode()

@@ -10,23 +10,17 @@ from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.blocked_executor import stuck_callback
-from grader.measure.motion.command import commands, is_zero, scans
+from grader.measure.motion.command import VelocityCommand, commands, is_zero, scans
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
 from grader.measure.motion.track import is_at_rest, speed_plot
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 
-_DECIDED_HINT = (
-    "It went on deciding to drive: log the range that you compare. Is it the beam straight ahead, "
-    "whose angle is 0, of the newest scan (a loop in a callback never sees a newer one), and is "
-    "your limit in metres? Where it is within the limit, publish linear.x = 0.0."
-)
-# Commands that were sent so long before contradict each other.
+# Commands that were sent so long before contradict each other; fewer may come of noise.
 _LATELY_NS = NS
-# Fewer commands to stop may come of noise.
 _CONTRADICTIONS = 3
-# A command that is older was not answered to one of the last two scans of the slowest LiDAR.
+# A command that is older did not answer one of the last two scans of the slowest LiDAR.
 _HELD_NS = NS // 2
 # So many scans, of which so many had an answer, are no chance.
 _FEW_SCANS = 10
@@ -46,15 +40,14 @@ class Contact(Symptom["Reason"]):
     before: Truth
 
     @cached_property
-    def command_times_ns(self) -> list[int]:
-        """When commands were sent until then."""
-        sent = commands(self.recording)
-        return [item.time_ns for item in sent if item.time_ns <= self.step.time_ns]
+    def sent(self) -> list[VelocityCommand]:
+        """Commands until then."""
+        return [item for item in commands(self.recording) if item.time_ns <= self.step.time_ns]
 
 
 @dataclass(frozen=True)
 class Reason:
-    """What is said behind the contact, and what to try."""
+    """What follows the contact in the text, and what to try."""
 
     words: str
     hint: str
@@ -62,7 +55,7 @@ class Reason:
 
 def why_touched(recording: Recording) -> Cause | None:
     """What the robot drove into, when, how fast and why; None if it did not."""
-    index = touch(recording)
+    index = _touch(recording)
     if index is None:
         return None
     step, before = recording.truth[index], recording.truth[max(index - 1, 0)]
@@ -74,12 +67,12 @@ def why_touched(recording: Recording) -> Cause | None:
         way = "backwards " if before.linear_m_s < 0.0 else ""
         motion = f"{way}at {speed(abs(before.linear_m_s))}"
     if before.command_m_s or before.command_rad_s:
-        told = f"with linear.x = {speed(before.command_m_s)} as the last command"
+        command = f"with linear.x = {speed(before.command_m_s)} as the last command"
     else:
-        told = "although it had been told to stop: too late"
+        command = "although the last command was to stop: too late"
     reason = cause_of(Contact(recording, step, before))
     return Cause(
-        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {told}{reason.words}",
+        f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {command}{reason.words}",
         reason.hint,
         Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
     )
@@ -102,11 +95,11 @@ def no_scan_for_long(symptom: Contact) -> Reason | None:
 @explanation(Contact)
 def old_command(symptom: Contact) -> Reason | None:
     """The last command, to drive, was long ago, and the robot keeps it."""
-    sent = symptom.command_times_ns
-    if not sent or not symptom.before.command_m_s or symptom.step.time_ns - sent[-1] <= _HELD_NS:
+    since_ns = symptom.step.time_ns - symptom.sent[-1].time_ns if symptom.sent else 0
+    if since_ns <= _HELD_NS or not symptom.before.command_m_s:
         return None
     return Reason(
-        f", sent {(symptom.step.time_ns - sent[-1]) / NS:.2f} s before",
+        f", sent {since_ns / NS:.2f} s before",
         "The robot keeps the last command: publish one with every scan, or from a timer of 10 "
         "Hz or more, and to stop one with linear.x = 0.0. A time.sleep() or a loop in a "
         "callback keeps it from coming in time.",
@@ -129,12 +122,8 @@ def callback_in_a_loop(symptom: Contact) -> Reason | None:
 @explanation(Contact)
 def contradicting_commands(symptom: Contact) -> Reason | None:
     """Two places publish: one stops the robot, the other drives it on."""
-    end_ns = symptom.step.time_ns
-    lately = [
-        item
-        for item in commands(symptom.recording)
-        if end_ns - _LATELY_NS <= item.time_ns <= end_ns
-    ]
+    since_ns = symptom.step.time_ns - _LATELY_NS
+    lately = [item for item in symptom.sent if item.time_ns >= since_ns]
     stops = sum(is_zero(item.twist) for item in lately)
     if not _CONTRADICTIONS <= stops < len(lately):
         return None
@@ -148,41 +137,33 @@ def contradicting_commands(symptom: Contact) -> Reason | None:
 @explanation(Contact)
 def fewer_commands_than_scans(symptom: Contact) -> Reason | None:
     """A slow callback or timer decides by old scans."""
-    sent, end_ns = symptom.command_times_ns, symptom.step.time_ns
-    seen = [
-        item for item in scans(symptom.recording) if sent and sent[0] <= item.stamp_ns <= end_ns
-    ]
+    sent = symptom.sent
+    begin_ns, end_ns = sent[0].time_ns if sent else symptom.step.time_ns, symptom.step.time_ns
+    seen = [item for item in scans(symptom.recording) if begin_ns <= item.stamp_ns <= end_ns]
     if len(seen) < _FEW_SCANS or len(sent) >= _ANSWERED * len(seen):
         return None
     return Reason(
         f"; only {counted(len(sent), 'command')} followed the {len(seen)} scans until then",
-        "A time.sleep() in the callback lets scans wait in the queue, and what is decided then "
-        "is from an old one; so is it in a slow timer. Publish in the callback of the scan, "
-        "and return at once. "
-        f"{_DECIDED_HINT}",
+        "A time.sleep() in the callback lets scans wait in the queue, and a slow timer reads them "
+        "late: the decision is made by an old scan. Publish in the callback of the scan, and "
+        "return at once.",
     )
-
-
-@explanation(Contact)
-def decided_to_drive(symptom: Contact) -> Reason | None:
-    """It went on deciding to drive, with scans before it."""
-    if not scans(symptom.recording) or symptom.before.command_m_s <= 0.0:
-        return None
-    return Reason("", _DECIDED_HINT)
 
 
 @explanation(Contact, general=True)
-def drove_into_it(symptom: Contact) -> Reason:
-    """It did not stop early enough."""
+def decided_to_drive(symptom: Contact) -> Reason:
+    """It went on deciding to drive, or stopped too late."""
     return Reason(
         "",
-        "Stop early enough: the robot needs time to see (a scan comes every 0.2 s) and to "
-        "brake, and its edge is ahead of its middle.",
+        "Log the range that you compare. Is it the beam straight ahead, whose angle is 0, of the "
+        "newest scan, and is your limit in metres? Where it is within the limit, publish "
+        "linear.x = 0.0. Stop early enough: the robot needs time to see (a scan comes every "
+        "0.2 s) and to brake.",
     )
 
 
-def touch(recording: Recording) -> int | None:
-    """Index of the first step of a contact that is the robot's own doing."""
+def _touch(recording: Recording) -> int | None:
+    """Index of the first step of a contact that the robot caused itself, or None."""
     truth = recording.truth
     before: str | None = None
     for index, step in enumerate(truth):
@@ -197,7 +178,5 @@ def _was_hit(truth: tuple[Truth, ...], index: int) -> bool:
     step = truth[index]
     if not (step.contact or "").startswith("moving") or step.command_m_s:
         return False
-    since = index
-    while since and step.time_ns - truth[since].time_ns < _RESTED_NS:
-        since -= 1
-    return all(is_at_rest(item) for item in truth[since:index])
+    rested = [one for one in truth[:index] if step.time_ns - one.time_ns <= _RESTED_NS]
+    return all(map(is_at_rest, rested))

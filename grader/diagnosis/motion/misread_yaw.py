@@ -6,10 +6,15 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from grader.measure.motion.answer import MOST_BEHIND, Answer, answers
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.control_law import Sample, fit
-from grader.measure.motion.steering import before_arrival
+from grader.measure.motion.steering import (
+    MOST_BEHIND,
+    Answer,
+    Sample,
+    answers,
+    before_arrival,
+    fit,
+)
 from sim.motion import wrap_angle
 
 # Chance does not come near it: nothing is read from fewer commands, or a worse fit.
@@ -18,24 +23,19 @@ _GOOD_R2 = 0.97
 _RIGHT_R2 = 0.9
 # Readings differ by less where the robot hardly turns.
 _TURNED_RAD = 0.5
-_NEARLY_OPPOSITE_DEG = 170
 _FORMULA = "yaw = atan2(2 (w z + x y), 1 - 2 (y y + z z))"
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A way to read yaw.
-
-    Attributes:
-        of: From the true yaw, in rad.
-    """
+    """A way to read yaw, from the true one in rad."""
 
     words: str
     hint: str
     of: Callable[[float], float]
 
     def __str__(self) -> str:
-        """What was seen, to be put behind a colon."""
+        """What was seen, to follow a colon."""
         return f"it turns as if yaw were {self.words}"
 
 
@@ -81,23 +81,6 @@ _READINGS = (
 )
 
 
-def _shifted(offset_deg: int) -> Reading:
-    """Yaw with something added to it."""
-    words = f"about {abs(offset_deg)}° {'more' if offset_deg > 0 else 'less'} than it is"
-    opposite = abs(offset_deg) > _NEARLY_OPPOSITE_DEG
-    return Reading(
-        f"{words}, or as if so much were taken from the direction of the goal",
-        "The direction is atan2(dy, dx) with dx = goal_x - x, and not atan(dy / dx), which is the "
-        "opposite one where dx is negative. An error is wrapped by 2 * pi, not by pi."
-        if opposite
-        else f"Neither yaw nor math.atan2(dy, dx) needs an offset: {_FORMULA}.",
-        lambda yaw_rad: yaw_rad + math.radians(offset_deg),
-    )
-
-
-_OFFSETS = tuple(_shifted(degrees) for degrees in range(-175, 181, 5) if degrees)
-
-
 def misread_yaw(run: Approach, position_m: float) -> Reading | None:
     """How yaw was read wrongly, if that alone explains the turns on the way to a goal.
 
@@ -116,12 +99,9 @@ def misread_yaw(run: Approach, position_m: float) -> Reading | None:
             return None
         if _r2(run, way, lambda yaw_rad: yaw_rad, limit_rad_s) > _RIGHT_R2:
             return None
-    for readings in (_READINGS, _OFFSETS):
-        fits = [(_r2(run, way, one.of, limit_rad_s), one) for way in ways for one in readings]
-        best = max(fits, key=lambda item: item[0])
-        if best[0] >= _GOOD_R2:
-            return best[1]
-    return None
+    fits = [(_r2(run, way, one.of, limit_rad_s), one) for way in ways for one in _READINGS]
+    r2, best = max(fits, key=lambda item: item[0])
+    return best if r2 >= _GOOD_R2 else None
 
 
 def _r2(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import endpoints_seen, first_seen
@@ -17,21 +18,21 @@ from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exit
 from grader.diagnosis.wrong_value import was_integer, what_was_put
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.motion.approach import Approach
-from grader.measure.motion.command import VelocityCommand, command_topic, commands, is_zero
-from grader.measure.motion.ground import ahead, nearest
-from grader.measure.motion.lateness import stolen_s
+from grader.measure.motion.command import (
+    VelocityCommand,
+    command_topic,
+    commands,
+    is_zero,
+    stolen_s,
+)
+from grader.measure.motion.ground import ahead
 from grader.measure.motion.quantities import metres, speed
 from grader.measure.motion.scan import misreading
 from grader.measure.motion.track import has_moved, index_at, is_at_rest
 from grader.recording.model import NS, Kind, Owner, Recording
-from grader.recording.simulated import Incident
 from grader.spec.unit import format_duration
 
 _STILL = "the robot never moved"
-_NAN_HINT = (
-    "A command must be finite: look for a division by zero, for inf from a range that sees "
-    "nothing, and for sqrt or acos of a number out of range."
-)
 
 
 def why_not_judged(recording: Recording) -> Cause | None:
@@ -83,10 +84,7 @@ def approach(recording: Recording, goal: Goal) -> Approach | Cause:
 
 
 def why_cut_short(recording: Recording) -> Cause | None:
-    """What deeper cause stands behind a motion that went wrong; None if there is none.
-
-    A process that ended while the robot was on its way, or commands that are not numbers.
-    """
+    """A process that ended while the robot was on its way, or commands that are not numbers."""
     ended = exited(recording)
     if ended:
         exited_ns = ended[0].exited_ns or recording.stop_ns
@@ -104,16 +102,14 @@ def why_rejected(recording: Recording) -> Cause | None:
         return None
     first = refused[0]
     were = "was" if len(refused) == 1 else "were"
+    when_s = recording.since_launch_s(first.time_ns)
     return Cause(
         f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
         f"(first: {first.text}); the robot stops instead",
-        _NAN_HINT,
-        Evidence(moments=(_moment(recording, "command rejected", first),)),
+        "A command must be finite: look for a division by zero, for inf from a range that sees "
+        "nothing, and for sqrt or acos of a number out of range.",
+        Evidence(moments=(Moment("command rejected", when_s),)),
     )
-
-
-def _moment(recording: Recording, label: str, incident: Incident) -> Moment:
-    return Moment(label, recording.since_launch_s(incident.time_ns))
 
 
 @explanation(NotMoved)
@@ -134,23 +130,19 @@ def no_velocity_command(symptom: NotMoved) -> Cause | None:
     """What was published is no velocity command."""
     if symptom.sent:
         return None
-    return _unreadable(symptom.recording).after(_STILL)
+    recording, topic = symptom.recording, command_topic(symptom.recording)
+    found = sorted({message.type for message in recording.on(topic)})
+    return Cause(
+        f"{_STILL}: what was published on {code(topic)} is no velocity command but {codes(found)}",
+        "Publish geometry_msgs/msg/Twist.",
+        Evidence(moments=first_seen(recording, recording.on(topic))),
+    )
 
 
 @explanation(NotMoved)
 def not_finite(symptom: NotMoved) -> Cause | None:
     """The commands are infinite, or not a number."""
     return why_rejected(symptom.recording)
-
-
-def _unreadable(recording: Recording) -> Cause:
-    topic = command_topic(recording)
-    found = sorted({message.type for message in recording.on(topic)})
-    return Cause(
-        f"what was published on {code(topic)} is no velocity command but {codes(found)}",
-        "Publish geometry_msgs/msg/Twist.",
-        Evidence(moments=first_seen(recording, recording.on(topic))),
-    )
 
 
 @explanation(NotMoved)
@@ -160,40 +152,26 @@ def robot_not_matched(symptom: NotMoved) -> Cause | None:
     if any(step.command_m_s or step.command_rad_s for step in recording.truth):
         return None
     topic = command_topic(recording)
-    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
     readers = [
         item
         for item in recording.endpoints
         if item.owner is Owner.PROBE and item.kind is Kind.SUBSCRIPTION and item.topic == topic
     ]
-    for publisher in publishers:
-        for reader in readers:
-            reasons = refusals(offered=publisher.qos, requested=reader.qos)
-            if reasons:
-                return Cause(
-                    f"{_STILL}: the QoS of the publisher on {code(topic)} does not match that of "
-                    f"the robot ({', '.join(reasons)})",
-                    "The robot's subscription is reliable: publish reliably, as "
-                    "create_publisher(Twist, 'cmd_vel', 10) does.",
-                    Evidence(
-                        moments=endpoints_seen(recording, (publisher,)),
-                        tables=(compatibility_table(publisher.qos, reader.qos),),
-                    ),
-                )
+    publishers = recording.student_endpoints(Kind.PUBLISHER, topic)
+    for publisher, reader in product(publishers, readers):
+        reasons = refusals(offered=publisher.qos, requested=reader.qos)
+        if reasons:
+            return Cause(
+                f"{_STILL}: the QoS of the publisher on {code(topic)} does not match that of "
+                f"the robot ({', '.join(reasons)})",
+                "The robot's subscription is reliable: publish reliably, as "
+                "create_publisher(Twist, 'cmd_vel', 10) does.",
+                Evidence(
+                    moments=endpoints_seen(recording, (publisher,)),
+                    tables=(compatibility_table(publisher.qos, reader.qos),),
+                ),
+            )
     return None
-
-
-@explanation(NotMoved)
-def other_axes(symptom: NotMoved) -> Cause | None:
-    """The commands set fields that a differential drive cannot follow, such as linear.y."""
-    stray = sorted({field for item in symptom.sent for field in item.stray})
-    if not stray or not all(is_zero(item.twist) for item in symptom.sent):
-        return None
-    return Cause(
-        f"{_STILL}: the commands set {codes(stray)}, which a differential drive cannot do",
-        "The speed ahead is linear.x, the turn is angular.z.",
-        symptom.moment("first command", symptom.sent[0]),
-    )
 
 
 @explanation(NotMoved)
@@ -206,26 +184,16 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
     topic = code(command_topic(recording))
     seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
     last = recording.truth[-1]
-    around = None if recording.scene is None else nearest(recording.scene, last)
-    misread = misreading(recording, last.time_ns, around)
+    misread = misreading(recording, last)
     if misread is not None:
         return Cause(f"{seen}; {misread.words}", misread.hint, evidence)
     sight = None if recording.scene is None else ahead(recording.scene, last)
     where = f"; {code(sight.name)} is {metres(sight.distance_m)} straight ahead" if sight else ""
-    hint = "Which branch of the callback publishes? Log what it compares."
-    return Cause(f"{seen}{where}", hint, evidence)
-
-
-@explanation(NotMoved)
-def stands_against_something(symptom: NotMoved) -> Cause | None:
-    """The robot stood against something and was told to drive into it."""
-    touched = next((step.contact for step in symptom.recording.truth if step.contact), None)
-    if not touched:
-        return None
     return Cause(
-        f"{_STILL}: it stood against {code(touched)} and was told to drive into it",
-        "Look at what is straight ahead before you drive.",
-        _first_to_move(symptom)[1],
+        f"{seen}{where}",
+        "Which branch of the callback publishes? Log what it compares. The speed ahead is "
+        "linear.x, the turn is angular.z.",
+        evidence,
     )
 
 
@@ -245,8 +213,8 @@ def integer_in_command(symptom: NotMoved) -> Cause | None:
     return None
 
 
-@explanation(NotMoved)
-def told_too_late(symptom: NotMoved) -> Cause:
+@explanation(NotMoved, general=True)
+def moves_too_late(symptom: NotMoved) -> Cause:
     """The first command to move came at the very end, or was too slow."""
     recording = symptom.recording
     first, evidence = _first_to_move(symptom)

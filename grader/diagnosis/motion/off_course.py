@@ -1,4 +1,4 @@
-"""Why a robot left its course, before anything is said of how it is steered."""
+"""Why a robot left its course, whatever the way it is steered."""
 
 from __future__ import annotations
 
@@ -26,20 +26,19 @@ class OffCourse(Symptom[Cause]):
 
 
 def why_off_course(recording: Recording) -> Cause | None:
-    """What lies deeper than a way that is wrong; None where nothing does."""
+    """A cause that lies deeper than the way in which the robot is steered, or None."""
     return explain(OffCourse(recording))
 
 
-@explanation(OffCourse)
-def cut_short(symptom: OffCourse) -> Cause | None:
-    """The process ended, or sent commands that are not finite."""
-    return why_cut_short(symptom.recording)
+def why_interrupted(recording: Recording) -> Cause | None:
+    """Why the way ended early: a process ended, commands not finite, or a contact; or None."""
+    return why_cut_short(recording) or why_touched(recording)
 
 
 @explanation(OffCourse)
-def touched(symptom: OffCourse) -> Cause | None:
-    """The robot touched something."""
-    return why_touched(symptom.recording)
+def interrupted(symptom: OffCourse) -> Cause | None:
+    """The process ended, sent commands that are not finite, or the robot touched something."""
+    return why_interrupted(symptom.recording)
 
 
 @explanation(OffCourse)
@@ -66,8 +65,8 @@ def why_unsteered(recording: Recording) -> Cause | None:
     until = " until the observation ended" if next_ns == end_ns else ""
     return Cause(
         f"no command came for {format_duration(long_s)}{until}, from {when_s:.2f} s after launch "
-        "on, and the robot moved on as it had been told before",
-        "Each odometry takes a command of its own: look for time.sleep() and for a loop in a "
+        "on, and the robot moved on by its last command",
+        "Publish a command for each odometry: look for time.sleep() and for a loop in a "
         "callback, which keep the next one waiting, and for a condition before publish().",
         Evidence(
             moments=(Moment("no command from here on", when_s),), plots=(speed_plot(recording),)

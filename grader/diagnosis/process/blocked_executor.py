@@ -8,7 +8,7 @@ from grader.checks.finding import Evidence, Moment
 from grader.checks.first_seen import until_the_end
 from grader.checks.wording import codes
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.process.raised import interrupted_callback, interrupted_place
+from grader.diagnosis.process.raised import in_brackets, interrupted_place
 from grader.measure import declarations
 from grader.recording.model import NS, Call, Process, Recording
 from grader.spec.unit import format_duration
@@ -26,40 +26,6 @@ HINT = (
 )
 
 
-def first_unanswered(recording: Recording, nodes: Collection[str], since_ns: int) -> Call | None:
-    """The first call that a blocked node left unanswered; None if it answered one in time.
-
-    A node's parameter services answer only while its executor spins. What the machine took from
-    the node is no time for an answer, and so a node that only gets no CPU is never blocked.
-    """
-    calls = [
-        call
-        for call in recording.calls
-        if call.service.rpartition("/")[0] in nodes
-        and not call.error
-        and left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
-    ]
-    unanswered = [call for call in calls if call.answered_ns is None]
-    if not unanswered or any((call.answered_ns or 0) >= since_ns for call in calls):
-        return None
-    return unanswered[0]
-
-
-def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float] | None:
-    """The call that the nodes let wait the longest but one, and for how long (seconds).
-
-    A single one may have been lost on its way. What the machine took from the nodes meanwhile
-    does not count.
-    """
-    waits = []
-    for call in recording.calls:
-        if call.service.rpartition("/")[0] in nodes and not call.error:
-            end_ns = call.answered_ns or recording.stop_ns
-            waits.append((call, left_s(recording, call.requested_ns, end_ns)))
-    waits.sort(key=lambda item: item[1])
-    return waits[-2] if len(waits) > 1 else None
-
-
 def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
     """Time without what the machine took of it."""
     return (end_ns - begin_ns) / NS - recording.stolen_s(begin_ns, end_ns)
@@ -67,7 +33,7 @@ def left_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
 
 def stuck_callback(recording: Recording) -> SourceError | None:
     """Where a callback was that did not return until it was interrupted; None without one."""
-    places = (interrupted_callback(recording, item.name) for item in recording.processes)
+    places = (interrupted_place(recording, it.name, in_callback=True) for it in recording.processes)
     return next((place for place in places if place is not None), None)
 
 
@@ -83,17 +49,30 @@ def why_not_called(recording: Recording, seen: str, nodes: Collection[str]) -> C
 def why_blocked(
     recording: Recording, seen: str, nodes: Collection[str], since_ns: int
 ) -> Cause | None:
-    """The cause if an executor is blocked, as unanswered calls to its node tell."""
-    call = first_unanswered(recording, nodes, since_ns)
-    if call is None:
+    """The cause if an executor is blocked, as calls to its node tell that had time for an answer.
+
+    A node's parameter services answer only while its executor spins. What the machine took from
+    the node is no time for an answer, and so a node that only gets no CPU is never blocked.
+    """
+    calls = [
+        call
+        for call in _calls(recording, nodes)
+        if left_s(recording, call.requested_ns, recording.stop_ns) >= _ANSWER_S
+    ]
+    call = next((call for call in calls if call.answered_ns is None), None)
+    if call is None or any((one.answered_ns or 0) >= since_ns for one in calls):
         return None
-    where, evidence = where_blocked(recording, min(nodes), call)
+    process = declarations.process_of(recording, min(nodes))
+    place = interrupted_place(recording, process.name) if process is not None else None
     since_s = recording.since_launch_s(call.requested_ns)
     return Cause(
-        f"{seen}: something blocks the executor{where}; from {since_s:.2f} s "
+        f"{seen}: something blocks the executor{in_brackets(place)}; from {since_s:.2f} s "
         "after launch on the node's parameter service answers no call either",
         HINT,
-        evidence,
+        Evidence(
+            moments=(Moment("first call that was not answered", since_s),),
+            places=(place,) if place else (),
+        ),
     )
 
 
@@ -112,19 +91,18 @@ def why_slow(recording: Recording, seen: str, nodes: Collection[str]) -> Cause |
     )
 
 
-def where_blocked(recording: Recording, node: str, call: Call) -> tuple[str, Evidence]:
-    """The place at which the node's process was when it was interrupted, if it told.
+def long_wait(recording: Recording, nodes: Collection[str]) -> tuple[Call, float] | None:
+    """The call that the nodes let wait the longest but one, and for how long (seconds).
 
-    Returns:
-        The place in words, with a space before it, or an empty text; and the evidence.
+    A single one may have been lost on its way. What the machine took from the nodes meanwhile
+    does not count.
     """
-    process = declarations.process_of(recording, node)
-    place = interrupted_place(recording, process.name) if process is not None else None
-    moment = Moment("first call that was not answered", recording.since_launch_s(call.requested_ns))
-    return (
-        f" ({place.file}:{place.line})" if place else "",
-        Evidence(moments=(moment,), places=(place,) if place else ()),
-    )
+    waits = [
+        (call, left_s(recording, call.requested_ns, call.answered_ns or recording.stop_ns))
+        for call in _calls(recording, nodes)
+    ]
+    waits.sort(key=lambda item: item[1])
+    return waits[-2] if len(waits) > 1 else None
 
 
 def why_never_spun(
@@ -134,7 +112,7 @@ def why_never_spun(
     processes: Iterable[Process] | None = None,
     moments: tuple[Moment, ...] = (),
 ) -> Cause | None:
-    """The cause if nothing spins a node, by the word of its process's tracer.
+    """The cause if nothing spins a node, as its process declares.
 
     Args:
         processes: Which may be the one that never spun; by default all.
@@ -164,11 +142,19 @@ def why_not_given(
     names = sorted(set(nodes))
     if not names or not all(declarations.in_no_executor(recording, name) for name in names):
         return None
-    named = codes(names)
     return Cause(
-        f"{seen}: an executor spins, but {named} was not given to it, so none of its callbacks "
-        "runs",
+        f"{seen}: an executor spins, but {codes(names)} was not given to it, so none of its "
+        "callbacks runs",
         "Give the node to the executor that spins, executor.add_node(node), or call "
         "rclpy.spin(node).",
         Evidence(moments or (until_the_end(recording, "no executor had the node"),)),
     )
+
+
+def _calls(recording: Recording, nodes: Collection[str]) -> list[Call]:
+    """Calls to services of the nodes that found a server."""
+    return [
+        call
+        for call in recording.calls
+        if call.service.rpartition("/")[0] in nodes and not call.error
+    ]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
+from grader.checks.wording import code
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
-from grader.diagnosis.process.missing_import import import_hint
 from grader.diagnosis.process.missing_library import library_hint
-from grader.diagnosis.process.raised import Failure, student_place, submission_path
+from grader.diagnosis.process.raised import Failure, Frame, student_place, submission_path
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
 
-TABLE = Path(__file__).with_suffix(".yaml")
+_UNDEFINED = re.compile(r"name '(\w+)' is not defined")
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,8 @@ class Row(Model):
     """A row of the table: a mistake, how to recognise its exception, and what to try."""
 
     mistake: str
+    example: str
+    line: str = ""
     type: str = ""
     message: str = ""
     raised_in: str = ""
@@ -40,29 +42,44 @@ class Row(Model):
 
     def __call__(self, symptom: Raised) -> str | None:
         """The hint, if the exception is that of the mistake."""
-        failure = symptom.failure
-        last = failure.frames[-1] if failure.frames else None
+        return self.hint_for(symptom.failure)
+
+    def hint_for(self, failure: Failure) -> str | None:
+        """The same of an exception alone."""
+        last = failure.frames[-1] if failure.frames else Frame("", 0)
         found = re.search(self.message, failure.message)
-        if found is None or (self.type and self.type != failure.type):
+        if found is None or self.type not in ("", failure.type) or self.raised_in not in last.file:
             return None
         names = {key: text for key, text in found.groupdict().items() if text}
-        if self.raised_in not in (last.file if last else ""):
-            return None
-        source = Template(self.source).safe_substitute(names)
-        if not re.search(source, last.source if last else ""):
+        if not re.search(Template(self.source).safe_substitute(names), last.source):
             return None
         return Template(self.hint).safe_substitute(names)
 
+    @property
+    def example_failure(self) -> Failure:
+        """The exception of the example."""
+        type_, _, message = self.example.partition(": ")
+        frame = Frame(f"/opt/ros/jazzy/{self.raised_in or 'bot/node.py'}", 1, "f", self.line)
+        return Failure(type_, message, (frame,))
+
 
 class Table(Model):
-    """The whole of the table."""
+    """The whole of ``exceptions.yaml``.
+
+    Attributes:
+        imports: The beginning of a line that imports something -> names, with blanks between.
+    """
 
     exceptions: tuple[Row, ...]
+    imports: dict[str, str]
+
+
+TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
 
 
 @explanation(Raised)
 def unknown_library(symptom: Raised) -> str | None:
-    """A Python library that the assignment does not allow is imported."""
+    """A Python library is imported that the assignment does not allow."""
     if symptom.failure.type != "ModuleNotFoundError":
         return None
     return library_hint(symptom.failure.message, symptom.recording)
@@ -71,13 +88,19 @@ def unknown_library(symptom: Raised) -> str | None:
 @explanation(Raised)
 def not_imported(symptom: Raised) -> str | None:
     """A well-known name of ROS 2 or Python, such as Twist or math, is not imported."""
-    return import_hint(symptom.failure.message) if symptom.failure.type == "NameError" else None
+    found = _UNDEFINED.match(symptom.failure.message)
+    for beginning, names in TABLE.imports.items():
+        if found and found[1] in names.split():
+            return (
+                "If it is the one of ROS or Python, import it at the top of the file: "
+                f"{code(f'{beginning} {found[1]}')}. Otherwise it is used before it is defined, "
+                "or misspelt."
+            )
+    return None
 
 
-_document, _ = read_source(TABLE).examine(Table)
-assert _document is not None
-for _row in _document.exceptions:
-    add(Explanation(Raised, _row, __name__, _row.mistake))
+for _row in TABLE.exceptions:
+    add(Explanation(Raised, _row.mistake, _row, __name__, _row.mistake))
 
 
 @explanation(Raised)
@@ -96,8 +119,10 @@ def no_such_attribute(symptom: Raised) -> str | None:
 
 
 @explanation(Raised, general=True)
-def any_exception(symptom: Raised) -> str:
+def any_exception(symptom: Raised) -> str | None:
     """Any other exception: the line that raised it is named."""
+    if not symptom.failure.frames:
+        return None
     if student_place(symptom.failure, symptom.recording.submission):
         return "Correct the line that is named here."
     return "Read the traceback from its last line upwards."

@@ -3,48 +3,40 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
 
 from grader.checks.wording import code, codes
 from grader.recording.model import Recording
 from grader.spec.nearest_name import nearest
 from grader.submission.read.rosdistro import PACKAGES, PYTHON_MODULES
-from grader.submission.record import SubmissionRecord
 
 _MISSING = re.compile(r"No module named '([A-Za-z_]\w*)")
 _MISSING_ROOT = re.compile(r"No module named '([A-Za-z_]\w*)'$")
+# Packages without a Python module: a student who imports one means another, such as rclpy.
 _WITHOUT_PYTHON = re.compile(r"rcl|rcl_.+|rclc.*|rcutils|rcpputils|rmw.*|ament_cmake.*|rosidl_.+")
-"""ROS packages that nobody can import; who does means another one, such as rclpy."""
 
 
-def lacking_package(
-    message: str, submission: SubmissionRecord, installed: Collection[str] = ()
-) -> str | None:
-    """The ROS package that the installation lacks, or None.
+def lacking_package(message: str, recording: Recording) -> str | None:
+    """The ROS package of Jazzy that an import wants and the installation lacks, or None.
 
-    Right code runs where the package is installed, so its absence is not the student's fault; the
-    same holds for one that the build does not find.
-
-    Args:
-        submission: What was handed in; its own packages are its own matter.
+    Right code runs where the package is installed, so its absence is not the student's fault.
     """
     found = _MISSING_ROOT.match(message)
     if found is None or found[1] not in PACKAGES:
         return None
     if found[1] not in PYTHON_MODULES and _WITHOUT_PYTHON.fullmatch(found[1]):
         return None
-    own = {package.name for package in submission.packages}
+    own = {package.name for package in recording.submission.packages}
+    # What is installed lacks only where the program hides it from itself.
+    installed = recording.environment.get("ros_imports", "").split()
     return None if found[1] in {*own, *installed} else found[1]
 
 
 def library_hint(message: str, recording: Recording) -> str | None:
     """What to do about an import of a library that is not among those of the assignment.
 
-    Args:
-        recording: Of the run; where it was in a sandbox, it names the libraries.
-
     Returns:
-        A hint, or None where the name is rather that of a package of the student's or of ROS.
+        A hint, or None where the name is rather that of a package of the student's or of ROS, and
+        where the run was in no sandbox, which names the libraries.
     """
     allowed = recording.environment.get("libraries")
     found = _MISSING.match(message)

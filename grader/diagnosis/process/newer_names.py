@@ -4,39 +4,31 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
 from grader.diagnosis.process.raised import Failure
 from grader.recording.model import Recording
+from grader.spec.source import Model, read_source
 
 _JAZZY_PYTHON = (3, 12)
-# What Python 3.11 and 3.12 added to modules that a node may use: "What's New In Python 3.11" and
-# "3.12", compared with what the modules of 3.10, 3.11 and 3.12 hold.
-_ADDED = {
-    "asyncio": "Barrier Runner TaskGroup timeout timeout_at eager_task_factory",
-    "calendar": "Day Month",
-    "collections.abc": "Buffer",
-    "contextlib": "chdir",
-    "datetime": "UTC",
-    "enum": "EnumCheck EnumType FlagBoundary ReprEnum StrEnum global_enum member nonmember verify",
-    "itertools": "batched",
-    "logging": "getHandlerByName getHandlerNames getLevelNamesMapping",
-    "math": "cbrt exp2 sumprod",
-    "operator": "call",
-    "random": "binomialvariate",
-    "types": "get_original_bases",
-    "typing": "LiteralString Never NotRequired Required Self TypeAliasType TypeVarTuple Unpack "
-    "assert_never assert_type dataclass_transform override reveal_type",
-}
-_ADDED_MODULES = ("tomllib",)
-_ADDED_METHODS = {"PosixPath": "walk", "Path": "walk"}
-# Those of 1.26 that numpy 2 lacks without saying that it had them; of the others it says so.
-_DROPPED_BY_NUMPY = "NAN RankWarning cumproduct msort product"
+# How Python says that something has no such name.
+_LACKS = (
+    re.compile(r"cannot import name '(?P<name>\w+)' from '(?P<home>[\w.]+)'"),
+    re.compile(r"(?:module )?'(?P<home>[\w.]+)' (?:object )?has no attribute '(?P<name>\w+)'"),
+    re.compile(r"No module named '(?P<name>\w+)'(?P<home>)"),
+)
+_REMOVED = re.compile(r"`np\.(\w+)` was removed in the NumPy 2")
+_ERRORS = ("AttributeError", "ImportError", "ModuleNotFoundError")
 
-_IMPORTED = re.compile(r"cannot import name '(\w+)' from '([\w.]+)'")
-_LOOKED_UP = re.compile(r"module '([\w.]+)' has no attribute '(\w+)'")
-_CALLED = re.compile(r"'(\w+)' object has no attribute '(\w+)'")
-_NO_MODULE = re.compile(r"No module named '(\w+)'")
-_SAID_BY_NUMPY = re.compile(r"`np\.(\w+)` was removed in the NumPy 2")
+
+class Table(Model):
+    """The whole of ``newer_names.yaml``: a module or a class -> names, with blanks between."""
+
+    added: dict[str, str]
+    dropped: dict[str, str]
+
+
+TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
 
 
 @dataclass(frozen=True)
@@ -53,45 +45,18 @@ class NewerName:
 
 
 def newer_name(failure: Failure, recording: Recording) -> NewerName | None:
-    """The name that a failure is about, if only the machine that grades lacks it.
-
-    Args:
-        recording: Of the run; it tells the version of Python.
-    """
-    dropped = _dropped_by_numpy(failure)
-    if dropped is not None:
-        return NewerName(f"numpy.{dropped}", "numpy 1.26 (for Python 3.12 and older)")
+    """The name that a failure is about, if only the machine that grades lacks it."""
+    if failure.type not in _ERRORS:
+        return None
+    removed = _REMOVED.match(failure.message)
+    found = next(filter(None, (words.match(failure.message) for words in _LACKS)), None)
+    home, name = (found["home"], found["name"]) if found else ("numpy", removed and removed[1])
+    if removed or name in TABLE.dropped.get(home, "").split():
+        return NewerName(f"numpy.{name}", "numpy 1.26 (for Python 3.12 and older)")
     version = recording.environment.get("python", "")
     if not version or tuple(map(int, version.split(".")[:2])) >= _JAZZY_PYTHON:
         return None
-    added = _added_to_python(failure)
-    return NewerName(added, "Python 3.12") if added else None
-
-
-def _dropped_by_numpy(failure: Failure) -> str | None:
-    if failure.type not in ("AttributeError", "ImportError"):
+    if name not in TABLE.added.get(home, "").split():
         return None
-    said = _SAID_BY_NUMPY.match(failure.message)
-    if said is not None:
-        return said[1]
-    module, name = _module_and_name(failure)
-    return name if module == "numpy" and name in _DROPPED_BY_NUMPY.split() else None
-
-
-def _added_to_python(failure: Failure) -> str | None:
-    if failure.type == "ModuleNotFoundError":
-        found = _NO_MODULE.match(failure.message)
-        return found[1] if found and found[1] in _ADDED_MODULES else None
-    called = _CALLED.match(failure.message)
-    if called is not None and _ADDED_METHODS.get(called[1]) == called[2]:
-        return f"pathlib.Path.{called[2]}"
-    module, name = _module_and_name(failure)
-    return f"{module}.{name}" if name and name in _ADDED.get(module, "").split() else None
-
-
-def _module_and_name(failure: Failure) -> tuple[str, str]:
-    if failure.type == "ImportError":
-        found = _IMPORTED.match(failure.message)
-        return (found[2], found[1]) if found else ("", "")
-    found = _LOOKED_UP.match(failure.message) if failure.type == "AttributeError" else None
-    return (found[1], found[2]) if found else ("", "")
+    home = "pathlib.Path" if home.endswith("Path") else home
+    return NewerName(f"{home}.{name}".removeprefix("."), "Python 3.12")

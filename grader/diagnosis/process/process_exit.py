@@ -2,82 +2,41 @@
 
 from __future__ import annotations
 
-import re
 import signal
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.explanation import Symptom, cause_of, explanation
+from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.process.exceptions import Raised
 from grader.diagnosis.process.missing_library import lacking_package
 from grader.diagnosis.process.newer_names import newer_name
-from grader.diagnosis.process.raised import Failure, fatal_failure, student_place
+from grader.diagnosis.process.raised import Failure, fatal_failure, in_brackets, student_place
 from grader.measure import declarations
 from grader.recording.model import Ending, Process, Recording
+from grader.spec.source import Model, read_source
 from grader.submission.record import SourceError
 
 _LOG_LINES = 15
 
-_SIGNALS = {
-    signal.SIGSEGV: "segmentation fault",
-    signal.SIGABRT: "abort",
-    signal.SIGBUS: "bus error",
-    signal.SIGILL: "illegal instruction",
-    signal.SIGFPE: "arithmetic error in native code",
-    signal.SIGKILL: "killed: by itself, or for too much memory",
-    signal.SIGSTOP: "stopped: it waited for SIGCONT",
-    signal.SIGXCPU: "too much CPU time",
-    signal.SIGXFSZ: "wrote a larger file than is allowed",
-    signal.SIGSYS: "a system call that no node needs",
-    signal.SIGTERM: "asked to end by another process",
-    signal.SIGPIPE: "wrote to a closed pipe",
-}
-_SIGNAL_HINTS = {
-    signal.SIGSEGV: "Native code crashed: look at the last call before it, such as one on a node "
-    "or publisher that was destroyed already.",
-    signal.SIGABRT: "A C++ exception or an assertion ended it: the last lines of output name it.",
-    signal.SIGKILL: "Look for os.kill or os.killpg, or for a list or an image that grows without "
-    "end.",
-    signal.SIGSTOP: "Look for os.kill, os.killpg and signal.raise_signal with SIGSTOP.",
-    signal.SIGTERM: "Look for os.kill, os.killpg or subprocess calls that end their own group.",
-}
 
-_BREACH_HINTS = {
-    "memory": "Look for a list, a queue or an image that grows without end.",
-    "cpu time": "Look for a loop without a pause: a node waits in rclpy.spin() and costs nothing "
-    "while nothing happens.",
-    "open files": "Look for files, sockets or processes that a loop opens and nothing closes.",
-    "descriptors in flight": "Receive at once what socket.send_fds() or multiprocessing sends.",
-    "escaped processes": "Write to no process but your own.",
-    "sessions": "Look for a loop that starts processes with start_new_session=True or setsid.",
-    "output": "Look for a print() or a log call in a loop that nothing slows down.",
-    "forbidden call": "Look for os.kill(os.getppid(), ...), and for whatever else is aimed at the "
-    "system, or at processes that are not your own.",
-    "forbidden packets": "The UDP ports from 7400 on belong to the middleware: choose another one "
-    "for a socket of your own.",
-    "forbidden name": "Let rclpy make your nodes and topics, and let it say which names it takes: "
-    "letters, digits and `_`, and `/` between the parts of a topic or a namespace.",
-    "forged report": "Write to no file descriptor that you did not open.",
-}
+class SignalRow(Model):
+    """A signal that ends a process, in words, and what to look for."""
 
-# A converter of rclpy met an object of another class; the name is that of the wanted one.
-_OTHER_CLASS = re.compile(r'convert_from_py: Assertion .strncmp\("[\w.]*\.(\w+)"')
+    words: str
+    hint: str = ""
 
-# A converter of rclpy met something else in a field of a message.
-_OTHER_FIELD = re.compile(r"Assertion .Py(Long|Float|Unicode|Bool)_Check\(")
-_FIELD_HINTS = {
-    "Long": "A field of integers in a message was given something else, such as a float or a text: "
-    "write int(value), and look for a parameter whose default is 1.0 or '1' in place of 1, or of "
-    "which .value is missing: get_parameter('name').value.",
-    "Float": "A field of floats in a message was given something else, such as a text or a whole "
-    "vector: write float(value).",
-    "Unicode": "A text field of a message was given something else: write str(value).",
-    "Bool": "A field that is True or False in a message was given something else: write "
-    "bool(value).",
-}
+
+class Table(Model):
+    """The whole of ``process_exit.yaml``: signals by name, and hints by what a breach is of."""
+
+    signals: dict[str, SignalRow]
+    breaches: dict[str, str]
+
+
+TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
 
 
 def ended_early(recording: Recording, process: Process) -> bool:
@@ -89,14 +48,10 @@ def ended_early(recording: Recording, process: Process) -> bool:
     if process.exited_ns is None:
         return False
     if process.stopped_by != "itself":
-        return process.exited_ns >= recording.stop_ns and _was_leaving(recording, process)
+        exiting_ns = declarations.exiting_ns(recording, process.name)
+        was_leaving = exiting_ns is not None and exiting_ns < recording.stop_ns
+        return process.exited_ns >= recording.stop_ns and was_leaving
     return recording.ending is Ending.EXITED or process.exited_ns < recording.stop_ns
-
-
-def _was_leaving(recording: Recording, process: Process) -> bool:
-    """Whether it said that it ends before it was asked to."""
-    exiting_ns = declarations.exiting_ns(recording, process.name)
-    return exiting_ns is not None and exiting_ns < recording.stop_ns
 
 
 def exited(recording: Recording) -> tuple[Process, ...]:
@@ -117,7 +72,8 @@ def exit_words(exit_code: int | None) -> str:
     number = signal_of(exit_code)
     if number is None:
         return f"exit code {exit_code}"
-    words = f" ({_SIGNALS[number]})" if number in _SIGNALS else ""
+    row = TABLE.signals.get(number.name)
+    words = f" ({row.words})" if row else ""
     through_shell = f", reported as exit code {exit_code}" if exit_code > 0 else ""
     return f"{number.name}{words}{through_shell}"
 
@@ -129,7 +85,7 @@ def signal_of(exit_code: int) -> signal.Signals | None:
         found = signal.Signals(number)
     except ValueError:
         return None
-    return found if exit_code < 0 or found in _SIGNALS else None
+    return found if exit_code < 0 or found.name in TABLE.signals else None
 
 
 def why_ended(recording: Recording, seen: str = "") -> Cause | None:
@@ -137,6 +93,12 @@ def why_ended(recording: Recording, seen: str = "") -> Cause | None:
     ended = exited(recording)
     cause = why_it_exited(recording, ended[0]) if ended else None
     return cause.after(seen) if cause is not None and seen else cause
+
+
+def why_crashed(recording: Recording) -> Cause | None:
+    """The cause if a process ended early with a failure; None if none did."""
+    ended = crashed(recording)
+    return why_it_exited(recording, ended[0]) if ended else None
 
 
 @dataclass(frozen=True)
@@ -152,10 +114,9 @@ class ProcessExit(Symptom[Cause]):
 
     @property
     def _when_s(self) -> float:
-        recording = self.recording
-        leaving_ns = declarations.exiting_ns(recording, self.process.name)
+        leaving_ns = declarations.exiting_ns(self.recording, self.process.name)
         exited_ns = leaving_ns if self._is_leaving else self.process.exited_ns
-        return recording.since_launch_s(exited_ns or recording.stop_ns)
+        return self.recording.since_launch_s(exited_ns or self.recording.stop_ns)
 
     @property
     def seen(self) -> str:
@@ -188,11 +149,6 @@ class ProcessExit(Symptom[Cause]):
         return student_place(failure, self.recording.submission) if failure else None
 
     @property
-    def where(self) -> str:
-        """The same in words, with a space before."""
-        return f" ({self.place.file}:{self.place.line})" if self.place else ""
-
-    @property
     def returned(self) -> bool:
         """Whether it ended without a failure."""
         failed = fatal_failure(self.recording, self.process.name)
@@ -202,21 +158,6 @@ class ProcessExit(Symptom[Cause]):
 def why_it_exited(recording: Recording, process: Process) -> Cause:
     """Why a process ended early, with its exception and the student's line if there is one."""
     return cause_of(ProcessExit(recording, process))
-
-
-@explanation(ProcessExit)
-def broken_off(symptom: ProcessExit) -> Cause | None:
-    """os._exit() or os.exec() ends the program in the middle of main()."""
-    process = symptom.process.name
-    if not symptom.returned or not declarations.broke_off(symptom.recording, process):
-        return None
-    return Cause(
-        f"{symptom.seen} with exit code 0, but main() did not return: Python was broken off, as "
-        "os._exit() does",
-        "Look for os._exit() or os.exec...(): they end the program wherever it is. A node "
-        "runs until rclpy.spin(node) returns, at Ctrl-C.",
-        symptom.evidence,
-    )
 
 
 @explanation(ProcessExit)
@@ -249,15 +190,15 @@ def returned_without_spin(symptom: ProcessExit) -> Cause | None:
 
 
 @explanation(ProcessExit)
-def returned(symptom: ProcessExit) -> Cause | None:
+def returned_early(symptom: ProcessExit) -> Cause | None:
     """main() returns early: spin_once(), a daemon thread, rclpy.shutdown() or sys.exit()."""
     if not symptom.returned:
         return None
     return Cause(
-        f"{symptom.seen} with exit code 0: main() returned, or something called sys.exit()",
+        f"{symptom.seen} with exit code 0: main() returned, or something ended the program",
         "rclpy.spin(node) keeps a node alive until Ctrl-C. Look for what ends it: spin_once() "
-        "handles one round only, a daemon thread ends with main(), rclpy.shutdown() and sys.exit() "
-        "end everything.",
+        "handles one round only, a daemon thread ends with main(), rclpy.shutdown(), sys.exit() "
+        "and os._exit() end everything.",
         symptom.evidence,
     )
 
@@ -268,7 +209,7 @@ def limit_exceeded(symptom: ProcessExit) -> Cause | None:
     breach = next((item for item in symptom.recording.breaches if item.ended), None)
     if symptom.killed is not signal.SIGKILL or breach is None:
         return None
-    return Cause(f"{symptom.seen}: {breach}", _BREACH_HINTS[breach.what], symptom.evidence)
+    return Cause(f"{symptom.seen}: {breach}", TABLE.breaches[breach.what], symptom.evidence)
 
 
 @explanation(ProcessExit)
@@ -277,10 +218,10 @@ def ended_by_signal(symptom: ProcessExit) -> Cause | None:
     if symptom.failure is not None:
         return None
     killed, evidence = symptom.killed, symptom.evidence
-    hint = ""
-    if killed is signal.SIGABRT:
-        hint = _wrong_class(evidence.log) or _wrong_field(evidence.log)
-    hint = hint or (_SIGNAL_HINTS.get(killed, "") if killed else "")
+    row = TABLE.signals.get(killed.name) if killed else None
+    failed = [line for line in evidence.log if killed is signal.SIGABRT and "Assertion" in line]
+    hints = [explain(Raised(Failure("Assertion", line, ()), symptom.recording)) for line in failed]
+    hint = next(filter(None, hints), None) or (row.hint if row else "")
     hint = hint or "Run it by hand with `ros2 run` and look at its last lines of output."
     return Cause(f"{symptom.seen} with {exit_words(symptom.process.exit_code)}", hint, evidence)
 
@@ -302,17 +243,16 @@ def service_without_response(symptom: ProcessExit) -> Cause | None:
 @explanation(ProcessExit)
 def package_not_installed(symptom: ProcessExit) -> Cause | None:
     """It imports a ROS 2 package that the machine lacks; an error, and never a lost point."""
-    failure, recording = symptom.failure, symptom.recording
+    failure = symptom.failure
     if not failure or failure.type != "ModuleNotFoundError":
         return None
-    installed = recording.environment.get("ros_imports", "").split()
-    lacking = lacking_package(failure.message, recording.submission, installed)
+    lacking = lacking_package(failure.message, symptom.recording)
     if lacking is None:
         return None
     apt_name = f"ros-jazzy-{lacking.replace('_', '-')}"
     return Cause(
-        f"{symptom.seen}: it imports {code(lacking)}{symptom.where}, a ROS 2 package that is not "
-        "installed where this is graded",
+        f"{symptom.seen}: it imports {code(lacking)}{in_brackets(symptom.place)}, a ROS 2 package "
+        "that is not installed where this is graded",
         f"No point is lost by it. Tell your instructor: `sudo apt install {apt_name}`.",
         symptom.evidence,
         ours=True,
@@ -326,8 +266,8 @@ def newer_python(symptom: ProcessExit) -> Cause | None:
     if not newer:
         return None
     return Cause(
-        f"{symptom.seen}: it uses {code(newer.name)}{symptom.where}, which is not there where "
-        "this is graded",
+        f"{symptom.seen}: it uses {code(newer.name)}{in_brackets(symptom.place)}, which is not "
+        "there where this is graded",
         f"It is right in ROS 2 Jazzy, which has {newer.home}, and no point is lost by it. Tell "
         f"your instructor: it needs {newer.home}. Or do without this name.",
         symptom.evidence,
@@ -338,13 +278,13 @@ def newer_python(symptom: ProcessExit) -> Cause | None:
 @explanation(ProcessExit, general=True)
 def raised(symptom: ProcessExit) -> Cause | None:
     """An exception ended it: see below what exceptions mean."""
-    failure, evidence = symptom.failure, symptom.evidence
+    failure = symptom.failure
     if failure is None:
         return None
     return Cause(
-        f"{symptom.seen} with {failure}{symptom.where}",
+        f"{symptom.seen} with {failure}{in_brackets(symptom.place)}",
         cause_of(Raised(failure, symptom.recording)),
-        replace(evidence, places=(symptom.place,) if symptom.place else ()),
+        replace(symptom.evidence, places=(symptom.place,) if symptom.place else ()),
     )
 
 
@@ -352,37 +292,18 @@ def offence(recording: Recording) -> Cause | None:
     """What the processes did that is never allowed, also where they ended before it was seen."""
     for breach in recording.breaches:
         if not breach.allowed:
-            when_s = recording.since_launch_s(breach.time_ns)
-            moment = Moment(breach.what, when_s)
-            return Cause(str(breach), _BREACH_HINTS[breach.what], Evidence(moments=(moment,)))
+            moment = Moment(breach.what, recording.since_launch_s(breach.time_ns))
+            return Cause(str(breach), TABLE.breaches[breach.what], Evidence(moments=(moment,)))
     return None
-
-
-def _wrong_class(lines: Sequence[str]) -> str:
-    """What to try where ROS was given an object of another class, or nothing."""
-    found = next((match for line in lines if (match := _OTHER_CLASS.search(line))), None)
-    if found is None:
-        return ""
-    # A part of a service or an action: Fibonacci_Result is Fibonacci.Result in Python.
-    name = re.sub(r"_(?=(Request|Response|Goal|Result|Feedback)$)", ".", found[1])
-    return (
-        f"ROS was given something that is no {code(name)}: return or publish one. A callback "
-        "without `return` returns None."
-    )
-
-
-def _wrong_field(lines: Sequence[str]) -> str:
-    """What to try where a field of a message held what it cannot."""
-    found = next((match for line in lines if (match := _OTHER_FIELD.search(line))), None)
-    return _FIELD_HINTS[found[1]] if found else ""
 
 
 def _last_lines(recording: Recording, process: Process) -> tuple[str, ...]:
     lines = [
         line.text
         for line in recording.log
-        if line.process == process.name and line.stream in ("stdout", "stderr")
+        if line.process == process.name
+        and line.stream in ("stdout", "stderr")
+        # Where colcon's script loads the entry point, Python does not leave its own frames out.
+        and '"<frozen importlib' not in line.text
     ]
-    # Where colcon's script loads the entry point, Python does not leave its own frames out.
-    lines = [line for line in lines if '"<frozen importlib' not in line]
     return tuple(lines[-_LOG_LINES:])

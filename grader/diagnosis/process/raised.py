@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from grader.recording.model import LogLine, Recording
+from grader.recording.model import Recording
 from grader.submission.record import SourceError, SubmissionRecord
 
 _HEADER = "Traceback (most recent call last):"
@@ -42,6 +42,7 @@ class Failure:
 
     Attributes:
         type: Short name of the class, such as ``ValueError``.
+        linked: It came of the exception before it.
         ignored: Python printed and ignored it (``Exception ignored in ...``).
     """
 
@@ -60,8 +61,6 @@ def parse_failures(lines: Sequence[str]) -> tuple[Failure, ...]:
     """Find every traceback in the output of one process."""
     found: list[Failure] = []
     linked = ignored = False
-    # What C code raised has no frames: the next failure, which has, is what came of it.
-    said, origin = "", ""
     index = 0
     while index < len(lines):
         line = lines[index]
@@ -69,26 +68,13 @@ def parse_failures(lines: Sequence[str]) -> tuple[Failure, ...]:
             start = index + 1 if line.strip() == _HEADER else index
             failure, index = _parse_one(lines, start, linked, ignored)
             if failure is not None:
-                found.append(_raised_by(failure, origin))
+                found.append(failure)
                 linked = ignored = False
-            said, origin = "", ""
             continue
-        if line.strip() in _LINKS:
-            linked, origin = True, said
-        elif line.startswith(_IGNORED):
-            ignored = True
-        said = line.rstrip() if line.strip() else said
+        linked = linked or line.strip() in _LINKS
+        ignored = ignored or line.startswith(_IGNORED)
         index += 1
     return tuple(found)
-
-
-def _raised_by(failure: Failure, origin: str) -> Failure:
-    """A failure with what was raised before it without frames, if there is that."""
-    raised = _RAISED.fullmatch(origin)
-    if raised is None or not raised["message"]:
-        return failure
-    short = raised["type"].rpartition(".")[2]
-    return replace(failure, type=short, message=raised["message"], linked=False)
 
 
 def _parse_one(
@@ -108,9 +94,7 @@ def _parse_one(
         else:
             break
         index += 1
-    if index == len(lines) or not frames:
-        return None, index
-    raised = _RAISED.fullmatch(lines[index].rstrip())
+    raised = _RAISED.fullmatch(lines[index].rstrip()) if index < len(lines) and frames else None
     if not raised:
         return None, index
     short = raised["type"].rpartition(".")[2]
@@ -119,7 +103,9 @@ def _parse_one(
 
 def failures(recording: Recording, process: str) -> tuple[Failure, ...]:
     """Every traceback that a process wrote to stderr."""
-    return parse_failures([line.text for line in _stderr(recording.log, process)])
+    return parse_failures(
+        [line.text for line in recording.log if line.process == process and line.stream == "stderr"]
+    )
 
 
 def fatal_failure(recording: Recording, process: str) -> Failure | None:
@@ -129,68 +115,51 @@ def fatal_failure(recording: Recording, process: str) -> Failure | None:
     the one to mend.
     """
     found = [failure for failure in failures(recording, process) if not failure.ignored]
-    if not found:
-        return None
     first = len(found) - 1
     while first > 0 and found[first].linked:
         first -= 1
-    return found[first]
+    return found[first] if found else None
 
 
-def interrupted_place(recording: Recording, process: str) -> SourceError | None:
+def interrupted_place(
+    recording: Recording, process: str, *, in_callback: bool = False
+) -> SourceError | None:
     """Where in the student's files a process was when SIGINT came, as its traceback tells.
 
     A process that was in ``rclpy.spin`` was where it should be: that place is not returned.
-    """
-    for failure in reversed(failures(recording, process)):
-        if failure.type == "KeyboardInterrupt":
-            place = student_place(failure, recording.submission, "was here when SIGINT came")
-            frame = _student_frame(failure, recording.submission)
-            if place is None or frame is None or "spin" in frame.source:
-                return None
-            source = f": {frame.source}" if frame.source else ""
-            return SourceError(place.file, place.line, place.message + source)
-    return None
-
-
-def interrupted_callback(recording: Recording, process: str) -> SourceError | None:
-    """Where in a callback a process was when SIGINT came; None if it was anywhere else.
-
-    A loop of its own in main() is no callback: rclpy did not call it.
-    """
-    for failure in reversed(failures(recording, process)):
-        if failure.type != "KeyboardInterrupt":
-            continue
-        frame = _student_frame(failure, recording.submission)
-        if frame is None or "spin" in frame.source:
-            return None
-        callers = failure.frames[: failure.frames.index(frame)]
-        if any("/rclpy/" in caller.file for caller in callers):
-            return interrupted_place(recording, process)
-        return None
-    return None
-
-
-def student_place(
-    failure: Failure, submission: SubmissionRecord, message: str = ""
-) -> SourceError | None:
-    """The deepest frame in the student's own files, with its path in the submission.
 
     Args:
-        message: What to say at the place; by default the exception.
+        in_callback: Only if rclpy had called it: a loop in main() is no callback.
     """
+    found = [item for item in failures(recording, process) if item.type == "KeyboardInterrupt"]
+    frame = _student_frame(found[-1], recording.submission) if found else None
+    if frame is None or "spin" in frame.source:
+        return None
+    callers = found[-1].frames[: found[-1].frames.index(frame)]
+    if in_callback and not any("/rclpy/" in caller.file for caller in callers):
+        return None
+    path = submission_path(frame.file, recording.submission) or frame.file
+    source = f": {frame.source}" if frame.source else ""
+    return SourceError(path, frame.line, f"was here when SIGINT came{source}")
+
+
+def student_place(failure: Failure, submission: SubmissionRecord) -> SourceError | None:
+    """The deepest frame in the student's own files, with its path in the submission."""
     frame = _student_frame(failure, submission)
     if frame is None:
         return None
-    path = submission_path(frame.file, submission)
-    return SourceError(path or frame.file, frame.line, message or str(failure))
+    path = submission_path(frame.file, submission) or frame.file
+    return SourceError(path, frame.line, str(failure))
+
+
+def in_brackets(place: SourceError | None) -> str:
+    """A place as it follows a sentence, such as `` (node.py:14)``; empty without one."""
+    return f" ({place.file}:{place.line})" if place else ""
 
 
 def _student_frame(failure: Failure, submission: SubmissionRecord) -> Frame | None:
-    for frame in reversed(failure.frames):
-        if submission_path(frame.file, submission):
-            return frame
-    return None
+    own = (frame for frame in reversed(failure.frames) if submission_path(frame.file, submission))
+    return next(own, None)
 
 
 def submission_path(installed: str, submission: SubmissionRecord) -> str | None:
@@ -198,12 +167,9 @@ def submission_path(installed: str, submission: SubmissionRecord) -> str | None:
 
     The longest of the known installed paths that the given path ends with wins.
     """
-    best: tuple[int, str] | None = None
-    for package in submission.packages:
-        for known, path in package.files:
-            if _ends_with(installed, known) and (best is None or len(known) > best[0]):
-                best = len(known), path
-    return best[1] if best else None
+    known = [pair for package in submission.packages for pair in package.files]
+    fitting = [pair for pair in known if _ends_with(installed, pair[0])]
+    return max(fitting, key=lambda pair: len(pair[0]))[1] if fitting else None
 
 
 def _ends_with(installed: str, known: str) -> bool:
@@ -214,7 +180,3 @@ def _ends_with(installed: str, known: str) -> bool:
     # A lone file name such as node.py would match rclpy/node.py too.
     parent = installed[: -len(known) - 1].rpartition("/")[2]
     return "/" in known or parent in _INSTALL_FOLDERS
-
-
-def _stderr(log: Iterable[LogLine], process: str) -> list[LogLine]:
-    return [line for line in log if line.process == process and line.stream == "stderr"]

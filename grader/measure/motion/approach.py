@@ -1,9 +1,11 @@
-"""The way to a goal pose: errors and arrival."""
+"""The way to a goal pose: errors, arrival, and turns by the long way."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from grader.checks.finding import Plot
 from grader.measure.motion.track import over_time
@@ -12,16 +14,15 @@ from grader.recording.simulated import Truth
 from sim.motion import Pose, wrap_angle
 
 NO_SPEED_M_S = 1e-3
+WRAP_HINT = (
+    "An angle error beyond [-pi, pi] makes the long way of the short one: normalise it with "
+    "atan2(sin(e), cos(e)) before you multiply it by the gain."
+)
 
 
 @dataclass(frozen=True)
 class Approach:
-    """A run towards a goal.
-
-    Attributes:
-        recording: The run; its robot moved.
-        goal: In the world's frame.
-    """
+    """A run towards a goal pose in the world's frame; its robot moved."""
 
     recording: Recording
     goal: Pose
@@ -54,14 +55,9 @@ class Approach:
         )
 
     def driven(self, position_m: float) -> int | None:
-        """Index of the step after which, near the goal, nothing but turns is commanded.
+        """Index of the step after the last one with a commanded speed.
 
-        Args:
-            position_m: How near the goal it must be.
-
-        Returns:
-            The step after the last one with a commanded speed, or None where speed was
-            commanded to the end or the robot was not near then.
+        None where a speed was commanded to the end, or the robot was farther from the goal.
         """
         index = len(self.truth)
         while index and abs(self.truth[index - 1].command_m_s) <= NO_SPEED_M_S:
@@ -84,3 +80,28 @@ class Approach:
             "heading error (°)",
             lambda step: math.degrees(self.heading_error_rad(step)),
         )
+
+
+def long_turns(
+    truth: Sequence[Truth], error: Callable[[Truth], float], tolerance_rad: float
+) -> Iterator[Truth]:
+    """First steps of turns away from an error, by more than the tolerance, through half a turn.
+
+    Args:
+        error: How far the robot would have to turn at a step, in rad from -pi to pi.
+    """
+    away_rad = 0.0
+    begin: Truth | None = None
+    for before, after in pairwise(truth):
+        error_rad = error(before)
+        turned_rad = wrap_angle(after.yaw_rad - before.yaw_rad)
+        if turned_rad * error_rad >= 0.0:
+            if turned_rad:
+                away_rad, begin = 0.0, None
+            continue
+        begin = begin or before
+        away_rad += abs(turned_rad)
+        if error_rad * error(after) < 0.0 and abs(error_rad) > math.pi / 2.0:
+            if away_rad > tolerance_rad:
+                yield begin
+            away_rad, begin = 0.0, None

@@ -1,4 +1,4 @@
-"""Velocity commands as the student published them, and what the robot told."""
+"""Velocity commands as the student published them, and what the robot published."""
 
 from __future__ import annotations
 
@@ -11,20 +11,16 @@ from grader.recording.model import Message, Recording
 from sim.motion import Twist
 
 _TOPIC = "/cmd_vel"
+# Late steps are noted before they are done, at the stamp of the step before them.
+_MARGIN_NS = 20_000_000
 
 
 @dataclass(frozen=True)
 class VelocityCommand:
-    """A velocity command.
-
-    Attributes:
-        twist: What it asks of the robot; may be NaN or infinite.
-        stray: Other fields of it that are not zero, such as ``linear.y``.
-    """
+    """A velocity command; its twist may be NaN or infinite."""
 
     time_ns: int
     twist: Twist
-    stray: tuple[str, ...] = ()
 
 
 def command_topic(recording: Recording) -> str:
@@ -33,12 +29,12 @@ def command_topic(recording: Recording) -> str:
 
 
 def odometry(recording: Recording) -> tuple[Message, ...]:
-    """What the robot told of its odometry, oldest first."""
+    """The robot's odometry, oldest first."""
     return () if recording.scene is None else recording.on(recording.scene.odometry_topic)
 
 
 def scans(recording: Recording) -> tuple[Message, ...]:
-    """What the robot told of its scans, oldest first."""
+    """The robot's scans, oldest first."""
     return () if recording.scene is None else recording.on(recording.scene.scan_topic)
 
 
@@ -49,14 +45,7 @@ def commands(recording: Recording) -> tuple[VelocityCommand, ...]:
         value = message.value.get("twist", message.value)
         linear, angular = number(value, "linear", "x"), number(value, "angular", "z")
         if linear is not None and angular is not None:
-            stray = tuple(
-                f"{part}.{axis}"
-                for part, axis in (
-                    ("linear", "y"), ("linear", "z"), ("angular", "x"), ("angular", "y"),
-                )
-                if number(value, part, axis)
-            )  # fmt: skip
-            found.append(VelocityCommand(message.stamp_ns, Twist(linear, angular), stray))
+            found.append(VelocityCommand(message.stamp_ns, Twist(linear, angular)))
     return tuple(found)
 
 
@@ -74,3 +63,17 @@ def number(value: Any, *path: str) -> float | None:
 def is_zero(twist: Twist) -> bool:
     """Whether a command asks the robot to rest."""
     return math.isclose(twist.linear_m_s, 0.0) and math.isclose(twist.angular_rad_s, 0.0)
+
+
+def stolen_s(recording: Recording, begin_ns: int, end_ns: int) -> float:
+    """How much later the robot can have received a command because of the machine, at most.
+
+    The student's waits for a CPU and the probe's lateness, and how late the simulator itself
+    was with its sensors' messages.
+    """
+    late_s = [
+        item.value or 0.0
+        for item in recording.incidents
+        if item.kind == "late" and begin_ns - _MARGIN_NS <= item.time_ns <= end_ns
+    ]
+    return recording.stolen_s(begin_ns, max(begin_ns, end_ns)) + max(late_s, default=0.0)

@@ -33,22 +33,20 @@ def ahead(scene: Scene, step: Truth) -> Sight | None:
     """The nearest thing straight ahead of the robot, or None where there is nothing."""
     eye = _eye(scene, step)
     cos, sin = math.cos(step.yaw_rad), math.sin(step.yaw_rad)
+
+    def into_frame(x_m: float, y_m: float) -> tuple[float, float]:
+        """As seen from the LiDAR, with the robot's heading as the x axis."""
+        dx, dy = x_m - eye.x_m, y_m - eye.y_m
+        return cos * dx + sin * dy, cos * dy - sin * dx
+
     found: Sight | None = None
-    for name, capsules in _things(scene, step.time_ns):
-        for x1, y1, x2, y2, radius in capsules:
-            # Seen from the LiDAR, along the robot's heading, the ray is the positive x axis.
-            dx1, dy1, dx2, dy2 = x1 - eye.x_m, y1 - eye.y_m, x2 - eye.x_m, y2 - eye.y_m
-            distance_m = _ray_m(
-                (
-                    cos * dx1 + sin * dy1,
-                    cos * dy1 - sin * dx1,
-                    cos * dx2 + sin * dy2,
-                    cos * dy2 - sin * dx2,
-                    radius,
-                )
-            )
-            if distance_m is not None and (found is None or distance_m < found.distance_m):
-                found = Sight(name, distance_m)
+    for name, (x1, y1, x2, y2, radius) in _things(scene, step.time_ns):
+        begin = into_frame(x1, y1)
+        distance_m = (
+            _ray_circle_m(*begin, radius) if radius else _ray_wall_m(*begin, *into_frame(x2, y2))
+        )
+        if distance_m is not None and (found is None or distance_m < found.distance_m):
+            found = Sight(name, distance_m)
     return found
 
 
@@ -56,13 +54,12 @@ def nearest(scene: Scene, step: Truth) -> Sight | None:
     """The nearest thing in any direction, or None in an empty world."""
     eye = _eye(scene, step)
     found: Sight | None = None
-    for name, capsules in _things(scene, step.time_ns):
-        for capsule in capsules:
-            distance_m = abs(point_clearance_m(eye.x_m, eye.y_m, capsule))
-            if found is None or distance_m < found.distance_m:
-                x, y = _foot(eye.x_m, eye.y_m, capsule)
-                bearing_rad = math.atan2(y - eye.y_m, x - eye.x_m) - step.yaw_rad
-                found = Sight(name, distance_m, math.remainder(bearing_rad, math.tau))
+    for name, capsule in _things(scene, step.time_ns):
+        distance_m = abs(point_clearance_m(eye.x_m, eye.y_m, capsule))
+        if found is None or distance_m < found.distance_m:
+            x, y = _foot(eye.x_m, eye.y_m, capsule)
+            bearing_rad = math.atan2(y - eye.y_m, x - eye.x_m) - step.yaw_rad
+            found = Sight(name, distance_m, math.remainder(bearing_rad, math.tau))
     return found
 
 
@@ -77,32 +74,18 @@ def _eye(scene: Scene, step: Truth) -> Pose:
     return compose(Pose(step.x_m, step.y_m, step.yaw_rad), scene.lidar)
 
 
-def _things(scene: Scene, time_ns: int) -> Iterator[tuple[str, tuple[Capsule, ...]]]:
-    yield from scene.outlines.items()
+def _things(scene: Scene, time_ns: int) -> Iterator[tuple[str, Capsule]]:
+    """Walls, which have no radius, and circles, whose segment is a point."""
+    for name, capsules in scene.outlines.items():
+        yield from ((name, capsule) for capsule in capsules)
     for obstacle in scene.moving:
         pose = obstacle.pose_at(time_ns - scene.began_ns)
         if pose is not None:
-            yield obstacle.label, obstacle.shape_at(pose).capsules
+            yield from ((obstacle.label, item) for item in obstacle.shape_at(pose).capsules)
 
 
-def _ray_m(capsule: Capsule) -> float | None:
-    """Distance along the positive x axis to a capsule's outline, or None if it misses."""
-    x1, y1, x2, y2, radius = capsule
-    if radius == 0.0:
-        return _ray_segment_m(x1, y1, x2, y2)
-    hits = [_ray_circle_m(x1, y1, radius)]
-    length_m = math.hypot(x2 - x1, y2 - y1)
-    if length_m > 0.0:
-        hits.append(_ray_circle_m(x2, y2, radius))
-        nx, ny = (y1 - y2) / length_m * radius, (x2 - x1) / length_m * radius
-        hits += [
-            _ray_segment_m(x1 + side * nx, y1 + side * ny, x2 + side * nx, y2 + side * ny)
-            for side in (1.0, -1.0)
-        ]
-    return min((hit for hit in hits if hit is not None), default=None)
-
-
-def _ray_segment_m(x1: float, y1: float, x2: float, y2: float) -> float | None:
+def _ray_wall_m(x1: float, y1: float, x2: float, y2: float) -> float | None:
+    """Distance along the positive x axis, or None if it misses."""
     if y1 * y2 > 0.0:
         return None
     if y1 == y2:

@@ -24,7 +24,7 @@ def speed(speed_m_s: float) -> str:
 
 def turn(speed_rad_s: float) -> str:
     """Write an angular speed: ``0.5 rad/s``."""
-    return f"{speed_rad_s:.3g} rad/s"
+    return f"{round(speed_rad_s, 6) + 0.0:.3g} rad/s"
 
 
 def degrees(angle_rad: float) -> str:
@@ -39,9 +39,5 @@ def point(x_m: float, y_m: float) -> str:
 
 
 def side(bearing_rad: float) -> str:
-    """Say where something is as seen from the robot.
-
-    Args:
-        bearing_rad: In the robot's frame, counter-clockwise from straight ahead.
-    """
+    """Write where something is as seen from the robot, by its bearing from straight ahead."""
     return _SIDES[round(math.remainder(bearing_rad, math.tau) / (math.pi / 2.0)) % 4]

@@ -1,25 +1,63 @@
-"""Commands on the way to a goal pose and at it, each with the error that it answers."""
+"""Commands with the odometry that they answer, and the line through them."""
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from grader.measure.motion.answer import Answer
-from grader.measure.motion.approach import NO_SPEED_M_S, Approach
-from grader.measure.motion.control_law import Law, Sample, examine
+from grader.measure.motion.approach import Approach
+from grader.measure.motion.command import VelocityCommand, commands, number, odometry
+from grader.measure.motion.track import pose_at
+from grader.recording.model import NS, Message, Recording
+from sim.motion import Pose
 
-LEAST_SAMPLES = 8
-# A command is in force from the step after it.
-_STEP_NS = 12_000_000
-# Of what the law of the first phase asks for.
-_SAME = 0.03
-_GOOD_R2 = 0.9
+MOST_BEHIND = 2
+"""Messages of odometry that are on their way, or wait for a busy callback, at most."""
+LEAST_FIT = 3
+"""A slow timer and a large gain leave few commands between the clamp and the goal."""
+ZERO_RAD_S = 1e-4
+FEW_STRAYS = 0.05
+_SAME = 1e-6
+_PLATEAU = 3
+_LEAST_TRIMMED = 8
+_SHORT_OF = 0.8
 
 
-def on_the_way(run: Approach, known: Sequence[Answer], position_m: float) -> list[Sample]:
-    """Commands until the robot is near the goal, with the error to the goal's direction."""
-    return [_to_goal(run, item) for item in before_arrival(run, known, position_m)]
+@dataclass(frozen=True)
+class Answer:
+    """A command with the odometry that its sender can have known: its time and true pose."""
+
+    command: VelocityCommand
+    seen_ns: int
+    pose: Pose
+
+
+def answers(recording: Recording, behind: int) -> list[Answer]:
+    """Every finite command between the first odometry and the end.
+
+    Args:
+        behind: How many messages older than the newest the known odometry is.
+    """
+    received = odometry(recording)
+    found = []
+    for item in commands(recording):
+        seen_ns = _seen_ns(received, item.time_ns, behind) if received else item.time_ns
+        is_judged = item.twist.is_finite and item.time_ns <= recording.truth[-1].time_ns
+        if seen_ns is not None and is_judged:
+            found.append(Answer(item, seen_ns, pose_at(recording.truth, seen_ns)))
+    return found
+
+
+def _seen_ns(received: Sequence[Message], time_ns: int, behind: int) -> int | None:
+    """Time at which the newest known odometry was measured, or None before the first."""
+    index = bisect_right(received, time_ns, key=lambda message: message.stamp_ns)
+    if index <= behind:
+        return None
+    message = received[index - 1 - behind]
+    sec, nanosec = (number(message.value, "header", "stamp", key) for key in ("sec", "nanosec"))
+    return message.stamp_ns if sec is None or nanosec is None else int(sec) * NS + int(nanosec)
 
 
 def before_arrival(run: Approach, known: Sequence[Answer], position_m: float) -> list[Answer]:
@@ -29,56 +67,93 @@ def before_arrival(run: Approach, known: Sequence[Answer], position_m: float) ->
     return [item for item in known if item.seen_ns < arrival_ns]
 
 
-def at_the_goal(
-    run: Approach, known: Sequence[Answer], position_m: float, limit_rad_s: float
-) -> list[Sample]:
-    """Commands since the robot has stopped near the goal, with the error to its heading.
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A command and the error that it answers."""
 
-    One that drives on while it turns is judged by what it does since it arrived.
+    error_rad: float
+    command_rad_s: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through the origin: its slope in rad/s for each rad, and how well it fits.
+
+    Attributes:
+        r2: Coefficient of determination, at most 1.
+        used: Number of commands.
     """
-    arrival, driven = run.arrival(position_m), run.driven(position_m)
-    since_ns: float
-    if driven is not None:
-        since_ns = run.truth[driven].time_ns - _STEP_NS
-    else:
-        since_ns = math.inf if arrival is None else run.truth[arrival].time_ns
-    there = [item for item in known if item.command.time_ns >= since_ns]
-    still = [item for item in there if abs(item.command.twist.linear_m_s) <= NO_SPEED_M_S]
-    still = still[_of_the_way(run, known, still, position_m, limit_rad_s) :]
-    if len(still) >= LEAST_SAMPLES:
-        return [_to_heading(run, item) for item in still]
-    driving = [item for item in there if abs(item.command.twist.linear_m_s) > NO_SPEED_M_S]
-    return [_to_heading(run, item) for item in (*driving, *still)]
+
+    gain: float
+    r2: float
+    used: int
 
 
-def _of_the_way(
-    run: Approach,
-    known: Sequence[Answer],
-    still: Sequence[Answer],
-    position_m: float,
-    limit_rad_s: float,
-) -> int:
-    """How many of the first commands without speed still turn to the goal's direction.
+def fit(samples: Sequence[Sample], limit_rad_s: float) -> Line:
+    """Lay a line through the origin and the commands that are at no limit.
 
-    Near the goal its direction changes fast; one that drives only where it looks there then
-    stops and turns once more, before it has arrived by its own tolerance.
+    A command at a limit is left out only if the line asks for at least that much there, so that
+    a step does not pass for a clamp.
+
+    Args:
+        samples: At least one.
     """
-    way = on_the_way(run, known, position_m)
-    law = examine(way, limit_rad_s, _GOOD_R2)
-    if law.law is not Law.PROPORTIONAL or law.r2 < _GOOD_R2:
-        return 0
-    fastest = max(abs(sample.command_rad_s) for sample in way)
-    for index, item in enumerate(still):
-        sample = _to_goal(run, item)
-        wanted = max(-fastest, min(fastest, law.gain * sample.error_rad))
-        if abs(sample.command_rad_s - wanted) > _SAME * abs(wanted):
-            return index
-    return 0
+    sizes = [abs(item.command_rad_s) for item in samples]
+    highest = max(sizes)
+    lowest = min((size for size in sizes if size > ZERO_RAD_S), default=0.0)
+    clamp = highest if _count(sizes, highest) >= _PLATEAU else math.inf
+    floor = lowest if _count(sizes, lowest) >= _PLATEAU and lowest < highest else 0.0
+    clamp = min(clamp, limit_rad_s * 0.999)
+    high, low = clamp * (1.0 - _SAME), floor * (1.0 + _SAME)
+    inside = [item for item in samples if low < abs(item.command_rad_s) < high]
+    if len(inside) < LEAST_FIT:
+        # Without a clamp of its own the law shows in what was asked for beyond the limit too.
+        inside, high, low = list(samples), math.inf, 0.0
+    slope = _gain(inside)
+
+    def counts(item: Sample) -> bool:
+        size, wanted = abs(item.command_rad_s), slope * abs(item.error_rad)
+        if size >= high:
+            return wanted < _SHORT_OF * clamp
+        return size > low or wanted > floor / _SHORT_OF
+
+    kept = _without_strays([item for item in samples if counts(item)])
+    gain = _gain(kept)
+    return Line(gain, _r2(kept, gain), len(kept))
 
 
-def _to_goal(run: Approach, item: Answer) -> Sample:
-    return Sample(run.bearing_error_rad(item.pose), item.command.twist.angular_rad_s)
+def _without_strays(samples: list[Sample]) -> list[Sample]:
+    """Leave out the few commands that fit worst.
+
+    Where one phase ends and the next begins, a command or two answer the error of the other.
+    """
+    if len(samples) < _LEAST_TRIMMED:
+        return samples
+    gain = _gain(samples)
+    by_rest = sorted(samples, key=lambda item: abs(item.command_rad_s - gain * item.error_rad))
+    return by_rest[: len(samples) - math.ceil(FEW_STRAYS * len(samples))]
 
 
-def _to_heading(run: Approach, item: Answer) -> Sample:
-    return Sample(run.heading_error_rad(item.pose), item.command.twist.angular_rad_s)
+def _count(sizes: Sequence[float], size: float) -> int:
+    return sum(math.isclose(item, size, rel_tol=_SAME) for item in sizes)
+
+
+def _gain(samples: Sequence[Sample]) -> float:
+    square = sum(item.error_rad**2 for item in samples)
+    product = sum(item.error_rad * item.command_rad_s for item in samples)
+    return product / square if square > 0.0 else 0.0
+
+
+def _r2(samples: Sequence[Sample], gain: float) -> float:
+    # In shares of the largest command, so that the squares of huge ones are still numbers.
+    largest = max(abs(item.command_rad_s) for item in samples) or 1.0
+    shares = [item.command_rad_s / largest for item in samples]
+    mean = sum(shares) / len(samples)
+    total = sum((share - mean) ** 2 for share in shares)
+    rest = sum(
+        (share - gain / largest * item.error_rad) ** 2
+        for share, item in zip(shares, samples, strict=True)
+    )
+    if total <= 0.0:
+        return 1.0 if rest <= 0.0 else 0.0
+    return 1.0 - rest / total

@@ -18,8 +18,6 @@ MOVED_M = 1e-3
 MOVED_RAD = 1e-2
 # A pause shorter than this is no rest: on-off driving rests again and again.
 _REST_NS = NS // 2
-_ONE_WAY = 0.9
-"""Share of all turning that leads around: a controller that settles turns back a little."""
 _MOST_POINTS = 400
 
 
@@ -46,7 +44,7 @@ def way_m(truth: Sequence[Truth]) -> float:
 
 
 def gone_ahead_m(truth: Sequence[Truth]) -> float:
-    """Way that was driven ahead; what was driven backwards is taken off."""
+    """Way that was driven ahead, less what was driven backwards."""
     return sum(
         math.copysign(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m), b.linear_m_s)
         for a, b in pairwise(truth)
@@ -58,33 +56,15 @@ def turned_rad(truth: Sequence[Truth]) -> float:
     return sum(wrap_angle(b.yaw_rad - a.yaw_rad) for a, b in pairwise(truth))
 
 
-def turns_one_way(truth: Sequence[Truth]) -> float:
-    """Whole turns of a robot that turns on and on in one sense, counter-clockwise positive."""
-    net_rad = turned_rad(truth)
-    gross_rad = sum(abs(wrap_angle(b.yaw_rad - a.yaw_rad)) for a, b in pairwise(truth))
-    is_one_way = abs(net_rad) >= max(1.5 * math.tau, _ONE_WAY * gross_rad)
-    return net_rad / math.tau if is_one_way else 0.0
-
-
-def headings(truth: Sequence[Truth]) -> list[float]:
-    """Heading of every step without jumps: full turns are counted."""
-    found: list[float] = []
-    for step in truth:
-        before = found[-1] if found else step.yaw_rad
-        found.append(before + wrap_angle(step.yaw_rad - before))
-    return found
-
-
 def departure(truth: Sequence[Truth]) -> int | None:
     """Index of the first step in which the robot moves, or None."""
     return next((index for index, step in enumerate(truth) if not is_at_rest(step)), None)
 
 
 def first_rest(truth: Sequence[Truth]) -> int | None:
-    """Index at which the robot first came to rest after it had moved.
+    """Index of the first step of a rest after it had moved, or None.
 
-    Returns:
-        The first step of a rest that lasts for half a second or until the end, or None.
+    A rest lasts for half a second, or until the end.
     """
     begin = departure(truth)
     if begin is None:
@@ -114,12 +94,7 @@ def index_at(truth: Sequence[Truth], time_ns: int) -> int:
 
 
 def pose_at(truth: Sequence[Truth], time_ns: int) -> Pose:
-    """True pose at a time, between two steps in proportion.
-
-    Args:
-        truth: At least one step.
-        time_ns: When; before the first and after the last step, their poses.
-    """
+    """True pose at a time, interpolated; before the first and after the last step, their poses."""
     index = bisect_left(truth, time_ns, key=_time_ns)
     if index == 0 or index == len(truth):
         step = truth[min(index, len(truth) - 1)]
@@ -140,27 +115,16 @@ def over_time(
     value: Callable[[Truth], float | None],
     band: tuple[float, float] | None = None,
 ) -> Plot:
-    """Draw something of the truth over time, thinned out to what can be seen.
-
-    Args:
-        value: Ordinate of a step; None leaves it out.
-        band: Lowest and highest allowed ordinate, or None.
-    """
+    """Draw a value of each step over time, with its allowed band; None leaves a step out."""
     truth = recording.truth
     stride = max(1, len(truth) // _MOST_POINTS)
     points = [
-        (recording.since_launch_s(step.time_ns), y)
+        (recording.since_launch_s(step.time_ns), shown)
         for step in truth[::stride]
-        if (y := value(step)) is not None
+        if (shown := value(step)) is not None
     ]
-    return Plot(
-        title,
-        "time since launch (s)",
-        y_label,
-        tuple(x for x, _ in points),
-        tuple(y for _, y in points),
-        band,
-    )
+    x, y = zip(*points, strict=True) if points else ((), ())
+    return Plot(title, "time since launch (s)", y_label, x, y, band)
 
 
 def speed_plot(recording: Recording, band: tuple[float, float] | None = None) -> Plot:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from markupsafe import Markup
 
-from grader.checks.finding import Moment
 from grader.checks.wording import counted, listing
 from grader.diagnosis.no_endpoint import OWN_TOPICS
 from grader.recording.model import NS, Call, LogLine, Owner, Process, Recording
@@ -14,7 +13,7 @@ from grader.report.drawing.axes import TIME_AXIS, Scale, time_axis
 from grader.report.drawing.flags import Flag, draw_flags
 from grader.report.drawing.lanes import LANE, SIDE, Bar, Lane, draw_lanes
 from grader.report.drawing.svg import Figure, figure, fitted
-from grader.report.model.sections import printed
+from grader.report.model.output import printed
 from grader.safe_text import one_line
 
 MOST_NODES = 4
@@ -25,10 +24,11 @@ _OWN_SERVICE = "parameter service"
 _COMPLAINTS = ("Traceback (most recent call last)", "[ERROR]", "[FATAL]")
 
 
-def draw_timeline(recording: Recording, moments: Sequence[Moment], name: str) -> Figure | None:
+def draw_timeline(recording: Recording, moments_s: Sequence[float], name: str) -> Figure | None:
     """Draw the time line of a run.
 
     Args:
+        moments_s: Times that findings point at, in seconds since launch.
         name: Unique in the document; letters, digits and hyphens.
 
     Returns:
@@ -39,7 +39,7 @@ def draw_timeline(recording: Recording, moments: Sequence[Moment], name: str) ->
         return None
     flags = _flags(recording)
     lanes = [*_of_processes(recording), *_of_topics(recording), *_of_requests(recording)]
-    lanes += _of_what_went_wrong(recording, moments)
+    lanes += _of_what_went_wrong(recording, moments_s)
 
     def draw(width: float) -> tuple[float, list[Markup]]:
         scale = Scale(0.0, end_s, SIDE, width - SIDE)
@@ -183,7 +183,7 @@ def _of_requests(recording: Recording) -> Iterator[Lane]:
         )
 
 
-def _of_what_went_wrong(recording: Recording, moments: Sequence[Moment]) -> Iterator[Lane]:
+def _of_what_went_wrong(recording: Recording, moments_s: Sequence[float]) -> Iterator[Lane]:
     """Output with its errors, limits that were reached, and what findings point at."""
     lines = printed(recording)
     bad = [entry.time_ns for entry in lines if _complains(entry)]
@@ -194,9 +194,8 @@ def _of_what_went_wrong(recording: Recording, moments: Sequence[Moment]) -> Iter
         reached = listing(breach.what for breach in recording.breaches)
         times_s = _since(recording, [breach.time_ns for breach in recording.breaches])
         yield Lane("limits of the sandbox", f"reached: {reached}", crosses=times_s)
-    if moments:
-        times_s = [moment.time_s for moment in moments]
-        yield Lane("findings", counted(len(moments), "moment"), crosses=times_s)
+    if moments_s:
+        yield Lane("findings", counted(len(moments_s), "moment"), crosses=moments_s)
 
 
 def _complains(entry: LogLine) -> bool:

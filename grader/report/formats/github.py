@@ -9,13 +9,12 @@ limits of annotations: actions/runner, ``ExecutionContext.cs``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from grader.checks.finding import Status
 from grader.report.formats.markdown import render_markdown
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
-from grader.report.text import explanation, words
+from grader.report.text import explanation
+from grader.report.text.words import number
 from grader.safe_text import clean, one_line
 
 MOST_ANNOTATIONS = 10
@@ -24,6 +23,7 @@ MOST_CHARACTERS = 4096
 """Of a message; the runner cuts what comes after."""
 SUMMARY_BYTES = 1 << 20
 """Of the summary of a step; beyond it GitHub shows nothing of it."""
+_LEFT_OUT = ("where", "printed")
 
 
 def annotation_lines(result: Result, prefix: str | None = "") -> tuple[str, ...]:
@@ -66,8 +66,8 @@ def outputs(result: Result, delimiter: str) -> str:
     """
     copy = for_student(result)
     values = {
-        "score": words.number(copy.score) if copy.score is not None else "",
-        "max-score": words.number(copy.max_score),
+        "score": number(copy.score) if copy.score is not None else "",
+        "max-score": number(copy.max_score),
         "status": status(copy),
         "summary": explanation.headline(copy),
     }
@@ -109,13 +109,9 @@ def _annotation(check: CheckPart, result: Result, level: str, prefix: str | None
         if place.line:
             properties["line"] = str(place.line)
     properties["title"] = one_line(f"{check.title} ({explanation.points(check)})")
-    return command(level, "\n".join(_message(check, result)), **properties)
-
-
-def _message(check: CheckPart, result: Result) -> Iterator[str]:
-    for row in explanation.explain(check, result):
-        if row.name in ("scenario", "expected", "observed", *words.ADVICE, "waiting"):
-            yield f"{row.name}: {row.text}"
+    # The place is that of the annotation, and what was printed is too long for it.
+    rows = [one for one in explanation.explain(check, result) if one.name not in _LEFT_OUT]
+    return command(level, "\n".join(f"{row.name}: {row.text}" for row in rows), **properties)
 
 
 def _data(text: str) -> str:

@@ -18,6 +18,7 @@ from grader.checks.finding import Status
 from grader.errors import UsageError
 from grader.report.formats import markdown
 from grader.report.formats.options import FormatOptions
+from grader.report.model.result import read_json
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import explanation
@@ -95,12 +96,7 @@ def read_metadata(file: Path) -> Mapping[str, Any]:
     Raises:
         UsageError: It cannot be read, or is not one.
     """
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"{file} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise UsageError(f"{file} is not JSON: {error}") from error
+    data = read_json(file)
     if not isinstance(data, dict):
         raise UsageError(f"{file} is not Gradescope's submission_metadata.json: no object in it")
     return data

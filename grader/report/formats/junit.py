@@ -94,9 +94,7 @@ def _notes(result: Result) -> Iterator[str]:
     """What is worth knowing of the runs; it belongs to no check."""
     for kind in explanation.notes_of_runs(result):
         yield f"{kind.title}:"
-        yield from (f"scenario {run}: {text}" for run, text in kind.notes)
-        if kind.rest:
-            yield kind.rest
+        yield from kind.lines
 
 
 def _properties(parent: ET.Element, values: dict[str, str]) -> None:

@@ -15,7 +15,8 @@ from grader.checks.finding import Status
 from grader.report.formats.options import FormatOptions
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
-from grader.report.text import explanation, words
+from grader.report.text import explanation
+from grader.report.text.words import STATUS
 from grader.safe_text import clean, one_line
 
 # Within a word an underscore is no markup; names would be hard to read with it escaped.
@@ -46,7 +47,9 @@ def render_markdown(result: Result, most_bytes: int | None = None) -> str:
     Returns:
         Markdown; the same input gives the same text.
     """
-    blocks = [_head(result), _table(result), *notes(result), *_explanations(result)]
+    title = f"## {literal(result.assignment.id)}: {explanation.score(result)}"
+    head = [title, "", explanation.headline(result), *first_to_fix(result), ""]
+    blocks = ["\n".join(head), _table(result), *notes(result), *_explanations(result)]
     whole = "\n".join(blocks)
     if most_bytes is None or len(whole.encode()) <= most_bytes:
         return whole
@@ -105,29 +108,19 @@ def _cut(line: str) -> str:
     return line if len(line) <= _LINE_CHARACTERS else f"{line[: _LINE_CHARACTERS - 1]}…"
 
 
-def _head(result: Result) -> str:
-    lines = [
-        f"## {literal(result.assignment.id)}: {explanation.score(result)}",
-        "",
-        explanation.headline(result),
-    ]
-    return "\n".join([*lines, *first_to_fix(result), ""])
-
-
 def first_to_fix(result: Result) -> list[str]:
     """What to correct first, and where; no lines where nothing failed."""
     first = next((check for check in result.checks if check.id == result.first_to_fix), None)
     if first is None:
         return []
-    place = words.first_place(first)
-    where = f" ({literal(place)})" if place else ""
+    where = "".join(f" ({literal(explanation.spot(one))})" for one in first.evidence.places[:1])
     return ["", f"**Fix this first:** {prose(first.title)}{where}"]
 
 
 def _table(result: Result) -> str:
     lines = ["| | check | points |", "| --- | --- | ---: |"]
     for check in result.checks:
-        said = words.STATUS[check.status]
+        said = STATUS[check.status]
         title = prose(check.title, cell=True)
         lines.append(f"| {said.symbol} {said.word} | {title} | {explanation.points(check)} |")
     return "\n".join([*lines, ""])
@@ -136,15 +129,10 @@ def _table(result: Result) -> str:
 def notes(result: Result) -> Iterator[str]:
     """Limits of the sandbox that were reached and what else is worth knowing, a block for each."""
     for kind in explanation.notes_of_runs(result):
-        lines = [f"- scenario {literal(run)}: {prose(text)}" for run, text in kind.notes]
-        if kind.rest:
-            lines.append(f"- {kind.rest}")
-        yield "\n".join([f"**{kind.title}**", "", *lines, ""])
+        yield "\n".join([f"**{kind.title}**", "", *(f"- {prose(one)}" for one in kind.lines), ""])
 
 
 def _explanations(result: Result) -> Iterator[str]:
-    for status in (Status.FAILED, Status.ERROR):
-        for check in result.checks:
-            if check.status is status:
-                yield f"### {words.STATUS[status].symbol} {prose(check.title)}\n"
-                yield f"{explained(check, result)}\n"
+    for check in (*result.of(Status.FAILED), *result.of(Status.ERROR)):
+        yield f"### {STATUS[check.status].symbol} {prose(check.title)}\n"
+        yield f"{explained(check, result)}\n"

@@ -5,10 +5,7 @@ Whatever a student does not get to see before grading is only counted.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
@@ -17,13 +14,8 @@ from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Visibility
 from grader.errors import UsageError
 from grader.grade.points import total
-from grader.report.html.policy import content_security_policy
-from grader.report.html.report import asset, environment
+from grader.report.html.page import render_page
 from grader.report.text.words import counted_points
-
-if TYPE_CHECKING:
-    from markdown_it import MarkdownIt
-    from markdown_it.token import Token
 
 HANDOUT_FILE = "README.md"
 
@@ -67,7 +59,7 @@ def make_handout(loaded: LoadedAssignment) -> Handout:
     Raises:
         UsageError: Its handout cannot be read.
     """
-    checks = [b for b in loaded.checks if b.spec.visibility is Visibility.VISIBLE]
+    visible = [b for b in loaded.checks if b.spec.visibility is Visibility.VISIBLE]
     hidden = [b for b in loaded.checks if b.spec.visibility is not Visibility.VISIBLE]
     file = loaded.folder / HANDOUT_FILE
     try:
@@ -78,50 +70,28 @@ def make_handout(loaded: LoadedAssignment) -> Handout:
         id=loaded.assignment.id,
         title=loaded.assignment.title,
         text=text,
-        checks=tuple(checks),
+        checks=tuple(visible),
         hidden=len(hidden),
         hidden_points=total(bound.spec.points for bound in hidden),
     )
 
 
 def render_handout(handout: Handout) -> str:
-    """Render the page of an assignment: one file, without a script, that needs no network.
-
-    Returns:
-        A whole HTML document; the same input gives the same text.
-    """
-    style = asset("report.css") + asset("handout.css")
-    return (
-        environment()
-        .get_template("handout.html.j2")
-        .render(
-            handout=handout,
-            text=Markup(_body(handout.text)),
-            style=Markup(style),
-            policy=content_security_policy(style),
-        )
-    )
+    """Render the page of an assignment, which has no script."""
+    text = Markup(_body(handout.text))
+    return render_page("handout.html.j2", ("report.css", "handout.css"), handout=handout, text=text)
 
 
 def _body(text: str) -> str:
     """The author's Markdown as HTML, below the page's own heading."""
-    reader = _markdown()
-    tokens = reader.parse(text)
-    if tokens and tokens[0].type == "heading_open" and tokens[0].tag == "h1":
-        tokens = tokens[3:]
-    return str(reader.renderer.render(_below_the_title(tokens), reader.options, {}))
-
-
-def _below_the_title(tokens: Sequence[Token]) -> Sequence[Token]:
-    for token in tokens:
-        if token.type.startswith("heading_") and token.tag == "h1":
-            token.tag = "h2"
-    return tokens
-
-
-@cache
-def _markdown() -> MarkdownIt:
     from markdown_it import MarkdownIt
 
     # HTML in it is shown as text. The page may load nothing, so an image stays a link to it.
-    return MarkdownIt("commonmark", {"html": False}).enable("table").disable("image")
+    reader = MarkdownIt("commonmark", {"html": False}).enable("table").disable("image")
+    tokens = reader.parse(text)
+    if tokens and tokens[0].type == "heading_open" and tokens[0].tag == "h1":
+        tokens = tokens[3:]
+    for token in tokens:
+        if token.tag == "h1":
+            token.tag = "h2"
+    return str(reader.renderer.render(tokens, reader.options, {}))

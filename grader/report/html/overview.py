@@ -1,8 +1,6 @@
 """The class overview: one page for all submissions of an assignment.
 
-Everything is in the page as a plain table; its script only filters and sorts. As in a report,
-whatever a student chose is cleaned and escaped, and the page's policy names its own script and
-style by their hashes.
+Everything is in the page as a plain table; its script only filters and sorts.
 """
 
 from __future__ import annotations
@@ -10,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import median
+from statistics import fmean, median
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -18,8 +16,7 @@ from markupsafe import Markup
 from grader.checks.finding import Status
 from grader.report.drawing.distribution import draw_distribution
 from grader.report.drawing.svg import element
-from grader.report.html.policy import content_security_policy
-from grader.report.html.report import asset, environment
+from grader.report.html.page import render_page
 from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.result_model import CheckPart, ScenarioPart
 from grader.report.text.words import STATUS, number
@@ -31,81 +28,50 @@ _UNGRADED = (RowStatus.NOT_GRADED, RowStatus.UNREADABLE, RowStatus.MISSING)
 
 @dataclass(frozen=True)
 class Column:
-    """A check over the whole class."""
+    """A check over the whole class; ``counts`` says how often it ended how."""
 
     id: str
     title: str
-    max_points: float
-    counts: dict[Status, int]
-
-    @property
-    def total(self) -> int:
-        """Submissions in which it was there."""
-        return sum(self.counts.values())
+    counts: Counter[Status]
 
 
 def render_overview(rows: Sequence[ClassRow]) -> str:
-    """Render the overview of a class.
-
-    Returns:
-        A whole HTML document; the same input gives the same text. Its links are relative to
-        the folder that it is written to.
-    """
+    """Render the overview of a class; its links are relative to the folder that it lies in."""
     columns = _columns(rows)
     scores = [row.score for row in rows if row.score is not None]
     most = max((row.result.max_score for row in rows if row.result is not None), default=0.0)
-    style, script = asset("report.css") + asset("overview.css"), asset("overview.js")
-    return (
-        environment()
-        .get_template("overview.html.j2")
-        .render(
-            assignments=sorted({row.result.assignment.id for row in rows if row.result}),
-            rows=rows,
-            columns=columns,
-            failed_most=_failed_most(columns),
-            lines=[_line(row, columns) for row in rows],
-            scores=scores,
-            middle=median(scores) if scores else 0.0,
-            mean=sum(scores) / len(scores) if scores else 0.0,
-            most=most,
-            distribution=draw_distribution(scores, most, "distribution"),
-            ungraded=[row for status in _UNGRADED for row in rows if row.status is status],
-            counts=Counter(row.status for row in rows),
-            RowStatus=RowStatus,
-            why=_why_ungraded,
-            disturbed=_disturbed(rows),
-            link=_link,
-            style=Markup(style),
-            script=Markup(script),
-            policy=content_security_policy(style, script),
-        )
+    failed = [column for column in columns if column.counts[Status.FAILED]]
+    return render_page(
+        "overview.html.j2",
+        ("report.css", "overview.css"),
+        "overview.js",
+        assignments=sorted({row.result.assignment.id for row in rows if row.result}),
+        rows=rows,
+        columns=columns,
+        failed_most=sorted(failed, key=lambda column: -column.counts[Status.FAILED]),
+        lines=[_line(row, columns) for row in rows],
+        scores=scores,
+        middle=median(scores) if scores else 0.0,
+        mean=fmean(scores) if scores else 0.0,
+        most=most,
+        distribution=draw_distribution(scores, most, "distribution"),
+        ungraded=[row for status in _UNGRADED for row in rows if row.status is status],
+        counts=Counter(row.status for row in rows),
+        RowStatus=RowStatus,
+        why=_why_ungraded,
+        disturbed=_disturbed(rows),
+        link=_link,
     )
 
 
-def _columns(rows: Sequence[ClassRow]) -> tuple[Column, ...]:
+def _columns(rows: Sequence[ClassRow]) -> list[Column]:
     """Every check of the class, in the order of the assignment."""
     found: dict[str, Column] = {}
     for row in rows:
-        for check in _checks(row):
-            column = found.setdefault(
-                check.id,
-                Column(check.id, check.title, check.max_points, dict.fromkeys(Status, 0)),
-            )
+        for check in row.judged:
+            column = found.setdefault(check.id, Column(check.id, check.title, Counter()))
             column.counts[check.status] += 1
-    return tuple(found.values())
-
-
-def _checks(row: ClassRow) -> Sequence[CheckPart]:
-    """What was judged of a row: of what cannot be read, nothing was."""
-    if row.result is None or row.status is RowStatus.UNREADABLE:
-        return ()
-    return row.result.checks
-
-
-def _failed_most(columns: Sequence[Column]) -> list[Column]:
-    """Checks that somebody failed, the most failed first."""
-    failed = [column for column in columns if column.counts[Status.FAILED]]
-    return sorted(failed, key=lambda column: -column.counts[Status.FAILED])
+    return list(found.values())
 
 
 def _line(row: ClassRow, columns: Sequence[Column]) -> Markup:
@@ -113,7 +79,7 @@ def _line(row: ClassRow, columns: Sequence[Column]) -> Markup:
 
     Made by hand and not by the template: a class has tens of thousands of them.
     """
-    checks = {check.id: check for check in _checks(row)}
+    checks = {check.id: check for check in row.judged}
     page = _link(row)
     return Markup("").join(_cell(checks.get(column.id), page) for column in columns)
 
@@ -146,9 +112,8 @@ def _why_ungraded(row: ClassRow) -> str:
     if row.result is not None:
         if row.result.submission.problem:
             return row.result.submission.problem
-        for check in row.result.checks:
-            if check.status is Status.ERROR:
-                return f"{one_line(check.title)}: {one_line(check.observed)}"
+        for check in row.result.of(Status.ERROR):
+            return f"{one_line(check.title)}: {one_line(check.observed)}"
     return row.note or "nothing was graded"
 
 

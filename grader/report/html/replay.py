@@ -19,7 +19,7 @@ from grader.measure.motion.quantities import metres
 from grader.recording.model import NS, Message, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing.ground_plan import places
-from grader.report.model.sections import printed
+from grader.report.model.output import printed
 from grader.report.model.target import targets
 from grader.safe_text import one_line
 

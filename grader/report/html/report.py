@@ -1,175 +1,166 @@
-"""The HTML report: one file that needs no network, and no JavaScript to be read.
-
-Whatever a student chose is untrusted: every value is cleaned of control characters and escaped
-on its way into the page, and the page's own policy forbids requests and every script and style
-but its own, which it names by their hashes.
-"""
+"""The HTML report of one submission: one file that can be read without JavaScript."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from itertools import accumulate
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
-from grader import resources
 from grader.checks.finding import Status
-from grader.checks.wording import counted
 from grader.grade.model import Grade
-from grader.recording.model import NS, Recording
+from grader.recording.event import Breach
+from grader.recording.model import Recording
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
-from grader.report.html.build_log import arrange
+from grader.report.drawing.plot import draw_plot
+from grader.report.drawing.svg import Figure
 from grader.report.html.comparison import align
-from grader.report.html.pictures import Gallery, draw_run, draw_shares
-from grader.report.html.policy import content_security_policy
+from grader.report.html.page import render_page
 from grader.report.html.replay import Replay, embedded, make_replay, with_goals
-from grader.report.model.facts import RunFacts
-from grader.report.model.remarks import remarks
-from grader.report.model.sections import ENDINGS, make_sections, shorten
-from grader.report.text import words
-from grader.safe_text import clean
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from grader.report.html.sections import Section, draw_run, make_sections
+from grader.report.model.output import shorten
+from grader.report.model.result_model import BuildPart, PlotPart, Result
 
 NO_REFERENCE: Mapping[str, Replay] = {}
+NO_POINTS = 0.15
+"""Width of a check without points, as if it gave these."""
+CONTEXT = 6
+"""Lines of a build log that are shown around the student's own."""
+MOST_PLACES = 3
+"""Places in the log that are shown before the whole of it."""
 
 
 def render_report(
     grade: Grade,
+    result: Result,
     recordings: Mapping[str, Recording],
-    facts: RunFacts,
     references: Mapping[str, Replay] = NO_REFERENCE,
 ) -> str:
     """Render the report of one submission.
 
     Args:
+        grade: The whole grade.
+        result: Its result or the student's copy of it: nothing else of the checks is shown.
         recordings: By scenario id; may lack scenarios that were not run.
-
-    Returns:
-        A whole HTML document; the same input gives the same text.
     """
-    sections = make_sections(grade, recordings)
+    assignment = grade.assignment
+    sections = make_sections(grade, result, recordings)
     runs = [section.recording for section in sections if section.recording]
-    replays = {
-        section.scenario.id: made
-        for section in sections
-        if section.scenario is not None
-        and section.recording is not None
-        and (made := make_replay(section.recording, section.scenario)) is not None
-    }
-    style, script = asset("report.css"), asset("report.js")
-    return (
-        environment()
-        .get_template("report.html.j2")
-        .render(
-            grade=grade,
-            facts=facts,
-            sections=sections,
-            pictures={
-                section.id: draw_run(grade, section, alone=len(runs) == 1) for section in sections
-            },
-            gallery=Gallery(),
-            shares=draw_shares(grade.results),
-            replays={
-                name: embedded(
-                    {
-                        "student": with_goals(own, grade.assignment, name),
-                        "reference": with_goals(references[name], grade.assignment, name)
-                        if name in references
-                        else None,
-                    }
-                )
-                for name, own in replays.items()
-            },
-            told={run.scenario for run in runs},
-            runs=runs,
-            faults=_faults(grade),
-            style=Markup(style),
-            script=Markup(script),
-            policy=content_security_policy(style, script),
-        )
-    )
-
-
-@cache
-def asset(name: str) -> str:
-    """A style or script of the pages."""
-    return (resources.templates() / name).read_text(encoding="utf-8")
-
-
-def _faults(grade: Grade) -> tuple[str, ...]:
-    """What went wrong on our side, each cause once."""
-    return tuple(
-        dict.fromkeys(
-            item.finding.observed
-            for result in grade.results
-            for item in result.findings
-            if item.finding.status is Status.ERROR
-        )
-    )
-
-
-@cache
-def environment() -> Environment:
-    """The templates, with all that they call; whatever they print is cleaned and escaped."""
-    # Imported late: the commands that write no report start faster without it.
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    from grader.report.html.compiled import CompiledTemplates
-
-    environment = Environment(
-        loader=FileSystemLoader(resources.templates()),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=_cleaned,
-        bytecode_cache=CompiledTemplates(resources.cache_folder() / "templates"),
-    )
-    environment.filters["prose"] = _prose
-    environment.filters["number"] = words.number
-    environment.globals.update(
-        Status=Status,
-        STATUS=words.STATUS,
-        HIDDEN_UNTIL=words.HIDDEN_UNTIL,
-        ENDINGS=ENDINGS,
-        ENVIRONMENT=words.ENVIRONMENT,
-        advice=words.advice,
-        headline=words.headline,
-        limit_reached=words.limit_reached,
-        remarks=remarks,
-        counted=counted,
-        tally=words.tally,
-        points_waiting=words.points_waiting,
-        waiting=words.waiting,
+    return render_page(
+        "report.html.j2",
+        ("report.css",),
+        "report.js",
+        title=assignment.title,
+        result=result,
+        first=next((one for one in result.checks if one.id == result.first_to_fix), None),
+        titles={check.id: check.title for check in result.checks},
+        sections=sections,
+        pictures={
+            section.id: draw_run(section, result, assignment, alone=len(runs) == 1)
+            for section in sections
+        },
+        shares=shares(result),
+        faults=_faults(result),
+        replays=_replays(grade, sections, references),
+        runs=runs,
+        told={run.scenario for run in runs},
+        files={run.id: run.recording for run in result.scenarios},
+        remarks={run.id: run.remarks for run in result.scenarios},
+        gallery=Gallery(),
         align=align,
-        arrange=arrange,
+        build_lines=build_lines,
         draw_callbacks=draw_callbacks,
         draw_cases=draw_cases,
+        limit_reached=_limit_reached,
         shorten=shorten,
-        taken_ms=_taken_ms,
-        run_s=lambda recording: (recording.end_ns - recording.launched_ns) / NS,
-    )
-    return environment
-
-
-def _cleaned(value: Any) -> Any:
-    return clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value
-
-
-def _prose(text: str) -> Markup:
-    """Text of a finding, with what stands between backticks as code."""
-    parts = clean(text).split("`")
-    if len(parts) % 2 == 0:
-        parts[-2:] = [f"{parts[-2]}`{parts[-1]}"]
-    return Markup("").join(
-        Markup("<code>{}</code>").format(part) if index % 2 else escape(part)
-        for index, part in enumerate(parts)
     )
 
 
-def _taken_ms(recording: Recording) -> float:
-    return recording.stolen_s(recording.launched_ns, recording.end_ns) * 1e3
+class Gallery:
+    """The plots of one report; checks of the same run often show the same."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._names: dict[tuple[PlotPart, str | None], str] = {}
+        self._folded: set[str] = set()
+
+    def plot(
+        self, plot: PlotPart, name: str, scenario: str | None, *, folded: bool = False
+    ) -> tuple[str, Figure | None]:
+        """Draw a plot, or only name the figure that shows it already.
+
+        Args:
+            folded: Whether the finding is folded up at first. One that is not shows its plot,
+                even if one that is has it too.
+        """
+        known = self._names.get((plot, scenario))
+        if known is not None and (folded or known not in self._folded):
+            return known, None
+        self._names[plot, scenario] = name
+        if folded:
+            self._folded.add(name)
+        return name, draw_plot(plot, name)
+
+
+def shares(result: Result) -> list[tuple[float, float, Status]]:
+    """Begin and width of the part of a bar, 1000 wide, that stands for the points of each check."""
+    widths = [max(check.max_points, NO_POINTS) for check in result.checks]
+    scale = 1000.0 / (sum(widths) or 1.0)
+    begins = accumulate(widths, initial=0.0)
+    return [
+        (begin * scale, max(1.0, width * scale - 4.0), check.status)
+        for begin, width, check in zip(begins, widths, result.checks, strict=False)
+    ]
+
+
+def _faults(result: Result) -> list[str]:
+    """What went wrong on our side, each cause once."""
+    findings = [finding for check in result.checks for finding in check.findings]
+    return list(dict.fromkeys(one.observed for one in findings if one.status is Status.ERROR))
+
+
+def _replays(
+    grade: Grade, sections: list[Section], references: Mapping[str, Replay]
+) -> dict[str, Markup]:
+    found: dict[str, Markup] = {}
+    for section in sections:
+        if section.scenario is None or section.recording is None:
+            continue
+        name, own = section.scenario.id, make_replay(section.recording, section.scenario)
+        if own is not None:
+            both = {"student": own, "reference": references.get(name)}
+            found[name] = embedded(
+                {
+                    side: with_goals(replay, grade.assignment, name) if replay else None
+                    for side, replay in both.items()
+                }
+            )
+    return found
+
+
+def build_lines(build: BuildPart) -> list[tuple[str, bool]]:
+    """The lines of a build log around the student's own mistake, each with whether it names it.
+
+    The first lines that name the file (and the line, if one is known) or repeat the message;
+    nothing where the log tells nothing of it.
+    """
+    lines, culprit = build.log.splitlines(), build.culprit
+    if culprit is None:
+        return []
+    file = culprit.file.rpartition("/")[2]
+    place = (f":{culprit.line}", f"line {culprit.line}") if culprit.line else ("",)
+    named = [i for i, text in enumerate(lines) if file in text and any(p in text for p in place)]
+    said = [i for i, text in enumerate(lines) if culprit.message and culprit.message in text]
+    hits = sorted({*named[:MOST_PLACES], *said[:1]})
+    if not hits:
+        return []
+    begin = max(0, hits[0] - 2)
+    end = min(len(lines), hits[-1] + CONTEXT, begin + 4 * CONTEXT)
+    return [(lines[i], i in hits) for i in range(begin, end)]
+
+
+def _limit_reached(breach: Breach) -> str:
+    """What reached which limit of the sandbox, and what came of it."""
+    then = "they were ended for it" if breach.ended else "anything more is refused"
+    return f"the processes of the submission {breach.violation}; {then}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from grader.report.model.result_model import Result
+from grader.report.model.result_model import CheckPart, Result
 
 
 class RowStatus(str, Enum):
@@ -49,9 +49,21 @@ class ClassRow:
         return RowStatus.GRADED if self.result.graded else RowStatus.NOT_GRADED
 
     @property
+    def judged(self) -> tuple[CheckPart, ...]:
+        """Its checks; none of what cannot be read."""
+        if self.result is None or self.status is RowStatus.UNREADABLE:
+            return ()
+        return self.result.checks
+
+    @property
     def graded(self) -> bool:
         """Whether it has a score."""
         return self.status is RowStatus.GRADED
+
+    @property
+    def score(self) -> float | None:
+        """Its points; None where there is no grade."""
+        return self.result.score if self.result is not None and self.graded else None
 
     @property
     def full(self) -> bool:
@@ -61,19 +73,14 @@ class ClassRow:
     @property
     def states(self) -> str:
         """Words that the overview filters by."""
+        runs = self.result.scenarios if self.result is not None else ()
         found = {
             "full": self.full,
             "lost": self.graded and not self.full,
             "ungraded": self.status is RowStatus.NOT_GRADED,
             "unreadable": self.status is RowStatus.UNREADABLE,
             "missing": self.status is RowStatus.MISSING,
-            "disturbed": self.result is not None
-            and any(run.disturbed for run in self.result.scenarios),
+            "disturbed": any(run.disturbed for run in runs),
             "late": self.late,
         }
         return " ".join(word for word, holds in found.items() if holds)
-
-    @property
-    def score(self) -> float | None:
-        """Its points; None where there is no grade."""
-        return self.result.score if self.result is not None and self.graded else None

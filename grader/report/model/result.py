@@ -14,7 +14,6 @@ from grader.checks.finding import Status
 from grader.errors import UsageError
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.recording.model import NS, Recording
-from grader.report.files import write_whole
 from grader.report.model.facts import RunFacts
 from grader.report.model.remarks import remarks
 from grader.report.model.result_model import (
@@ -55,14 +54,10 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
         max_score=grade.max_score,
         graded=grade.graded,
         first_to_fix=first.id if first else None,
-        checks=tuple(_check(result) for result in grade.results),
+        checks=tuple(map(_check, grade.results)),
         withheld=WithheldPart(checks=grade.withheld.checks, points=grade.withheld.points),
         scenarios=tuple(
-            _scenario(
-                recordings[scenario.id],
-                facts.recordings.get(scenario.id),
-                facts.runs.get(scenario.id, 1),
-            )
+            _scenario(recordings[scenario.id], facts)
             for scenario in grade.assignment.scenarios
             if scenario.id in recordings
         ),
@@ -79,31 +74,13 @@ def result_json(result: Result) -> str:
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def write_result(
-    grade: Grade, recordings: Mapping[str, Recording], facts: RunFacts, file: Path
-) -> Result:
-    """Write ``result.json``, whole or not at all.
-
-    Raises:
-        UsageError: It cannot be written there.
-    """
-    result = make_result(grade, recordings, facts)
-    write_whole(file, result_json(result))
-    return result
-
-
 def read_result(file: Path) -> Result:
     """Read a ``result.json``.
 
     Raises:
         UsageError: There is none, it is not one, or it has a schema that is not ours.
     """
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"{file} cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise UsageError(f"{file} is not JSON: {error}") from error
+    data = read_json(file)
     schema = data.get("schema") if isinstance(data, dict) else None
     if schema != SCHEMA:
         raise UsageError(
@@ -116,6 +93,20 @@ def read_result(file: Path) -> Result:
         first = error.errors()[0]
         place = ".".join(str(step) for step in first["loc"])
         raise UsageError(f"{file} is not a result: {place}: {first['msg']}") from error
+
+
+def read_json(file: Path) -> Any:
+    """Read JSON.
+
+    Raises:
+        UsageError: The file cannot be read, or is not JSON.
+    """
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise UsageError(f"{file} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise UsageError(f"{file} is not JSON: {error}") from error
 
 
 def result_schema() -> dict[str, Any]:
@@ -153,12 +144,12 @@ def _finding(item: ScenarioFinding) -> FindingPart:
     )
 
 
-def _scenario(recording: Recording, file: str | None, runs: int) -> ScenarioPart:
-    begin, end = recording.launched_ns, recording.end_ns
+def _scenario(recording: Recording, facts: RunFacts) -> ScenarioPart:
+    name, begin, end = recording.scenario, recording.launched_ns, recording.end_ns
     return ScenarioPart(
-        id=recording.scenario,
+        id=name,
         seed=recording.seed,
-        recording=file,
+        recording=facts.recordings.get(name),
         ending=recording.ending.value,
         duration_s=(end - begin) / NS,
         disturbance=DisturbancePart(
@@ -166,7 +157,7 @@ def _scenario(recording: Recording, file: str | None, runs: int) -> ScenarioPart
             worst_late_s=max((item.late_ns for item in recording.disturbance), default=0) / NS,
         ),
         faults=recording.faults,
-        breaches=tuple(str(breach) for breach in recording.breaches),
+        breaches=tuple(map(str, recording.breaches)),
         remarks=remarks(recording),
-        runs=runs,
+        runs=facts.runs.get(name, 1),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -15,6 +16,7 @@ from pydantic import (
 )
 
 from grader.checks.finding import Status
+from grader.grade.first import reason
 from grader.safe_text import encodable
 
 SCHEMA: Literal[1] = 1
@@ -180,6 +182,11 @@ class CheckPart(FindingPart):
     waits_for: tuple[Text, ...]
     other_scenarios: tuple[FindingPart, ...]
 
+    @property
+    def findings(self) -> tuple[FindingPart, ...]:
+        """What it said of every scenario, first of the one that decided."""
+        return (self, *self.other_scenarios)
+
 
 class WithheldPart(_Part):
     """Checks that the reader does not get to see yet; they are not in ``max_score`` either."""
@@ -262,3 +269,15 @@ class Result(_Part):
         alias_generator=lambda name: name.rstrip("_"),
         populate_by_name=True,
     )
+
+    def of(self, status: Status) -> tuple[CheckPart, ...]:
+        """Checks that ended so, in the author's order."""
+        return tuple(check for check in self.checks if check.status is status)
+
+    @property
+    def reasons(self) -> dict[str, Hashable]:
+        """Why each failed check failed, by id: equal for those that name the same mistake."""
+        return {
+            check.id: reason(check.id, check.scenario, check.observed, check.evidence)
+            for check in self.of(Status.FAILED)
+        }

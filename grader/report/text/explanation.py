@@ -1,15 +1,16 @@
-"""What a check of a result says, as plain words: the same in every format without pictures."""
+"""What a result says, as plain words: the same in every format."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from grader.assignment.model import Withheld
 from grader.checks.finding import Status
+from grader.checks.wording import counted, listing
 from grader.grade import first
+from grader.grade.points import total
 from grader.report.model.result_model import CheckPart, FindingPart, PlacePart, Result
-from grader.report.text import words
+from grader.report.text.words import ADVICE, STATUS, counted_points, number
 from grader.safe_text import clean, one_line
 
 MOST_NOTES = 20
@@ -23,8 +24,8 @@ class Row:
     """One thing that is said.
 
     Attributes:
-        name: What it is: ``expected``, ``observed``, ``try next``, ``also``, ``where``,
-            ``printed`` or ``waiting``.
+        name: What it is: ``scenario``, ``expected``, ``observed``, ``try next``, ``also``,
+            ``where``, ``printed`` or ``waiting``.
         text: Cleaned; ``printed`` has several lines.
     """
 
@@ -32,86 +33,122 @@ class Row:
     text: str
 
 
+def explain(check: CheckPart, result: Result) -> list[Row]:
+    """Say why a check ended as it did; what is the same in several scenarios is said once."""
+    same_advice: dict[tuple[str, ...], list[FindingPart]] = {}
+    for item in check.findings:
+        if item.status is check.status:
+            same_advice.setdefault(advice(check, item), []).append(item)
+    rows: list[Row] = []
+    for texts, items in same_advice.items():
+        rows += _seen(items, several=len(check.findings) > 1)
+        rows += [Row(ADVICE[min(index, 1)], one_line(text)) for index, text in enumerate(texts)]
+        places = dict.fromkeys(where(place) for item in items for place in item.evidence.places)
+        rows += [Row("where", place) for place in places]
+        log = next((item.evidence.log for item in items if item.evidence.log), ())
+        if log:
+            rows.append(Row("printed", clean("\n".join(log))))
+    if waits := points_waiting(check, result):
+        rows.append(Row("waiting", waits))
+    return rows
+
+
+def _seen(items: Sequence[FindingPart], *, several: bool) -> Iterator[Row]:
+    scenarios: dict[tuple[str, str], list[str]] = {}
+    for item in items:
+        key = (one_line(item.expected), one_line(item.observed))
+        scenarios.setdefault(key, []).append(one_line(item.scenario or ""))
+    before = None
+    for (expected, observed), names in scenarios.items():
+        if several and names[0]:
+            yield Row("scenario", listing(names))
+        if expected != before:
+            yield Row("expected", expected)
+        yield Row("observed", observed)
+        before = expected
+
+
+def advice(check: CheckPart, finding: FindingPart) -> tuple[str, ...]:
+    """What to try next: the check's hint, then the author's own where a check failed."""
+    own = check.author_hint if finding.status is Status.FAILED else ""
+    return tuple(dict.fromkeys(text for text in (finding.hint, own) if text))
+
+
+def where(place: PlacePart) -> str:
+    """``file:line: message`` in one line."""
+    return one_line(f"{spot(place)}: {place.message}")
+
+
+def spot(place: PlacePart) -> str:
+    """``file:line``, or only the file."""
+    return f"{place.file}:{place.line}" if place.line else place.file
+
+
+def plain(check: CheckPart, result: Result) -> str:
+    """:func:`explain` as text, a line for each; several lines stand below their name."""
+    rows = explain(check, result)
+    return "\n".join(
+        f"{row.name}:{chr(10) if chr(10) in row.text else ' '}{row.text}" for row in rows
+    )
+
+
 @dataclass(frozen=True)
 class Notes:
     """What is worth knowing of the runs, beside the checks.
 
     Attributes:
-        notes: Scenario and text of each, in one line each; between backticks stands code.
+        lines: One line each; between backticks stands code.
     """
 
     title: str
-    notes: tuple[tuple[str, str], ...]
-    left_out: int
-
-    @property
-    def rest(self) -> str:
-        """What to say of the notes that are left out; nothing where there are none."""
-        return f"{self.left_out} more: see the report" if self.left_out else ""
+    lines: tuple[str, ...]
 
 
-def notes_of_runs(result: Result) -> tuple[Notes, ...]:
+def notes_of_runs(result: Result) -> list[Notes]:
     """Limits of the sandbox that were reached, and what else is worth knowing."""
-    reached = [(run.id, breach) for run in result.scenarios for breach in run.breaches]
-    remarked = [(run.id, remark) for run in result.scenarios for remark in run.remarks]
-    kinds = ((words.LIMITS_REACHED, reached), (words.WORTH_KNOWING, remarked))
-    return tuple(_notes(title, told) for title, told in kinds if told)
+    reached = [(breach, run.id) for run in result.scenarios for breach in run.breaches]
+    remarked = [(remark, run.id) for run in result.scenarios for remark in run.remarks]
+    kinds = (("Limits of the sandbox that were reached", reached), ("Worth knowing", remarked))
+    return [Notes(title, _lines(found)) for title, found in kinds if found]
 
 
-def _notes(title: str, told: Sequence[tuple[str, str]]) -> Notes:
-    kept = tuple((one_line(run), _cut(one_line(text))) for run, text in told[:MOST_NOTES])
-    return Notes(title, kept, len(told) - len(kept))
+def _lines(found: Sequence[tuple[str, str]]) -> tuple[str, ...]:
+    runs: dict[str, list[str]] = {}
+    for text, run in found:
+        runs.setdefault(one_line(text), []).append(one_line(run))
+    lines = [
+        f"scenario{'s' if len(names) > 1 else ''} {listing(names)}: {_cut(text)}"
+        for text, names in list(runs.items())[:MOST_NOTES]
+    ]
+    left_out = len(runs) - len(lines)
+    return (*lines, f"{left_out} more: see the report") if left_out else tuple(lines)
 
 
 def _cut(text: str) -> str:
     return text if len(text) <= MOST_CHARACTERS else f"{text[: MOST_CHARACTERS - 1]}…"
 
 
-def explain(check: CheckPart, result: Result) -> tuple[Row, ...]:
-    """Say why a check ended as it did, every scenario that did not pass in its turn."""
-    findings = [check, *check.other_scenarios]
-    told = [item for item in findings if item.status is check.status]
-    rows = [row for item in told for row in _rows(check, item, many=len(findings) > 1)]
-    if points := words.points_waiting(check.id, result.checks):
-        rows.append(Row("waiting", points))
-    return tuple(rows)
-
-
-def _rows(check: CheckPart, finding: FindingPart, *, many: bool) -> Iterator[Row]:
-    if many and finding.scenario:
-        yield Row("scenario", one_line(finding.scenario))
-    yield Row("expected", one_line(finding.expected))
-    yield Row("observed", one_line(finding.observed))
-    own = check.author_hint if finding.status is Status.FAILED else ""
-    advice = dict.fromkeys(text for text in (finding.hint, own) if text)
-    for number, text in enumerate(advice):
-        yield Row(words.ADVICE[min(number, 1)], one_line(text))
-    for place in finding.evidence.places:
-        yield Row("where", where(place))
-    if finding.evidence.log:
-        yield Row("printed", clean("\n".join(finding.evidence.log)))
-
-
-def where(place: PlacePart) -> str:
-    """``file:line: message`` in one line."""
-    line = f":{place.line}" if place.line else ""
-    return one_line(f"{place.file}{line}: {place.message}")
-
-
-def plain(check: CheckPart, result: Result) -> str:
-    """:func:`explain` as text, a line for each; several lines stand below their name."""
-    return "\n".join(_told(row) for row in explain(check, result))
-
-
-def _told(row: Row) -> str:
-    gap = "\n" if "\n" in row.text else " "
-    return f"{row.name}:{gap}{row.text}"
-
-
 def points(check: CheckPart) -> str:
     """``1.02 / 3``; what could not be judged has a question mark."""
-    earned = "?" if check.status is Status.ERROR else words.number(check.points)
-    return f"{earned} / {words.number(check.max_points)}"
+    earned = "?" if check.status is Status.ERROR else number(check.points)
+    return f"{earned} / {number(check.max_points)}"
+
+
+def points_waiting(check: CheckPart, result: Result) -> str:
+    """``4.25 points wait for this``: what is skipped because a check failed; or nothing."""
+    lost = total(one.max_points for one in result.checks if check.id in one.waits_for)
+    return f"{counted_points(lost)} {'waits' if lost == 1 else 'wait'} for this" if lost else ""
+
+
+def waiting(result: Result, check: CheckPart) -> str:
+    """How many other checks a failed one keeps from passing, or nothing."""
+    reasons = result.reasons
+    same = {name for name, reason in reasons.items() if reason == reasons[check.id]}
+    count = len(same) - 1 + sum(not same.isdisjoint(one.waits_for) for one in result.checks)
+    if len(same) > 1:
+        return f"{counted(count, 'other check')} did not pass for the same reason."
+    verb = "waits" if count == 1 else "wait"
+    return f"{counted(count, 'other check')} {verb} for it." if count else ""
 
 
 def only_shown(result: Result) -> frozenset[str]:
@@ -124,16 +161,43 @@ def only_shown(result: Result) -> frozenset[str]:
     return first.only_shown(mild, (check.waits_for for check in result.checks))
 
 
-def headline(result: Result) -> str:
-    """The headline of the report, from a result."""
-    withheld = Withheld(result.withheld.checks, result.withheld.points)
-    full_points = result.score == result.max_score > 0
-    statuses = [check.status for check in result.checks]
-    return words.summary(statuses, withheld, graded=result.graded, full_points=full_points)
-
-
 def score(result: Result) -> str:
     """``7 of 10 points``, or that there is no score."""
     if result.score is None:
         return "Not graded"
-    return f"{words.number(result.score)} of {words.counted_points(result.max_score)}"
+    return f"{number(result.score)} of {counted_points(result.max_score)}"
+
+
+def tally(result: Result, status: Status) -> str:
+    """``9 passed``, ``1 error``; nothing where there are none."""
+    count = len(result.of(status))
+    if not count:
+        return ""
+    return counted(count, "error") if status is Status.ERROR else f"{count} {STATUS[status].word}"
+
+
+def headline(result: Result) -> str:
+    """One sentence on the whole, and what is judged only at grading."""
+    every, withheld = len(result.checks), result.withheld
+    passed, failed, skipped, errors = (
+        len(result.of(status))
+        for status in (Status.PASSED, Status.FAILED, Status.SKIPPED, Status.ERROR)
+    )
+    if not result.graded:
+        text = "Something of the grader or of the machine failed; no point is lost by it"
+    elif result.score == result.max_score > 0 or passed == every:
+        text = f"{passed} of {every} visible checks passed" if withheld.checks else "Full points"
+        if failed:
+            text += f"; {counted(failed, 'check')} without points failed"
+    else:
+        text = f"{counted(failed, 'check')} failed"
+        if skipped:
+            verb = "waits" if skipped == 1 else "wait"
+            text += f", {counted(skipped, 'other')} {verb} for {'it' if failed == 1 else 'them'}"
+    if result.graded and errors:
+        text += f"; {counted(errors, 'check')} without points could not be judged"
+    if withheld.checks:
+        verb = "runs" if withheld.checks == 1 else "run"
+        text += f"; {counted(withheld.checks, 'hidden check')}, "
+        text += f"{counted_points(withheld.points)}, {verb} at grading"
+    return f"{text}."

@@ -6,20 +6,15 @@ cleaned and wrapped in a :class:`rich.text.Text`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-
 from rich.cells import cell_len
-from rich.console import Console, RenderableType
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from grader.checks.finding import Status
-from grader.checks.wording import listing
-from grader.grade.model import CheckResult, Grade, ScenarioFinding
-from grader.recording.model import Recording
-from grader.report.model.changes import Change, changes
-from grader.report.model.remarks import remarks
-from grader.report.text import words
+from grader.report.model.result_model import CheckPart, Result
+from grader.report.text import explanation
+from grader.report.text.words import STATUS, number
 from grader.safe_text import clean, one_line
 
 _STYLE = {
@@ -38,233 +33,145 @@ _INDENT = 12
 _LOG_LINES = 8
 
 
-NO_RECORDINGS: Mapping[str, Recording] = {}
-
-
-def print_grade(
-    console: Console, grade: Grade, recordings: Mapping[str, Recording] = NO_RECORDINGS
-) -> None:
+def print_grade(console: Console, title: str, result: Result) -> None:
     """Print a grade.
 
     Args:
         console: Where to; its width, colours and encoding are respected.
+        title: Of the assignment.
     """
-    console.print(_heading(console, grade))
+    submission = _line(console, result.submission.id)
+    console.print(Text.assemble((_line(console, title), "bold"), "   ", (submission, "dim")))
     console.print()
-    console.print(_table(console, grade))
-    for result in (*grade.of(Status.FAILED), *grade.of(Status.ERROR)):
-        console.print()
-        _explain(console, grade, result)
-    _tell_runs(console, recordings)
-    console.print()
-    _conclude(console, grade)
+    console.print(_table(console, result))
+    for check in (*result.of(Status.FAILED), *result.of(Status.ERROR)):
+        _explain(console, result, check)
+    _conclude(console, result)
 
 
-def print_changes(
-    console: Console,
-    before: Grade,
-    after: Grade,
-    recordings: Mapping[str, Recording] = NO_RECORDINGS,
-) -> None:
-    """Print what changed since an earlier grade, and what to fix now.
+def print_changes(console: Console, before: Result, after: Result) -> None:
+    """Print which checks ended differently than in an earlier grade, and what to fix now.
 
     Args:
         console: Where to; its width, colours and encoding are respected.
     """
-    changed = changes(before, after)
-    if changed:
-        console.print(_changes_table(console, changed))
-    else:
-        console.print("No check changed.")
-    first = after.first_to_fix()
-    explained = (first,) if first is not None else after.of(Status.ERROR)[:1]
-    for result in explained:
-        console.print()
-        _explain(console, after, result)
-    _tell_runs(console, recordings)
-    console.print()
+    known = {check.id: check for check in before.checks}
+    table = _grid(overflowing=2, right=3)
+    for check in after.checks:
+        old = known.get(check.id)
+        if old and (old.status, explanation.points(old)) == (
+            check.status,
+            explanation.points(check),
+        ):
+            continue
+        table.add_row(
+            _status(console, check.status),
+            Text(f"was {STATUS[old.status].word}" if old else "new", "dim"),
+            Text(_line(console, check.title)),
+            Text(explanation.points(check), "bold"),
+        )
+    console.print(table if table.row_count else "No check changed.")
+    first = [check for check in after.checks if check.id == after.first_to_fix]
+    for check in first or after.of(Status.ERROR)[:1]:
+        _explain(console, after, check)
     _conclude(console, after, before)
 
 
-def _changes_table(console: Console, changed: Sequence[Change]) -> Table:
-    table = Table.grid(padding=(0, 2, 0, 0), expand=False)
-    table.add_column(no_wrap=True)
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
-    table.add_column(no_wrap=True, justify="right")
-    for change in changed:
-        before = change.before
-        table.add_row(
-            _status(console, change.after.status),
-            Text(f"was {words.STATUS[before.status].word}" if before else "new", "dim"),
-            Text(_line(console, change.after.title)),
-            Text(_points(change.after), "bold"),
-        )
+def _grid(overflowing: int, right: int, *, expand: bool = False) -> Table:
+    """An empty table without lines, of so many columns as it has to the right one."""
+    table = Table.grid(padding=(0, 2, 0, 0), expand=expand)
+    for index in range(right + 1):
+        if index == overflowing:
+            table.add_column(overflow="fold")
+        else:
+            table.add_column(no_wrap=True, justify="right" if index == right else "left")
     return table
 
 
-def _heading(console: Console, grade: Grade) -> Text:
-    return Text.assemble(
-        (_line(console, grade.assignment.title), "bold"),
-        ("   ", ""),
-        (_line(console, grade.submission.id), "dim"),
-    )
-
-
-def _table(console: Console, grade: Grade) -> Table:
+def _table(console: Console, result: Result) -> Table:
     wide = console.width >= _WIDE
     # Whatever is left over is the last column's, and it takes nothing from the others.
-    table = Table.grid(padding=(0, 2, 0, 0), expand=wide)
-    table.add_column(no_wrap=True)
-    longest = max(cell_len(_line(console, result.title)) for result in grade.results)
+    table = _grid(overflowing=1, right=2, expand=wide)
+    longest = max(cell_len(_line(console, check.title)) for check in result.checks)
     if wide:
-        table.add_column(overflow="fold", width=min(longest, _TITLE))
-    else:
-        table.add_column(overflow="fold", min_width=min(longest, 10))
-    table.add_column(no_wrap=True, justify="right")
-    if wide:
+        table.columns[1].width = min(longest, _TITLE)
         table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
-    for result in grade.results:
-        row: list[RenderableType] = [
-            _status(console, result.status),
-            Text(_line(console, result.title)),
-            Text(_points(result), "" if result.status is Status.PASSED else "bold"),
+    else:
+        table.columns[1].min_width = min(longest, 10)
+    titles = {check.id: check.title for check in result.checks}
+    for check in result.checks:
+        row = [
+            _status(console, check.status),
+            Text(_line(console, check.title)),
+            Text(explanation.points(check), "" if check.status is Status.PASSED else "bold"),
         ]
         if wide:
-            row.append(Text(_line(console, _short(grade, result)), "dim", overflow="ellipsis"))
+            roots = ", ".join(titles[root] for root in check.waits_for)
+            short = f"waits for {roots}" if roots else check.observed
+            row.append(Text(_line(console, short), "dim", overflow="ellipsis"))
         table.add_row(*row)
     return table
 
 
 def _status(console: Console, status: Status) -> Text:
-    said = words.STATUS[status]
+    said = STATUS[status]
     symbol = said.ascii if console.options.ascii_only else said.symbol
     return Text(f"{symbol} {said.word}", _STYLE[status])
 
 
-def _points(result: CheckResult) -> str:
-    earned = "?" if result.status is Status.ERROR else words.number(result.points)
-    return f"{earned} / {words.number(result.max_points)}"
-
-
-def _short(grade: Grade, result: CheckResult) -> str:
-    """What fits into the table's last column."""
-    if result.waits_for:
-        return "waits for " + ", ".join(grade.result(root).title for root in result.waits_for)
-    return result.decisive.finding.observed
-
-
-def _explain(console: Console, grade: Grade, result: CheckResult) -> None:
+def _explain(console: Console, result: Result, check: CheckPart) -> None:
     """Say why points were lost, or why there is no verdict."""
-    console.print(
-        Text.assemble(_status(console, result.status), "  ", (_line(console, result.title), "bold"))
-    )
-    same_advice: dict[tuple[str, ...], list[ScenarioFinding]] = {}
-    for item in result.findings:
-        if item.finding.status is result.status:
-            advice = tuple(words.advice(result, item.finding))
-            same_advice.setdefault(advice, []).append(item)
-    for advice, items in same_advice.items():
-        for name, text in (*_seen(result, items), *_advised(advice), *_evidence(items)):
-            console.print(_hanging(console, name, text))
-    if points := words.points_waiting(result.id, grade.results):
-        console.print(_hanging(console, "waiting", points))
+    console.print()
+    title = (_line(console, check.title), "bold")
+    console.print(Text.assemble(_status(console, check.status), "  ", title))
+    for row in explanation.explain(check, result):
+        text = row.text
+        if row.name == "printed":
+            # Marks under a part of the line above mean nothing where that line is wrapped.
+            lines = [line for line in text.splitlines() if line.strip(" ^~")]
+            text = "\n".join(lines[-_LOG_LINES:])
+        console.print(_hanging(console, row.name, text))
 
 
 def _hanging(console: Console, name: str, text: str) -> Text:
     """A name, and beside it a text in as many lines as it needs."""
     width = max(10, min(console.width, _READABLE) - _INDENT)
-    lines = Text(_block(console, text)).wrap(console, width, overflow="fold")
+    shown = _encodable(console, clean(text).expandtabs(4))
+    lines = Text(shown).wrap(console, width, overflow="fold")
     for line in lines:
         line.rstrip()
     margin = Text(f"\n{' ' * _INDENT}")
     return Text.assemble((f"  {name:<8}  ", "dim"), margin.join(lines))
 
 
-def _seen(result: CheckResult, items: Sequence[ScenarioFinding]) -> Iterator[tuple[str, str]]:
-    """What was expected and observed in each scenario; what is the same is said once."""
-    scenarios: dict[tuple[str, str], list[str]] = {}
-    for item in items:
-        key = (item.finding.expected, item.finding.observed)
-        scenarios.setdefault(key, []).append(item.scenario or "")
-    before = ""
-    for (expected, observed), names in scenarios.items():
-        if len(result.findings) > 1 and names[0]:
-            yield "scenario", listing(names)
-        if expected != before:
-            yield "expected", expected
-        yield "observed", observed
-        before = expected
-
-
-def _advised(advice: Sequence[str]) -> Iterator[tuple[str, str]]:
-    for number, text in enumerate(advice):
-        yield words.ADVICE[min(number, 1)], text
-
-
-def _evidence(items: Sequence[ScenarioFinding]) -> Iterator[tuple[str, str]]:
-    """Places of all scenarios, and what the first of them printed."""
-    for place in dict.fromkeys(str(p) for item in items for p in item.finding.evidence.places):
-        yield "where", one_line(place)
-    log = next((item.finding.evidence.log for item in items if item.finding.evidence.log), ())
-    if log:
-        # Marks under a part of the line above mean nothing where that line is wrapped.
-        lines = [line for line in log if line.strip(" ^~")]
-        yield "printed", "\n".join(lines[-_LOG_LINES:])
-
-
-def _tell_runs(console: Console, recordings: Mapping[str, Recording]) -> None:
-    """Say which limits of the sandbox were reached, when, and what else is worth knowing."""
-    reached = [
-        f"{words.limit_reached(breach)} (scenario {run.scenario}, "
-        f"{run.since_launch_s(breach.time_ns):.1f} s after launch)"
-        for run in recordings.values()
-        for breach in run.breaches
-    ]
-    found: dict[str, list[str]] = {}
-    for run in recordings.values():
-        for remark in remarks(run):
-            found.setdefault(remark, []).append(run.scenario)
-    remarked = [
-        f"{remark} (scenario{'s' if len(names) > 1 else ''} {listing(names)})"
-        for remark, names in found.items()
-    ]
-    for title, label, texts in (
-        (words.LIMITS_REACHED, "reached", reached),
-        (words.WORTH_KNOWING, "remark", remarked),
-    ):
-        if texts:
-            console.print()
-            console.print(Text(title, "bold"))
-            for text in texts:
-                console.print(_hanging(console, label, text))
-
-
-def _conclude(console: Console, grade: Grade, before: Grade | None = None) -> None:
-    first = grade.first_to_fix()
-    if first is not None:
-        place = words.first_place(first)
-        where = f" ({_line(console, place)})" if place else ""
-        text = f"{_line(console, first.title)}{where}. {words.waiting(grade, first)}".rstrip()
-        console.print(Text.assemble(("Fix this first: ", "bold"), text))
-    if grade.graded:
-        score = f"{words.number(grade.score)} of {words.number(grade.max_score)} points"
-        style = "bold green" if grade.full_points else "bold"
-        if before is not None and before.graded and before.score != grade.score:
-            score = f"{score}, before {words.number(before.score)}"
-        console.print(Text(f"Score: {score}", style))
-        if grade.withheld.checks:
-            console.print(Text(words.headline(grade)))
-    else:
-        console.print(Text(f"Not graded. {words.headline(grade)}", "bold magenta"))
+def _conclude(console: Console, result: Result, before: Result | None = None) -> None:
+    """What is worth knowing of the runs, what to fix first, and the score."""
+    for notes in explanation.notes_of_runs(result):
+        console.print()
+        console.print(Text(notes.title, "bold"))
+        for line in notes.lines:
+            console.print(_hanging(console, "note", line))
+    console.print()
+    for first in result.checks:
+        if first.id == result.first_to_fix:
+            places = "".join(f" ({explanation.spot(one)})" for one in first.evidence.places[:1])
+            text = f"{first.title}{places}. {explanation.waiting(result, first)}".rstrip()
+            console.print(Text.assemble(("Fix this first: ", "bold"), _line(console, text)))
+    if not result.graded:
+        text = f"Not graded. {explanation.headline(result)}"
+        console.print(Text(text, "bold magenta"))
+        return
+    text = f"Score: {number(result.score or 0.0)} of {number(result.max_score)} points"
+    full = result.score == result.max_score
+    if before is not None and before.graded and before.score != result.score:
+        text = f"{text}, before {number(before.score or 0.0)}"
+    console.print(Text(text, "bold green" if full else "bold"))
+    if result.withheld.checks:
+        console.print(Text(explanation.headline(result)))
 
 
 def _line(console: Console, text: str) -> str:
     return _encodable(console, one_line(text))
-
-
-def _block(console: Console, text: str) -> str:
-    return _encodable(console, clean(text).expandtabs(4))
 
 
 def _encodable(console: Console, text: str) -> str:

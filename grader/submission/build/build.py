@@ -10,24 +10,18 @@ from __future__ import annotations
 import errno
 import re
 import shutil
-import signal
-import threading
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from grader.errors import GraderFault, machine_fault
 from grader.out_of_memory import oom_kills
-from grader.ros import RosInstallation
 from grader.submission.build import build_log, standalone_build
 from grader.submission.build.bounded import Outcome
 from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
 from grader.submission.build.build_key import build_key
-from grader.submission.build.build_limits import BuildLimits
-from grader.submission.build.colcon import COMPILE_S, STOPPED, Colcon
+from grader.submission.build.colcon import COMPILE_S, STOPPED, BuildSetting, Colcon
 from grader.submission.build.installed import tidy
 from grader.submission.build.toolchain import missing_here, missing_tools
 from grader.submission.intake.locate import Located, only
@@ -35,11 +29,7 @@ from grader.submission.intake.members import MIB
 from grader.submission.read.rosdistro import PACKAGES
 from grader.submission.record import BuildRecord
 
-if TYPE_CHECKING:
-    from grader.sandbox.sandbox import Sandbox
-
 _T = TypeVar("_T")
-_WHOLE_LOG = 60_000
 _SUMMARY = re.compile(r"Summary: \d+ packages? finished")
 _SIGNALLED = 128
 # What colcon, Python, compilers and make say of a program of theirs that was killed.
@@ -50,14 +40,14 @@ _NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|pr
 
 
 class BuildKilled(GraderFault):
-    """A build was ended by a signal from outside; once more it may come to its end."""
+    """A build was ended from outside; once more it may come to its end."""
 
 
 def once_more(attempt: Callable[[bool], _T]) -> _T:
     """Build, and build again if the first build was killed.
 
     Args:
-        attempt: Builds from the beginning; told whether it is the second time.
+        attempt: Builds from the beginning; gets whether it is the second time.
     """
     try:
         return attempt(False)
@@ -65,116 +55,92 @@ def once_more(attempt: Callable[[bool], _T]) -> _T:
         return attempt(True)
 
 
-def build(
-    located: Located,
-    sources: Sources,
-    ros: RosInstallation,
-    *,
-    only_python: bool,
-    cache: BuildCache,
-    standalone: Sequence[str] = (),
-    is_standalone: bool = False,
-    limits: BuildLimits | None = None,
-    on_progress: Callable[[str], None] = lambda _: None,
-    sandbox: Sandbox | None = None,
-    stop: threading.Event | None = None,
-    on_output: Callable[[str], None] = lambda _: None,
-    is_second: bool = False,
-) -> CachedBuild:
-    """Build all packages of a submission, unless just this was built before.
+@dataclass(frozen=True, kw_only=True)
+class Builder(BuildSetting):
+    """Builds submissions in one setting, or takes them from the cache.
 
-    Args:
-        located: The submission; its private copy is where the build runs, so read from it what
-            you need before.
+    Attributes:
         cache: Where builds are kept; failed ones too, but not those that were ended by the
             time limit.
-        sandbox: What the build runs in, or None.
-
-    Raises:
-        BuildKilled: A signal ended it that no limit of ours sends.
-        GraderFault: It could not be built here, for no fault of the student: colcon is missing,
-            the disk is full.
+        is_second: Whether the first attempt was killed.
     """
-    limits = limits or BuildLimits()
-    wall_s = limits.python_s if only_python else limits.other_s
-    colcon = partial(
-        Colcon,
-        located.root,
-        tuple(sources.folders.values()),
-        ros=ros,
-        only_python=only_python,
-        is_standalone=is_standalone,
-        limits=limits,
-        wall_s=wall_s,
-        on_progress=on_progress,
-        sandbox=sandbox,
-        stop=stop,
-        on_output=on_output,
-    )
-    workshop = _Workshop(located, sources, ros, colcon, on_output, is_second)
-    alone = partial(
-        build,
-        ros=ros,
-        only_python=False,
-        cache=cache,
-        is_standalone=True,
-        limits=limits,
-        on_progress=on_progress,
-        sandbox=sandbox,
-        stop=stop,
-        is_second=is_second,
-    )
-    terms = [*_terms(limits, sandbox), *(["apart"] if is_standalone else [])]
-    key = build_key(located.sha256, ros, sandboxed=sandbox is not None, terms=terms)
-    on_progress("looking for an earlier build")
-    with cache.locked(key, wait_s=wall_s + COMPILE_S):
-        found = cache.find(key)
-        if found is not None:
-            return found
-        parts = dict(_parts(located, sources, standalone, alone))
-        with cache.unfinished() as unfinished:
-            record = workshop.build(unfinished / INSTALL, parts)
-            if record.timed_out:
-                return CachedBuild(record, None)
-            return cache.store(key, unfinished, record)
 
+    cache: BuildCache
+    is_second: bool = False
 
-def _parts(
-    located: Located,
-    sources: Sources,
-    names: Iterable[str],
-    build_alone: Callable[[Located, Sources], CachedBuild],
-) -> Iterator[tuple[str, CachedBuild]]:
-    """Build packages apart from the others, or take them from the cache.
+    def build(
+        self,
+        located: Located,
+        sources: Sources,
+        *,
+        only_python: bool,
+        standalone: Sequence[str] = (),
+        is_standalone: bool = False,
+    ) -> CachedBuild:
+        """Build all packages of a submission, unless just this was built before.
 
-    One that does not build alone is left out: it is built with the others, which also tells the
-    student why it fails.
-    """
-    for name in names:
-        folder = sources.folders[name]
-        with only(located, folder, name) as part:
-            files = {file.path for file in part.files}
-            built = build_alone(part, Sources(files, {name: name}))
-        if built.build.succeeded and built.install is not None:
-            log = standalone_build.as_handed_in(built.build.log, name, folder)
-            yield name, replace(built, build=replace(built.build, log=log))
+        Args:
+            located: The submission; its private copy is where the build runs, so read from it
+                what you need before.
+            standalone: Packages that are built for themselves, as if handed in alone.
 
+        Raises:
+            BuildKilled: It was ended by no limit of ours.
+            GraderFault: It could not be built here, for no fault of the student: colcon is
+                missing, the disk is full.
+        """
+        wall_s = self.limits.python_s if only_python else self.limits.other_s
+        key = build_key(located.sha256, self.ros, self.limits, self.sandbox, is_standalone)
+        self.on_progress("looking for an earlier build")
+        with self.cache.locked(key, wait_s=wall_s + COMPILE_S):
+            found = self.cache.find(key)
+            if found is not None:
+                return found
+            parts = dict(self._parts(located, sources, standalone))
+            with self.cache.unfinished() as unfinished:
+                # Beside the copy, so that relative paths in the log are the same on every run.
+                scratch = located.root.with_name("scratch")
+                scratch.mkdir()
+                colcon = Colcon(
+                    self,
+                    located.root,
+                    tuple(sources.folders.values()),
+                    scratch,
+                    unfinished / INSTALL,
+                    only_python=only_python,
+                    is_standalone=is_standalone,
+                    wall_s=wall_s,
+                )
+                record = self._run(colcon, sources, parts)
+                if record.timed_out:
+                    return CachedBuild(record, None)
+                return self.cache.store(key, unfinished, record)
 
-@dataclass(frozen=True)
-class _Workshop:
-    """One build that is really run."""
+    def _parts(
+        self, located: Located, sources: Sources, names: Sequence[str]
+    ) -> Iterator[tuple[str, CachedBuild]]:
+        """Build packages for themselves, or take them from the cache.
 
-    located: Located
-    sources: Sources
-    ros: RosInstallation
-    colcon: Callable[[Path, Path], Colcon]
-    on_output: Callable[[str], None]
-    is_second: bool
+        One that does not build alone is left out: it is built with the others, which also tells
+        the student why it fails.
+        """
+        quiet = replace(self, on_output=lambda _: None)
+        for name in names:
+            folder = sources.folders[name]
+            with only(located, folder, name) as part:
+                files = {file.path for file in part.files}
+                built = quiet.build(
+                    part, Sources(files, {name: name}), only_python=False, is_standalone=True
+                )
+            if built.build.succeeded and built.install is not None:
+                log = standalone_build.as_handed_in(built.build.log, name, folder)
+                yield name, replace(built, build=replace(built.build, log=log))
 
-    def build(self, install: Path, parts: Mapping[str, CachedBuild]) -> BuildRecord:
-        # Beside the copy, so that relative paths in the log are the same on every run.
-        scratch = self.located.root.with_name("scratch")
-        scratch.mkdir()
+    def _run(
+        self, colcon: Colcon, sources: Sources, parts: Mapping[str, CachedBuild]
+    ) -> BuildRecord:
+        """Really build."""
+        install = colcon.install
         for name, part in parts.items():
             assert part.install is not None
             standalone_build.lay(name, part.install, install)
@@ -183,55 +149,52 @@ class _Workshop:
         finished = set(parts)
         # It is there before anything of the student's runs, who could else put a link in its place.
         install.mkdir(exist_ok=True)
-        colcon = self.colcon(scratch, install)
         kills = oom_kills()
-        check_python = colcon.sandbox.watched() if colcon.sandbox else None
+        check_python = self.sandbox.watched() if self.sandbox else None
         outcome = colcon.build(finished)
-        if kills != oom_kills():
-            _check_memory(outcome)
-        self._check_machine(outcome, scratch, install)
+        self._check_machine(outcome, colcon, memory_ran_out=kills != oom_kills())
         if check_python is not None and outcome.status != 0:
             check_python()
-        limits = colcon.limits
         problem = tidy(
             install,
-            self.located.root,
-            most_bytes=limits.install_bytes,
-            most_files=limits.install_files,
+            colcon.root,
+            most_bytes=self.limits.install_bytes,
+            most_files=self.limits.install_files,
         )
-        problem = problem or _ended_by_us(outcome, colcon.wall_s)
-        record = self._record(outcome, finished, problem, scratch, install)
-        record = _with_parts(record, parts.values())
+        problem = problem or _limit(outcome, colcon.wall_s)
+        record = self._record(outcome, colcon, sources, sources.folders.keys() - finished, problem)
         if finished:
             # Nodes then start without doing it.
             colcon.compile()
         else:
             # colcon writes its own setup files first.
             shutil.rmtree(install, ignore_errors=True)
-        return record
+        builds = [part.build for part in parts.values()]
+        return replace(
+            record,
+            duration_s=round(record.duration_s + sum(one.duration_s for one in builds), 3),
+            log=build_log.ending("".join(one.log for one in builds) + record.log),
+        )
 
-    def _check_machine(self, outcome: Outcome, scratch: Path, install: Path) -> None:
+    def _check_machine(self, outcome: Outcome, colcon: Colcon, *, memory_ran_out: bool) -> None:
         """Raise what is not the student's fault."""
-        if outcome.ended_by_us:
+        status, output = outcome.status, outcome.output
+        if status is None:
             return
-        killed = _signal_of(outcome)
-        if killed is not None:
-            raise BuildKilled(
-                f"colcon was ended by {killed}, twice, which no limit of ours sends: "
-                "perhaps somebody stopped it, or memory ran out; grade again"
-            )
-        if not self.is_second and outcome.status != 0 and _KILLED.search(outcome.output):
-            # Perhaps by the build itself; then it happens again.
-            raise BuildKilled("a program of the build was killed")
-        unstarted = _NOT_STARTED.match(outcome.output) if outcome.status else None
-        if unstarted and "Starting >>>" not in outcome.output:
+        killed = status != 0 and _KILLED.search(output)
+        if killed and memory_ran_out:
+            raise GraderFault("this machine ran out of memory: a program of the build was killed")
+        unstarted = _NOT_STARTED.match(output) if status else None
+        if unstarted and "Starting >>>" not in output:
             raise GraderFault(f"the sandbox of the build could not be started: {unstarted[0]}")
-        if _is_cut_off(outcome.output, self.sources.folders):
-            raise GraderFault(f"colcon ended with status {outcome.status} in the middle of a build")
-        if outcome.status == 0:
-            return
-        if "No space left on device" in outcome.output:
-            for place in (scratch, install.parent):
+        # A program of the build may also kill itself; then it does so again.
+        if _is_cut_off(status, output) or (killed and not self.is_second):
+            raise BuildKilled(
+                f"colcon ended in the middle of a build (status {status}), twice, which no limit "
+                "of ours does: perhaps it was stopped, or memory ran out; grade again"
+            )
+        if status != 0 and "No space left on device" in output:
+            for place in (colcon.scratch, colcon.install.parent):
                 full = machine_fault(OSError(errno.ENOSPC, "", str(place)))
                 if full is not None and shutil.disk_usage(place).free < _LEAST_FREE_BYTES:
                     raise full
@@ -239,111 +202,66 @@ class _Workshop:
     def _record(
         self,
         outcome: Outcome,
-        finished: set[str],
+        colcon: Colcon,
+        sources: Sources,
+        failed: set[str],
         problem: str | None,
-        scratch: Path,
-        install: Path,
     ) -> BuildRecord:
         paths = {
-            str(self.located.root): "",
-            str(scratch / "build"): "build",
-            str(install): "install",
-            str(scratch): "scratch",
+            str(colcon.root): "",
+            str(colcon.scratch / "build"): "build",
+            str(colcon.install): "install",
+            str(colcon.scratch): "scratch",
         }
         log = build_log.clean(outcome.output, paths)
-        failed = sorted(set(self.sources.folders) - finished)
         succeeded = outcome.status == 0 and not failed and problem is None
         culprit = None
         if not succeeded:
-            culprit = find_build_error(log, failed, self.sources)
-            culprit = culprit or last_started(log, self.sources, problem)
+            culprit = find_build_error(log, failed, sources)
+            culprit = culprit or last_started(log, sources, problem)
         if problem is not None:
             log += f"\n[rosgrade: {problem}]\n"
         return BuildRecord(
             succeeded=succeeded,
-            duration_s=round(outcome.duration_s, 3),
+            duration_s=outcome.duration_s,
             timed_out=outcome.ended_by_us == "time",
-            failed_packages=tuple(failed),
-            lacking=tuple(sorted(self._lacking(outcome.output))) if failed else (),
+            failed_packages=tuple(sorted(failed)),
+            lacking=tuple(sorted(self._lacking(outcome.output, sources))) if failed else (),
             culprit=culprit,
-            log=build_log.ending(log),
+            log=log,
         )
 
-    def _lacking(self, output: str) -> set[str]:
+    def _lacking(self, output: str, sources: Sources) -> set[str]:
         """What ROS 2 Jazzy has and is neither installed here nor handed in."""
         named = build_log.not_found(output)
-        imported = {name for name in build_log.modules_not_found(output) if self._imports(name)}
-        missing = (named | imported) & PACKAGES - self.ros.packages - set(self.sources.folders)
+        wanted = named | build_log.modules_not_found(output)
+        missing = wanted & PACKAGES - self.ros.packages - set(sources.folders)
         tools = missing_tools(self.ros.environment({})["PATH"])
         return missing | missing_here(named) | set(tools)
 
-    def _imports(self, module: str) -> bool:
-        """Whether a setup.py really imports a module, whatever it prints."""
-        statement = re.compile(rf"\s*(?:import|from)\s+{module}\b")
-        texts = self.sources.texts.items()
-        lines = (line for path, text in texts if path.endswith("setup.py") for line in text)
-        return any(statement.match(line) for line in lines)
 
+def _is_cut_off(status: int, output: str) -> bool:
+    """Whether colcon ended without coming to its end.
 
-def _terms(limits: BuildLimits, sandbox: Sandbox | None) -> list[str]:
-    """What else may decide whether a build succeeds, where it is not as usual."""
-    usual = BuildLimits()
-    terms = [repr(limits.output)] if limits.output != usual.output else []
-    if sandbox is not None:
-        terms += [repr(limits.room)] if limits.room != usual.room else []
-        terms += sorted(sandbox.libraries)
-    return terms
-
-
-def _check_memory(outcome: Outcome) -> None:
-    """Raise that a program of a build may be what the kernel ended for want of memory."""
-    if not outcome.ended_by_us and outcome.status != 0 and _KILLED.search(outcome.output):
-        raise GraderFault("this machine ran out of memory: a program of the build was killed")
-
-
-def _signal_of(outcome: Outcome) -> str | None:
-    """The signal that ended colcon, or None.
-
-    In a sandbox no program of a build can send it one (see :func:`student_filter`), and none can
-    write to its memory: see :data:`~grader.submission.build.colcon.UNTOUCHABLE`.
+    In a sandbox no program of a build can send it a signal (see :func:`student_filter`), and none
+    can write to its memory: see :data:`~grader.submission.build.colcon.UNTOUCHABLE`.
     """
-    if outcome.status is None or _SUMMARY.search(outcome.output):
-        # It came to its end, and ends with the status of what failed, such as sys.exit(137).
-        return None
-    # As a shell tells of a signal, and bubblewrap does.
-    number = -outcome.status if outcome.status < 0 else outcome.status - _SIGNALLED
-    if not 0 < number < signal.NSIG:
-        return None
-    # Few of the real-time signals have a name.
-    return next((one.name for one in signal.Signals if one == number), f"signal {number}")
-
-
-def _is_cut_off(output: str, packages: Collection[str]) -> bool:
-    """Whether colcon started a package and never said how that ended, nor why it stopped."""
     if _SUMMARY.search(output):
-        # It came to its end, so whatever it says nothing of was only named by a build file.
+        # It ends with the status of what failed, such as sys.exit(137).
         return False
-    started = set(re.findall(r"^Starting >>> (\S+)", output, re.MULTILINE)) & set(packages)
-    ended = set(re.findall(r"^(?:Finished|Failed|Aborted) +<<< (\S+)", output, re.MULTILINE))
-    # Of a very long log only the beginning and the end are there.
-    return len(output) < _WHOLE_LOG and bool(started - ended) and STOPPED not in output
+    # As a shell tells of a signal, and bubblewrap does.
+    if status < 0 or status > _SIGNALLED:
+        return True
+    return "Starting >>>" in output and STOPPED not in output
 
 
-def _with_parts(record: BuildRecord, parts: Iterable[CachedBuild]) -> BuildRecord:
-    """The record of a build together with what was built apart before."""
-    builds = [part.build for part in parts]
-    return replace(
-        record,
-        duration_s=round(record.duration_s + sum(one.duration_s for one in builds), 3),
-        log=build_log.ending("".join(one.log for one in builds) + record.log),
-    )
-
-
-def _ended_by_us(outcome: Outcome, wall_s: float) -> str | None:
-    if outcome.ended_by_us == "time":
-        return f"the build was ended after {wall_s:.0f} s"
-    if outcome.ended_by_us == "output":
-        return "the build was ended because it wrote too much output"
-    if outcome.ended_by_us is not None:
-        return f"the build was ended because {outcome.ended_by_us}"
-    return None
+def _limit(outcome: Outcome, wall_s: float) -> str | None:
+    """The limit that a build passed, in words for the student."""
+    if outcome.ended_by_us is None:
+        return None
+    reasons = {
+        "time": f"after {wall_s:.0f} s",
+        "output": "because it wrote too much output",
+    }
+    reason = reasons.get(outcome.ended_by_us, f"because {outcome.ended_by_us}")
+    return f"the build was ended {reason}"

@@ -1,9 +1,9 @@
 """Builds kept by the content of what was built.
 
 ``<cache>/builds/<key>/`` holds ``build.json`` and, where something was installed, ``install/``.
-An entry is made under another name and renamed, so it is there as a whole or not at all. The
-hashes in it find damage, such as a disk that lost a block, or a student's program that wrote into
-its own installation; what is damaged is built anew.
+An entry is made under another name and renamed, so it is there as a whole or not at all. The hash
+in it finds damage, such as a student's program that wrote into its own installation; what is
+damaged is built anew.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class CacheLimits:
 
 @dataclass(frozen=True)
 class _Entry:
-    """The content of ``build.json``, behind a line with its hash."""
+    """The content of ``build.json``."""
 
     build: BuildRecord
     installed: bool
@@ -90,7 +90,7 @@ class BuildCache:
 
     @contextlib.contextmanager
     def locked(self, key: str, wait_s: float) -> Iterator[bool]:
-        """Hold a build's lock, so that two who need it do not both build it.
+        """Hold a build's lock, so that two processes do not both build it.
 
         Args:
             wait_s: Longest wait; without the lock the same work is done twice, nothing worse.
@@ -141,7 +141,7 @@ class BuildCache:
     def store(self, key: str, unfinished: Path, build: BuildRecord) -> CachedBuild:
         """Make an unfinished folder, with what is in its ``install``, the build of that key.
 
-        When somebody else was quicker, theirs stays and is returned.
+        An entry that another process stored meanwhile stays and is returned.
 
         Raises:
             GraderFault: The cache folder cannot be written.
@@ -151,8 +151,7 @@ class BuildCache:
         size = sum(path.lstat().st_size for path in _files(install))
         entry = _Entry(build, installed, tree_hash(install) if installed else "", size)
         with _usable(self._folder):
-            content = _ENTRY.dump_json(entry)
-            (unfinished / _RECORD).write_bytes(_hash_line(content) + content)
+            (unfinished / _RECORD).write_bytes(_ENTRY.dump_json(entry))
             other = self.find(key)
             if other is not None:
                 return other
@@ -161,21 +160,16 @@ class BuildCache:
                 (self._folder / key).rename(unfinished / "damaged")
             unfinished.rename(self._folder / key)
         shutil.rmtree(self._folder / key / "damaged", ignore_errors=True)
-        if self._is_due():
-            self.prune(keep=key)
+        self._prune_sometimes(key)
         return CachedBuild(build, self._folder / key / INSTALL if installed else None)
 
-    def _is_due(self) -> bool:
-        """Whether to look for old builds: in a batch not after every one, as that takes long."""
+    def _prune_sometimes(self, keep: str) -> None:
+        """Look for old builds: in a batch not after every one, as that takes long."""
         marker = self._folder / _PRUNED
-        try:
-            if time.time() - marker.stat().st_mtime < _PRUNE_EACH_S:
-                return False
-        except OSError:
-            pass
         with contextlib.suppress(OSError):
-            marker.touch()
-        return True
+            if not marker.exists() or time.time() - marker.stat().st_mtime >= _PRUNE_EACH_S:
+                marker.touch()
+                self.prune(keep)
 
     def prune(self, keep: str = "") -> None:
         """Throw away builds that are old, or the least recently used of too many."""
@@ -190,7 +184,8 @@ class BuildCache:
                 if now - used > _STALE_S:
                     remove_tree(folder)
             elif folder.is_dir() and folder.name != keep and now - used > self._limits.safe_s:
-                builds.append((used, folder, _size(folder)))
+                entry = _read(folder)
+                builds.append((used, folder, entry.size if entry else 0))
         total = sum(size for _, _, size in builds)
         for used, folder, size in sorted(builds, key=lambda item: item[0]):
             if now - used > self._limits.age_s or total > self._limits.total_bytes:
@@ -228,19 +223,9 @@ def _files(folder: Path, *, compiled: bool = False) -> Iterator[Path]:
 
 def _read(folder: Path) -> _Entry | None:
     try:
-        line, _, content = (folder / _RECORD).read_bytes().partition(b"\n")
-        return _ENTRY.validate_json(content) if _hash_line(content) == line + b"\n" else None
+        return _ENTRY.validate_json((folder / _RECORD).read_bytes())
     except (OSError, ValidationError):
         return None
-
-
-def _hash_line(content: bytes) -> bytes:
-    return hashlib.sha256(content).hexdigest().encode() + b"\n"
-
-
-def _size(folder: Path) -> int:
-    entry = _read(folder)
-    return entry.size if entry else 0
 
 
 def _lock(file: int) -> bool:
@@ -256,5 +241,5 @@ def _usable(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        told = GraderFault(f"the cache folder {folder} cannot be used: {error}")
-        raise machine_fault(error, folder) or told from error
+        unusable = GraderFault(f"the cache folder {folder} cannot be used: {error}")
+        raise machine_fault(error, folder) or unusable from error

@@ -1,19 +1,18 @@
-"""Whose file and line a build log blames first."""
+"""The student's file and line that a build log names first as the reason of a failure."""
 
 from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from grader.submission.intake.paths import is_within, join, shown
+from grader.submission.intake.paths import join, shown
 from grader.submission.record import SourceError
 
 _STARTED = re.compile(r"Starting >>> (\S+)")
 _TRACEBACK = "Traceback (most recent call last):"
 _FRAME = re.compile(r'\s*File "([^"]+)", line (\d+)')
-_SYNTAX_ERROR = re.compile(r"(SyntaxError|IndentationError|TabError): .+")
 _CMAKE = re.compile(r"CMake Error at (.+?):(\d+)(?: \((\w+)\))?:")
 _CMAKE_PLAIN = re.compile(r"CMake Error: (.+)")
 _CMAKE_CALLER = re.compile(r"\s+(\S+):(\d+) \(\w+\)")
@@ -21,23 +20,17 @@ _COMPILER = re.compile(r"([^\s:]+):(\d+)(?::\d+)?: (?:fatal )?error: (.+)")
 _MANIFEST = re.compile(r"(?:\S*InvalidPackage: )?Error\(s\) in package '([^']+)':")
 _SETUPTOOLS = re.compile(r"error: (.+)")
 _NO_SETUP_PY = re.compile(r".*can't open file '[^']*setup\.py'")
-_NEVER_CALLED = "setup()' was never called"
-_QUOTED = re.compile(r"'([^']+)'")
-_CONFIG = re.compile(r"'setup\.cfg'[\s,]*\[?line:?\s*(\d+)")
-_BOM = r"\ufeff"
-"""As the reader of setup.cfg shows it."""
-_HAS_BOM = (
-    "begins with a byte order mark (BOM), so its first section is not found: save it as UTF-8 "
-    "without BOM"
-)
-_RUN_SETUP = ", in run_setup"
 _INTERFACE = re.compile(r"Error processing '([^']+)' of package '[^']+': (.+)")
-_INSTALLED = re.compile(r"(?:install|build/[^/]+/build)/lib/(?:python3[^/]*/site-packages/)?(.+)")
-_IDENTIFYING = re.compile(r"ERROR:.*Exception in package identification extension '\w+' in '(.+?)'")
+_QUOTED = re.compile(r"'([^']+)'")
+_RUN_SETUP = ", in run_setup"
 _NO_CMAKELISTS = "does not appear to contain CMakeLists.txt"
-_ABSOLUTE_DATA = "os.path.isabs(dest)"
-_READ_OUTPUT = "ast.literal_eval(output)"
-_DIED = re.compile(r"(?=.*setup\.py).* died with <Signals\.(\w+): \d+>")
+_NEVER_CALLED = "setup()' was never called"
+_OF_SETUP = {
+    _NEVER_CALLED: "setup() is never called, or refuses its arguments",
+    "os.path.isabs(dest)": "data_files names an absolute folder; write 'share/<package>'",
+    "ast.literal_eval(output)": "setup.py prints something, which colcon takes for its answer",
+}
+"""What stands in a traceback of colcon's own code -> what is wrong in setup.py."""
 _INTERFACES = (".msg", ".srv", ".action")
 # What colcon and make say of a program that failed, and not that program itself.
 _AROUND = re.compile(
@@ -55,25 +48,26 @@ class Sources:
     """What the search needs to know of the submission.
 
     Attributes:
+        folders: Of each package.
         texts: Lines of each setup.py and interface file, in which quoted names are looked up.
+        malformed: Entry points of each package that setuptools refuses.
     """
 
     files: Collection[str]
     folders: Mapping[str, str]
     texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
     malformed: Mapping[str, tuple[SourceError, ...]] = field(default_factory=dict)
-    manifest_errors: Mapping[str, SourceError] = field(default_factory=dict)
 
 
 def find_build_error(log: str, failed: Collection[str], sources: Sources) -> SourceError | None:
-    """Find the first place in the student's own files that a cleaned log blames.
+    """Find the first place in the student's own files that a cleaned log names.
 
     Args:
         failed: Packages that were not finished; what the log says of others is no reason.
 
     Returns:
         For a Python traceback the deepest frame in the student's files. None where the log
-        blames no file of the student.
+        names no file of the student.
     """
     lines = log.splitlines()
     package = ""
@@ -82,15 +76,16 @@ def find_build_error(log: str, failed: Collection[str], sources: Sources) -> Sou
         if started:
             package = started[1]
         elif package in failed or not package:
-            blamed = _Place(lines, number, package, sources).blamed()
-            if blamed is not None:
-                message = shown(blamed.message)[:_MAX_MESSAGE]
-                return SourceError(shown(blamed.file), blamed.line, message)
+            found = _Place(lines, number, package, sources).error()
+            if found is not None:
+                return SourceError(
+                    shown(found.file), found.line, shown(found.message)[:_MAX_MESSAGE]
+                )
     return None
 
 
 def last_started(log: str, sources: Sources, problem: str | None) -> SourceError | None:
-    """Blame the build file of the package that was being built when the log ends.
+    """Name the build file of the package that was being built when the log ends.
 
     Args:
         problem: Why the build ended, or None where only the log tells.
@@ -123,20 +118,14 @@ class _Place:
     sources: Sources
 
     @property
-    def line(self) -> str:
-        return self.lines[self.number]
-
-    @property
     def setup_py(self) -> str:
-        return join(self.sources.folders.get(self.package, "."), "setup.py")
+        return self._path("setup.py")
 
-    def blamed(self) -> SourceError | None:
-        """Whom this line blames, if it is a message that blames somebody."""
-        line = self.line
+    def error(self) -> SourceError | None:
+        """What this line says is wrong, if it says so."""
+        line = self.lines[self.number]
         if line.rstrip().endswith(_TRACEBACK):
             return self._traceback()
-        if match := _FRAME.match(line):
-            return self._syntax_error(match)
         if match := _CMAKE.match(line):
             return self._cmake(match)
         if match := _CMAKE_PLAIN.match(line):
@@ -147,28 +136,20 @@ class _Place:
             return self._at(match[1], int(match[2]), match[3])
         if match := _MANIFEST.match(line):
             reason = "".join(self.lines[self.number + 1 : self.number + 2]).strip("- ")
-            blamed = self._at(match[1], None, reason or line)
-            return blamed and self.sources.manifest_errors.get(blamed.file, blamed)
+            return self._at(match[1], None, reason or line)
         if _NO_SETUP_PY.match(line):
             return SourceError(self.setup_py, None, "there is no setup.py")
-        if match := _DIED.match(line):
-            return self._setup(f"setup.py died with {match[1]}")
         if match := _SETUPTOOLS.match(line):
             return self._setup(match[1])
         return None
 
-    def _own(self, path: str) -> str | None:
-        """The student's file that a path of the log means."""
-        folder = self.sources.folders.get(self.package, ".")
-        candidates = [path, join(folder, path)]
-        installed = _INSTALLED.fullmatch(path)
-        if installed:
-            candidates.append(join(folder, installed[1]))
-        normal = (posixpath.normpath(candidate) for candidate in candidates)
-        return next((name for name in normal if name in self.sources.files), None)
+    def _path(self, name: str) -> str:
+        return join(self.sources.folders.get(self.package, "."), name)
 
     def _at(self, path: str, line: int | None, message: str) -> SourceError | None:
-        file = self._own(path)
+        """The message at the student's file that a path of the log means, if there is one."""
+        normal = (posixpath.normpath(candidate) for candidate in (path, self._path(path)))
+        file = next((name for name in normal if name in self.sources.files), None)
         return SourceError(file, line, message) if file else None
 
     def _block(self) -> list[str]:
@@ -183,51 +164,24 @@ class _Place:
     def _traceback(self) -> SourceError | None:
         block = self._block()
         message = block[-1] if block else ""
-        if not self.package:
-            return self._while_identifying()
         if message.startswith("configparser."):
-            config = self._config(message, self.number + len(block))
-            if config is not None:
-                return config
-        file, at, in_setup = None, None, False
+            # Which file cannot be read, setup.cfg, is said in the next line.
+            end = self.number + len(block)
+            message = " ".join(self.lines[end : end + 2])
+        found, in_setup = None, False
         for line in block:
-            frame = _FRAME.match(line)
-            if frame is None:
-                continue
-            path = self.setup_py if in_setup and frame[1] == "<string>" else frame[1]
-            in_setup = in_setup or _RUN_SETUP in line
-            own = self._own(path)
-            if own:
-                file, at = own, int(frame[2])
-        if file:
-            return SourceError(file, at, message)
-        if _NEVER_CALLED in message:
-            malformed = self.sources.malformed.get(self.package)
-            if malformed:
-                return malformed[0]
-            return self._setup("setup() is never called, or refuses its arguments")
-        if any(_ABSOLUTE_DATA in line for line in block):
-            return self._setup("data_files names an absolute folder; write 'share/<package>'")
-        if any(_READ_OUTPUT in line for line in block):
-            return self._setup("setup.py prints something, which colcon takes for its answer")
-        return None
-
-    def _config(self, message: str, number: int) -> SourceError | None:
-        """What is wrong in setup.cfg, which setup.py reads and which the error itself names."""
-        said = "\n".join(self.lines[number : number + 3])
-        found = _CONFIG.search(said)
-        if found is None:
-            return None
-        return self._at("setup.cfg", int(found[1]), _HAS_BOM if _BOM in said else message)
-
-    def _while_identifying(self) -> SourceError | None:
-        """Colcon says only afterwards whose setup.py it ran to learn the package's name."""
-        for line in self.lines[self.number + 1 : self.number + 60]:
-            match = _IDENTIFYING.match(line)
-            for package, folder in self.sources.folders.items():
-                if match and posixpath.normpath(match[1]) == folder:
-                    return replace(self, package=package)._traceback()
-        return None
+            if frame := _FRAME.match(line):
+                path = self.setup_py if in_setup and frame[1] == "<string>" else frame[1]
+                in_setup = in_setup or _RUN_SETUP in line
+                found = self._at(path, int(frame[2]), message) or found
+        if found is not None:
+            return found
+        malformed = self.sources.malformed.get(self.package)
+        if _NEVER_CALLED in message and malformed:
+            return malformed[0]
+        text = "\n".join(block)
+        wrong = next((wrong for sign, wrong in _OF_SETUP.items() if sign in text), None)
+        return self._setup(wrong) if wrong else None
 
     def _plain_cmake(self, message: str) -> SourceError | None:
         if _NO_CMAKELISTS not in message:
@@ -238,11 +192,6 @@ class _Place:
             message = "there is no CMakeLists.txt beside it, which this build type needs"
         return self._at("package.xml", None, message)
 
-    def _syntax_error(self, frame: re.Match[str]) -> SourceError | None:
-        following = self.lines[self.number + 1 : self.number + 5]
-        found = next((line for line in following if _SYNTAX_ERROR.match(line)), None)
-        return self._at(frame[1], int(frame[2]), found) if found else None
-
     def _cmake(self, match: re.Match[str]) -> SourceError | None:
         paragraphs = _paragraphs(self._block())
         message = paragraphs[0] if paragraphs else f"{match[3]} failed"
@@ -252,17 +201,17 @@ class _Place:
             quoted = self._quoted(message, _INTERFACES)
             if quoted is not None:
                 return quoted
-        blamed = self._at(match[1], int(match[2]), message)
-        for caller in map(_CMAKE_CALLER.match, self._block_after("Call Stack")):
-            if blamed is None and caller is not None:
-                blamed = self._at(caller[1], int(caller[2]), message)
-        return blamed
+        places = [(match[1], match[2]), *self._callers()]
+        found = (self._at(path, int(line), message) for path, line in places)
+        return next((error for error in found if error is not None), None)
 
-    def _block_after(self, heading: str) -> list[str]:
+    def _callers(self) -> Iterator[tuple[str, str]]:
+        """What called the command that failed, the innermost first."""
         for number in range(self.number + 1, min(self.number + 40, len(self.lines))):
-            if self.lines[number].startswith(heading):
-                return _Place(self.lines, number, self.package, self.sources)._block()
-        return []
+            if self.lines[number].startswith("Call Stack"):
+                callers = map(_CMAKE_CALLER.match, replace(self, number=number)._block())
+                yield from ((caller[1], caller[2]) for caller in callers if caller)
+                return
 
     def _setup(self, message: str) -> SourceError | None:
         if self.setup_py not in self.sources.files:
@@ -271,15 +220,14 @@ class _Place:
 
     def _quoted(self, message: str, endings: tuple[str, ...]) -> SourceError | None:
         """The first line of such a file of the package that has what the message quotes."""
-        folder = self.sources.folders.get(self.package, ".")
+        folder = self._path("")
         for quoted in _QUOTED.findall(message)[:_MOST_QUOTED]:
             word = re.compile(rf"(?<![\w-]){re.escape(quoted)}(?![\w-])")
             for file, lines in sorted(self.sources.texts.items()):
-                if not (is_within(file, folder) and file.endswith(endings)):
-                    continue
-                for number, line in enumerate(lines[:_MOST_LINES], start=1):
-                    if word.search(line):
-                        return SourceError(file, number, message)
+                if file.startswith(folder) and file.endswith(endings):
+                    for number, line in enumerate(lines[:_MOST_LINES], start=1):
+                        if word.search(line):
+                            return SourceError(file, number, message)
         return None
 
 

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.errors import GraderFault
-from grader.ros import RosInstallation
+from grader.ros import RosInstallation, site_packages
+from grader.sandbox.limits import BUILD, SandboxLimits
 from grader.submission.build import build_log
-from grader.submission.build.bounded import Outcome, run_bounded
-from grader.submission.build.build_limits import BuildLimits
-from grader.submission.build.installed import site_packages
+from grader.submission.build.bounded import Outcome, OutputLimits, run_bounded
+from grader.submission.intake.members import MIB
 from grader.tree import MOST_DEEP, cut_deep
 
 if TYPE_CHECKING:
@@ -35,7 +36,42 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 """
 """Runs a Python program whose memory no other process can reach: PR_SET_DUMPABLE, prctl(2)."""
 _CMAKE_INCLUDE = Path(__file__).with_name("wheels.cmake")
-_PROGRESS = re.compile(r"(Starting >>>|Finished <<<|Failed   <<<|Aborted  <<<) (\S+)")
+_PROGRESS = re.compile(r"(Starting|Finished|Failed|Aborted) +(?:>>>|<<<) (\S+)")
+
+
+@dataclass(frozen=True)
+class BuildLimits:
+    """How much a build may take.
+
+    Attributes:
+        python_s: Wall time where every package is pure Python.
+        other_s: Wall time where one is not.
+    """
+
+    python_s: float = 120.0
+    other_s: float = 300.0
+    install_bytes: int = 512 * MIB
+    install_files: int = 20_000
+    output: OutputLimits = field(default_factory=OutputLimits)
+    room: SandboxLimits = BUILD
+
+
+@dataclass(frozen=True, kw_only=True)
+class BuildSetting:
+    """With what builds run, and who follows them.
+
+    Attributes:
+        sandbox: What everything runs in, or None.
+        stop: Set when the builds are no longer wanted.
+        on_output: Called with each line of the log as it comes.
+    """
+
+    ros: RosInstallation
+    limits: BuildLimits = field(default_factory=BuildLimits)
+    sandbox: Sandbox | None = None
+    stop: threading.Event | None = None
+    on_progress: Callable[[str], None] = lambda _: None
+    on_output: Callable[[str], None] = lambda _: None
 
 
 @dataclass(frozen=True)
@@ -45,22 +81,16 @@ class Colcon:
     Attributes:
         folders: Of its packages, relative to ``root``.
         scratch: For what a build leaves behind; exists.
-        sandbox: What everything runs in, or None.
     """
 
+    setting: BuildSetting
     root: Path
     folders: tuple[str, ...]
     scratch: Path
     install: Path
-    ros: RosInstallation
     only_python: bool
     is_standalone: bool
-    limits: BuildLimits
     wall_s: float
-    on_progress: Callable[[str], None]
-    sandbox: Sandbox | None
-    stop: threading.Event | None
-    on_output: Callable[[str], None]
 
     def build(self, finished: set[str]) -> Outcome:
         """Build what can be built.
@@ -69,60 +99,63 @@ class Colcon:
             finished: Packages that are built already; what is built is added.
 
         Raises:
-            GraderFault: colcon is not installed, or nobody wants the build any more.
+            GraderFault: colcon is not installed, or the build is no longer wanted.
         """
         started: set[str] = set()
 
         def on_output(text: str) -> None:
             for line in build_log.own_lines(text).split("\n"):
-                on_line(line)
-
-        def on_line(line: str) -> None:
-            self.on_output(line)
-            match = _PROGRESS.match(line)
-            if match is None:
-                return
-            if match[1].startswith("Finished"):
-                finished.add(match[2])
-            elif match[1].startswith("Starting"):
-                started.add(match[2])
-                self.on_progress(f"building {match[2]}")
-            else:
-                # colcon has the last word, whatever a package printed as if it were colcon.
-                finished.discard(match[2])
+                self.setting.on_output(line)
+                match = _PROGRESS.match(line)
+                if match is None:
+                    continue
+                if match[1] == "Finished":
+                    finished.add(match[2])
+                elif match[1] == "Starting":
+                    started.add(match[2])
+                    self.setting.on_progress(f"building {match[2]}")
+                else:
+                    # colcon has the last word, whatever a package printed as if it were colcon.
+                    finished.discard(match[2])
 
         failed: set[str] = set()
-        outcomes: list[Outcome] = []
+        total: Outcome | None = None
         while True:
             command = self._command()
             if failed or finished:
                 command += ["--packages-skip", *sorted(failed | finished)]
             if failed:
                 command += ["--packages-skip-by-dep", *sorted(failed)]
-            outcome = self._run(
-                command,
-                self.wall_s - sum(item.duration_s for item in outcomes),
-                on_output,
-            )
-            outcomes.append(replace(outcome, output=build_log.own_lines(outcome.output)))
+            used_s = total.duration_s if total else 0.0
+            outcome = self._run(command, self.wall_s - used_s, on_output)
+            outcome = replace(outcome, output=build_log.own_lines(outcome.output))
+            total = _together(total, outcome) if total else outcome
             # Where setup.py raises before anything is built, colcon's executor stops with the
             # exception, whatever --continue-on-error says; the others are still to be built.
             stopped = not outcome.ended_by_us and STOPPED in outcome.output
             if not stopped or started - finished <= failed:
-                return _together(outcomes)
+                return total
             failed = started - finished
 
     def compile(self) -> None:
         """Compile what the build installed, so that nodes start without doing it."""
         folders = [str(path) for path in site_packages(self.install)]
         if folders:
-            command = [str(self.ros.python), "-I", "-S", "-m", "compileall", "-qq", *folders]
+            command = [
+                str(self.setting.ros.python),
+                "-I",
+                "-S",
+                "-m",
+                "compileall",
+                "-qq",
+                *folders,
+            ]
             self._run(command, COMPILE_S)
 
     @cached_property
     def environment(self) -> dict[str, str]:
         """Variables of a build; none of the caller's, on which what is kept would depend."""
-        environment = self.ros.environment({})
+        environment = self.setting.ros.environment({})
         for name in ("HOME", "TMPDIR", "COLCON_HOME"):
             folder = self.scratch / name.lower()
             folder.mkdir()
@@ -133,14 +166,15 @@ class Colcon:
 
     def _command(self) -> list[str]:
         folders = [str(self.root / folder) for folder in self.folders]
-        command = [*_colcon(self.ros, self.environment["PATH"]), "--log-base", os.devnull, "build"]
-        command += ["--merge-install", "--continue-on-error", "--executor", "sequential"]
-        command += [
-            "--build-base",
-            str(self.scratch / "build"),
-            "--install-base",
-            str(self.install),
+        command = [
+            *_colcon(self.setting.ros, self.environment["PATH"]),
+            "--log-base",
+            os.devnull,
+            "build",
         ]
+        command += ["--merge-install", "--continue-on-error", "--executor", "sequential"]
+        command += ["--build-base", str(self.scratch / "build")]
+        command += ["--install-base", str(self.install)]
         command += ["--event-handlers", "console_direct+", "console_cohesion-", "console_stderr-"]
         command += ["--base-paths", *folders]
         if not self.only_python:
@@ -150,7 +184,7 @@ class Colcon:
             # an interface package has none.
             if self.is_standalone and shutil.which("ninja", path=self.environment["PATH"]):
                 command += ["-GNinja"]
-            if self.ros.source == "wheels":
+            if self.setting.ros.source == "wheels":
                 command += [f"-DCMAKE_PROJECT_INCLUDE={self._include}"]
         return command
 
@@ -163,74 +197,53 @@ class Colcon:
         return Path(shutil.copy(_CMAKE_INCLUDE, self.scratch))
 
     def _run(
-        self,
-        command: Sequence[str],
-        wall_s: float,
-        on_line: Callable[[str], None] | None = None,
+        self, command: Sequence[str], wall_s: float, on_line: Callable[[str], None] | None = None
     ) -> Outcome:
         """Run a part of the build, in the sandbox if there is one."""
+        setting = self.setting
         # Not the folder around the install space: what is written there afterwards is written by
         # us, and would go wherever a link that was left there points to.
         folders = (self.scratch, self.root, self.install)
-        run = partial(self._bounded, folders, wall_s=wall_s, on_line=on_line)
-        if self.sandbox is None:
-            return run(command, environment=self.environment, excess=self._watched())
-        self.limits.room.check_allowed()
-        with self.sandbox.build(self.ros, folders, self.limits.room) as room:
-            return run(
-                room.command(command, self.environment),
-                environment=room.environment,
-                excess=self._watched(room.excess),
-            )
+        with contextlib.ExitStack() as stack:
+            room = None
+            environment: Mapping[str, str] = self.environment
+            if setting.sandbox is not None:
+                setting.limits.room.check_allowed()
+                room = stack.enter_context(
+                    setting.sandbox.build(setting.ros, folders, setting.limits.room)
+                )
+                command, environment = room.command(command, environment), room.environment
 
-    def _bounded(
-        self,
-        folders: Sequence[Path],
-        command: Sequence[str],
-        *,
-        environment: Mapping[str, str],
-        wall_s: float,
-        on_line: Callable[[str], None] | None,
-        excess: Callable[[int], str | None],
-    ) -> Outcome:
-        """Run a command, and take away what it left too deep for anybody to come to its end."""
-        try:
-            outcome = run_bounded(
-                command,
-                cwd=self.scratch,
-                environment=environment,
-                wall_s=wall_s,
-                output=self.limits.output,
-                on_line=on_line,
-                excess=excess,
-            )
-        finally:
-            deep = [folder for folder in folders if cut_deep(folder)]
+            def excess(pid: int) -> str | None:
+                if setting.stop is not None and setting.stop.is_set():
+                    raise GraderFault("interrupted")
+                return room.excess(pid) if room else None
+
+            try:
+                outcome = run_bounded(
+                    command,
+                    cwd=self.scratch,
+                    environment=environment,
+                    wall_s=wall_s,
+                    output=setting.limits.output,
+                    on_line=on_line,
+                    excess=excess,
+                )
+            finally:
+                # Nothing that walks through the folders afterwards could come to the end of these.
+                deep = [folder for folder in folders if cut_deep(folder)]
         if not deep or outcome.ended_by_us:
             return outcome
         return replace(outcome, ended_by_us=f"it made more than {MOST_DEEP} folders in one another")
 
-    def _watched(
-        self, excess: Callable[[int], str | None] = lambda _: None
-    ) -> Callable[[int], str | None]:
-        """Look for a passed limit, and for whoever wants the build to end."""
 
-        def look(pid: int) -> str | None:
-            if self.stop is not None and self.stop.is_set():
-                raise GraderFault("interrupted")
-            return excess(pid)
-
-        return look
-
-
-def _together(outcomes: Sequence[Outcome]) -> Outcome:
-    """One outcome of several commands: it succeeded if all did."""
-    last = outcomes[-1]
+def _together(first: Outcome, second: Outcome) -> Outcome:
+    """One outcome of two commands: it succeeded if both did."""
     return Outcome(
-        status=next((item.status for item in outcomes if item.status), last.status),
-        ended_by_us=last.ended_by_us,
-        output="".join(item.output for item in outcomes),
-        duration_s=sum(item.duration_s for item in outcomes),
+        status=first.status or second.status,
+        ended_by_us=second.ended_by_us,
+        output=first.output + second.output,
+        duration_s=first.duration_s + second.duration_s,
     )
 
 

@@ -8,11 +8,14 @@ import shutil
 import stat
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
+from itertools import takewhile
 from pathlib import Path
 
+from grader.ros import site_packages
 from grader.submission.intake.paths import is_within
-from grader.submission.read.entrypoints import EntryPoint, parse_installed
+from grader.submission.read.setup_py import EntryPoint, parse_installed
 from grader.submission.record import Definition
 
 MOST_BYTES = 64 * 1024
@@ -21,6 +24,7 @@ MOST_BYTES = 64 * 1024
 _INDEX = Path("share", "ament_index", "resource_index", "packages")
 _MAX_METADATA_BYTES = 256 * 1024
 _MAX_HASHED_BYTES = 16 * 2**20
+_MOST_COPIES = 100
 _DISTRIBUTION = re.compile(r"(?P<name>.+?)-[^-]+(-py3[.\d]*)?\.(egg-info|dist-info)")
 
 
@@ -53,18 +57,16 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
     definitions = {}
     python: dict[str, str] = {}
     for package in packages:
-        folder = install / "lib" / package
-        found = [path for path in regular_files(folder) if os.access(path, os.X_OK)]
-        executables[package] = tuple(sorted({path.name for path in found}))
-        for path in regular_files(folder):
-            python[path.relative_to(install).as_posix()] = _hash(path)
+        programs = list(regular_files(install / "lib" / package))
+        executables[package] = tuple(
+            sorted({path.name for path in programs if os.access(path, os.X_OK)})
+        )
+        python |= {path.relative_to(install).as_posix(): _hash(path) for path in programs}
         definitions[package] = tuple(_definitions(install / "share" / package))
     entry_points = {}
     for site in site_packages(install):
-        for path in regular_files(site):
-            name = path.relative_to(site).as_posix()
-            if name.endswith(".py"):
-                python[name] = _hash(path)
+        modules = (path for path in regular_files(site) if path.suffix == ".py")
+        python |= {path.relative_to(site).as_posix(): _hash(path) for path in modules}
         for metadata in sorted(site.glob("*-info")):
             match = _DISTRIBUTION.fullmatch(metadata.name)
             if match:
@@ -82,9 +84,9 @@ def inspect(install: Path, packages: Iterable[str], sources: Mapping[str, str]) 
 
 
 def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> str | None:
-    """See that an install space holds nothing that nobody of ours should open or follow.
+    """See that an install space holds nothing that is dangerous to open or follow.
 
-    Symbolic links to what was handed in, or to nothing, go: nobody would find anything there.
+    Symbolic links to what was handed in, or to nothing, go: nothing will be there.
 
     Returns:
         Why it cannot be used at all, in which case it is removed, or None.
@@ -126,11 +128,6 @@ def _named(path: Path, install: Path) -> str:
     return repr(str(path.relative_to(install)))
 
 
-def site_packages(install: Path) -> list[Path]:
-    """Folders of an install space that Python imports from."""
-    return sorted(install.glob("lib/python3*/site-packages"))
-
-
 def normalised(distribution: str) -> str:
     """Write a distribution's name so that ``bot-publisher`` equals ``bot_publisher``."""
     return re.sub(r"[-_.]+", "_", distribution).lower()
@@ -139,7 +136,7 @@ def normalised(distribution: str) -> str:
 def regular_files(folder: Path) -> Iterator[Path]:
     """All regular files below a folder, without following links, sorted.
 
-    But for those of names that are no text: nobody could write them down, or ask ROS for them.
+    But for those of names that are no text, which no report could hold.
     """
     for parent, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if name != "__pycache__" and _is_text(name))
@@ -161,31 +158,21 @@ def match_files(python: Mapping[str, str], sources: Mapping[str, str]) -> dict[s
         Installed path -> student's path: of those with the same content the one whose path ends
         most alike. Files that the build changed or made are left out.
     """
-    first: dict[str, str] = {}
-    ending: dict[tuple[str, int], str] = {}
+    same: dict[str, list[str]] = {}
     for path, digest in sorted(sources.items()):
-        first.setdefault(digest, path)
-        for mark in _endings(path):
-            ending.setdefault((digest, mark), path)
-    found = {}
-    for installed, digest in python.items():
-        if digest not in first:
-            continue
-        found[installed] = first[digest]
-        for mark in _endings(installed):
-            alike = ending.get((digest, mark))
-            if alike is None:
-                break
-            found[installed] = alike
-    return found
+        same.setdefault(digest, []).append(path)
+    return {
+        # Of thousands of copies, any one will do.
+        path: max(same[digest][:_MOST_COPIES], key=partial(_common_ending, path))
+        for path, digest in python.items()
+        if digest in same
+    }
 
 
-def _endings(path: str) -> Iterator[int]:
-    """A mark for each ending of a path, the shortest first: there may be thousands of copies."""
-    mark = 0
-    for part in reversed(path.split("/")):
-        mark = hash((part, mark))
-        yield mark
+def _common_ending(one: str, other: str) -> int:
+    """How many parts at the end of two paths are the same."""
+    pairs = zip(reversed(one.split("/")), reversed(other.split("/")), strict=False)
+    return len(list(takewhile(lambda pair: pair[0] == pair[1], pairs)))
 
 
 def in_folder(files: Mapping[str, str], folder: str) -> tuple[tuple[str, str], ...]:
@@ -216,10 +203,6 @@ def _hash(path: Path) -> str:
 
 def _entry_points(metadata: Path) -> tuple[EntryPoint, ...]:
     path = metadata / "entry_points.txt"
-    try:
-        if not stat.S_ISREG(path.lstat().st_mode) or path.stat().st_size > _MAX_METADATA_BYTES:
-            return ()
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
+    if path not in regular_files(metadata) or path.stat().st_size > _MAX_METADATA_BYTES:
         return ()
-    return tuple(parse_installed(text, "setup.py"))
+    return tuple(parse_installed(path.read_text(encoding="utf-8", errors="replace"), "setup.py"))

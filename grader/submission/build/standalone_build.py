@@ -1,11 +1,9 @@
-"""Interface packages that are built apart from the rest of their submission.
+"""Interface packages that are built without the rest of their submission.
 
-To generate and compile the code of interfaces takes nearly all of a build's time, and what changes
-from one submission to the next is the nodes. So a package that holds interfaces only, and asks for
-nothing else of its submission, is built as if it had been handed in alone: in a copy of its own
-files and of no others, into an install space of its own, which is kept by their content. What a
-submission gets is what its own files make, whether they were built now or before; and where the
-package does not build alone, the submission is built as a whole, as if there were no such thing.
+To compile the code of interfaces takes nearly all of a build's time, and what changes from one
+submission to the next is the nodes. So a package that holds interfaces only, and needs nothing else
+of its submission, is built as if it had been handed in alone, and kept by its content. Where it
+does not build alone, the submission is built as a whole.
 """
 
 from __future__ import annotations
@@ -42,32 +40,24 @@ _PREFIX = re.compile(r'^_colcon_package_sh_COLCON_CURRENT_PREFIX="(/.*)"$', re.M
 
 
 def standalone(packages: Sequence[Package], files: Iterable[SubmissionFile]) -> tuple[str, ...]:
-    """Names of the packages of a submission that can be built apart.
-
-    Returns:
-        None of them where nothing else would be left to build.
-    """
-    listed = list(files)
+    """Names of the packages that can be built alone; none where nothing else would be left."""
+    code = [file.path for file in files if file.link is not None or not _is_harmless(file.path)]
     found = tuple(
         package.name
         for package in packages
-        if _asks_for_nothing(package, {one.name for one in packages} - {package.name})
-        and all(_is_interface_or_text(file, package) for file in listed)
+        if _needs_nothing(package, {one.name for one in packages} - {package.name})
+        and not any(is_within(path, package.folder) for path in code)
     )
     return found if len(found) < len(packages) else ()
 
 
-def _is_interface_or_text(file: SubmissionFile, package: Package) -> bool:
-    """Whether a file is no code, or no file of the package."""
-    if not is_within(file.path, package.folder):
-        return True
-    name = file.path.rpartition("/")[2]
-    known = name.endswith((*_INTERFACES, *_DOCUMENTS)) or name in _OTHERS
-    return known and file.link is None
+def _is_harmless(path: str) -> bool:
+    name = path.rpartition("/")[2]
+    return name.endswith((*_INTERFACES, *_DOCUMENTS)) or name in _OTHERS
 
 
-def _asks_for_nothing(package: Package, others: set[str]) -> bool:
-    """Whether a package does not look at the others, and asks only for its own interfaces."""
+def _needs_nothing(package: Package, others: set[str]) -> bool:
+    """Whether a package does not look at the others, and makes only its own interfaces."""
     manifest, cmake = package.manifest, package.cmake
     if cmake is None or manifest.error is not None or package.build_type != "ament_cmake":
         return False
@@ -102,10 +92,10 @@ def lay(package: str, built: Path, install: Path) -> None:
     ignore = shutil.ignore_patterns("__pycache__")
     shutil.copytree(built, install, symlinks=True, dirs_exist_ok=True, ignore=ignore)
     share = install / "share" / package
-    told = _PREFIX.search((share / "package.sh").read_text(errors="surrogateescape"))
-    if told is None:
+    built_at = _PREFIX.search((share / "package.sh").read_text(errors="surrogateescape"))
+    if built_at is None:
         return
     # Scripts for a plain shell cannot tell where they are, and name the place of the build.
     for script in share.glob("*.sh"):
         text = script.read_text(errors="surrogateescape")
-        script.write_text(text.replace(told[1], str(install)), errors="surrogateescape")
+        script.write_text(text.replace(built_at[1], str(install)), errors="surrogateescape")

@@ -42,11 +42,8 @@ def check_toolchain(path: str) -> None:
 
 def missing_here(names: Collection[str]) -> set[str]:
     """Those libraries that a build did not find because they are not installed."""
-    libraries = set(_LIBRARIES.split()) & set(names)
-    headers = PYTHON_HEADERS in names and not has_headers()
-    return {name for name in libraries if not _has_library(name)} | (
-        {PYTHON_HEADERS} if headers else set()
-    )
+    missing = {name for name in set(_LIBRARIES.split()) & set(names) if not _has_library(name)}
+    return missing if has_headers() else missing | {PYTHON_HEADERS} & set(names)
 
 
 def watched_folders() -> list[Path]:

@@ -1,9 +1,8 @@
 """Interface packages of ours: built as a student's are, kept in the cache, laid under others.
 
-The wheels of ROS 2 lack ``example_interfaces``, which tutorials and course material use all
-the time, so rosgrade carries its definitions. And an assignment in whose lesson the student
-writes an interface package brings its own copy, because the probe never imports anything that
-a student wrote.
+The wheels of ROS 2 lack ``example_interfaces``, which tutorials use all the time. And an assignment
+in whose lesson the student writes an interface package brings its own copy, because the probe never
+imports what a student wrote.
 """
 
 from __future__ import annotations
@@ -15,17 +14,17 @@ from pathlib import Path
 from grader.errors import GraderFault
 from grader.resources import carried_interfaces
 from grader.ros import RosInstallation
-from grader.submission.build.build import build, once_more
+from grader.submission.build.build import Builder, once_more
 from grader.submission.build.build_cache import BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources
-from grader.submission.build.build_limits import BuildLimits
+from grader.submission.build.colcon import BuildLimits
 from grader.submission.build.toolchain import check_toolchain, missing_tools
 from grader.submission.intake.locate import opened
 
 CARRIED = carried_interfaces()
 """One folder for each package that the wheels lack."""
 
-# Thirty interfaces take 95 s of CPU, and whoever builds them may have little of it.
+# Thirty interfaces take 95 s of CPU.
 _LIMITS = BuildLimits(other_s=1200.0)
 
 
@@ -46,22 +45,20 @@ def install_prefix(
     check_toolchain(ros.environment({})["PATH"])
 
     def attempt(is_second: bool) -> CachedBuild:
+        builder = Builder(
+            ros=ros,
+            cache=cache,
+            limits=_LIMITS,
+            on_progress=lambda what: on_progress(f"{what} (ours, once on this machine)"),
+            is_second=is_second,
+        )
         with opened(packages) as located:
             folders = {
                 packages.name if folder == "." else folder.rpartition("/")[2]: folder
                 for folder in located.packages
             }
-            return build(
-                located,
-                Sources({file.path for file in located.files}, folders),
-                ros,
-                only_python=False,
-                cache=cache,
-                is_standalone=True,
-                limits=_LIMITS,
-                on_progress=lambda what: on_progress(f"{what} (ours, once on this machine)"),
-                is_second=is_second,
-            )
+            sources = Sources({file.path for file in located.files}, folders)
+            return builder.build(located, sources, only_python=False, is_standalone=True)
 
     built = once_more(attempt)
     if built.install is None or not built.build.succeeded:

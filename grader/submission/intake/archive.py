@@ -1,8 +1,8 @@
 """Unpack a student's archive into a fresh folder, whatever it holds.
 
-No member is extracted by :mod:`zipfile` or :mod:`tarfile` themselves: they only read the table
-of contents, :func:`~grader.submission.intake.members.admit` decides, and files are written here. So
-it does not matter whether this Python's ``tarfile`` already has the data filter.
+:mod:`zipfile` and :mod:`tarfile` only read the table of contents,
+:func:`~grader.submission.intake.members.admit` decides, and files are written here. So it does not
+matter whether this Python's ``tarfile`` already has the data filter.
 
 What is made: folders, files (0644, or 0755 when anyone could execute them), hard links as
 copies and, last, symbolic links that lead to something inside. Owners, times, setuid bits and
@@ -21,14 +21,15 @@ import tarfile
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import IO, cast
+from typing import IO
 
 from grader.errors import GraderFault, SubmissionError
 from grader.submission.intake import tars, zips
-from grader.submission.intake.members import MIB, ArchiveLimits, Entry, Kind, Refused, admit
+from grader.submission.intake.members import MIB, ArchiveLimits, Kind, Member, Refused, admit
 from grader.submission.intake.paths import shown
 
 SUFFIXES = (".tar.gz", ".tar.bz2", ".tar.xz", ".tgz", ".tbz2", ".txz", ".tar", ".zip")
@@ -68,7 +69,7 @@ def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> No
     """
     limits = limits or ArchiveLimits()
     name = shown(archive.name)
-    with _translated(name), archive.open("rb") as file:
+    with _translated(name), archive.open("rb") as file, tempfile.TemporaryFile() as scratch:
         size = os.fstat(file.fileno()).st_size
         if size > limits.total_bytes:
             raise SubmissionError(
@@ -77,11 +78,22 @@ def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> No
         start = file.read(512)
         file.seek(0)
         if start.startswith((b"PK\x03\x04", b"PK\x05\x06")):
-            _unpack_zip(file, name, into, limits)
+            zips.check_directory(file, limits)
+            zipped = zipfile.ZipFile(file)
+            infos, found = zipped.infolist(), zips.members(zipped)
+
+            def content(member: Member) -> IO[bytes]:
+                return zipped.open(infos[member.place])
         else:
-            with tempfile.TemporaryFile() as scratch:
-                plain = _plain_tar(file, start, name, scratch, limits)
-                _unpack_tar(plain, name, size, into, limits)
+            plain = _plain_tar(file, start, name, scratch, limits)
+            found = tars.members(plain)
+
+            def content(member: Member) -> IO[bytes]:
+                plain.seek(member.place)
+                return plain
+
+        entries = admit(found, archive=name, archive_bytes=size, limits=limits)
+        _make(entries, content, into)
 
 
 @contextmanager
@@ -102,39 +114,13 @@ def _translated(name: str) -> Iterator[None]:
         raise GraderFault(f"{name}: could not be unpacked here: {error}") from error
 
 
-def _unpack_zip(file: IO[bytes], name: str, into: Path, limits: ArchiveLimits) -> None:
-    size = os.fstat(file.fileno()).st_size
-    zips.check_directory(file, limits)
-    with zipfile.ZipFile(file) as archive:
-        found = zips.members(archive)
-        entries = admit(found, archive=name, archive_bytes=size, limits=limits)
-        infos = archive.infolist()
-        for entry in _files(entries):
-            with archive.open(infos[entry.member.place]) as source:
-                _write(source, entry, into)
-    _make_folders_and_links(entries, into)
-
-
-def _unpack_tar(plain: IO[bytes], name: str, size: int, into: Path, limits: ArchiveLimits) -> None:
-    found = tars.members(plain)
-    entries = admit(found, archive=name, archive_bytes=size, limits=limits)
-    for entry in _files(entries):
-        plain.seek(entry.member.place)
-        _write(plain, entry, into)
-    _make_folders_and_links(entries, into)
-
-
-def _files(entries: list[Entry]) -> list[Entry]:
-    return [entry for entry in entries if entry.member.kind is Kind.FILE]
-
-
 def _plain_tar(
     file: IO[bytes], start: bytes, name: str, scratch: IO[bytes], limits: ArchiveLimits
 ) -> IO[bytes]:
     if start.startswith(b"\x1f\x8b"):
-        blocks = _blocks(cast("IO[bytes]", gzip.GzipFile(fileobj=file)))
+        blocks = iter(partial(gzip.GzipFile(fileobj=file).read, _CHUNK), b"")
     elif start.startswith(b"BZh"):
-        blocks = _blocks(cast("IO[bytes]", bz2.BZ2File(file)))
+        blocks = iter(partial(bz2.BZ2File(file).read, _CHUNK), b"")
     elif start.startswith(b"\xfd7zXZ\x00"):
         blocks = _xz_blocks(file)
     elif start[257:262] == b"ustar" or name.lower().endswith(".tar"):
@@ -163,11 +149,6 @@ def _plain_tar(
     return scratch
 
 
-def _blocks(file: IO[bytes]) -> Iterator[bytes]:
-    while block := file.read(_CHUNK):
-        yield block
-
-
 def _xz_blocks(file: IO[bytes]) -> Iterator[bytes]:
     # lzma.open has no memory limit, and the file itself says how much its decoder allocates.
     decoder = lzma.LZMADecompressor(memlimit=_LZMA_MEMORY)
@@ -186,31 +167,27 @@ def _xz_blocks(file: IO[bytes]) -> Iterator[bytes]:
         ahead = b""
 
 
-def _write(source: IO[bytes], entry: Entry, into: Path) -> None:
-    path = into / entry.path
-    path.parent.mkdir(parents=True, exist_ok=True)
-    left = entry.member.size
-    with _created(path, entry.member.executable) as file:
+def _make(members: list[Member], content: Callable[[Member], IO[bytes]], into: Path) -> None:
+    # Links come last, so that nothing is written through one.
+    for member in sorted(members, key=lambda member: member.kind is Kind.LINK):
+        path = into / member.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if member.kind is Kind.FILE:
+            _write(content(member), member, path)
+        elif member.kind is Kind.FOLDER:
+            path.mkdir(exist_ok=True)
+        else:
+            path.symlink_to(member.target)
+
+
+def _write(source: IO[bytes], member: Member, path: Path) -> None:
+    # O_EXCL does not follow links, should one be there against all reason.
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+    left = member.size
+    with os.fdopen(os.open(path, flags, 0o755 if member.executable else 0o644), "wb") as file:
         while left:
             block = source.read(min(_CHUNK, left))
             if not block:
-                raise EOFError(f"{shown(entry.path)} ends too early")
+                raise EOFError(f"{shown(member.name)} ends too early")
             file.write(block)
             left -= len(block)
-
-
-def _created(path: Path, executable: bool) -> IO[bytes]:
-    # O_EXCL does not follow links, should one be there against all reason.
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
-    return os.fdopen(os.open(path, flags, 0o755 if executable else 0o644), "wb")
-
-
-def _make_folders_and_links(entries: list[Entry], into: Path) -> None:
-    for entry in entries:
-        if entry.member.kind is Kind.FOLDER:
-            (into / entry.path).mkdir(parents=True, exist_ok=True)
-    links = [entry for entry in entries if entry.member.kind is Kind.LINK]
-    for entry in links:
-        (into / entry.path).parent.mkdir(parents=True, exist_ok=True)
-    for entry in links:
-        (into / entry.path).symlink_to(entry.member.target)

@@ -4,34 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection
-from functools import partial
 
 from grader.submission.intake.paths import parents
 from grader.submission.read.manifest import MANIFEST
 
-TOOL_FOLDERS = frozenset(
-    {
-        ".git",
-        ".hg",
-        ".svn",
-        "__pycache__",
-        ".venv",
-        "node_modules",
-        ".pytest_cache",
-        ".mypy_cache",
-        ".ruff_cache",
-        ".hypothesis",
-        ".tox",
-        ".colcon",
-        "__MACOSX",
-        "rosgrade-report",
-    }
-)
+_TOOLS = """
+.git .hg .svn __pycache__ .venv node_modules .pytest_cache .mypy_cache .ruff_cache .hypothesis .tox
+.colcon __MACOSX rosgrade-report
+"""
+TOOL_FOLDERS = frozenset(_TOOLS.split())
 """Folders that tools make, wherever they are."""
 
 COLCON_FOLDERS = ("build", "install", "log")
 _COLCON_MARKS = ("COLCON_IGNORE", ".built_by", ".colcon_install_layout", "local_setup.sh")
 _VIRTUAL_ENVIRONMENT = "pyvenv.cfg"
+_MARKS = (*_COLCON_MARKS, _VIRTUAL_ENVIRONMENT)
 
 _EDITORS = re.compile(
     r"""
@@ -65,19 +52,11 @@ def is_leftover(name: str, holds: Callable[[str], bool], in_package: bool) -> bo
 
 
 def is_within_leftover(path: str, present: Collection[str]) -> bool:
-    """Whether a path is in a folder that :func:`is_leftover`.
-
-    Args:
-        path: Relative.
-    """
+    """Whether a path is in a folder that :func:`is_leftover`."""
     in_package = MANIFEST in present
     for folder in reversed(parents(path)):
-        name = folder.rpartition("/")[2]
-        if is_leftover(name, partial(_is_there, present, folder), in_package):
+        marks = {one for one in (*_MARKS, MANIFEST) if f"{folder}/{one}" in present}
+        if is_leftover(folder.rpartition("/")[2], marks.__contains__, in_package):
             return True
-        in_package = in_package or f"{folder}/{MANIFEST}" in present
+        in_package = in_package or MANIFEST in marks
     return False
-
-
-def _is_there(present: Collection[str], folder: str, name: str) -> bool:
-    return f"{folder}/{name}" in present

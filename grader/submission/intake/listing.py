@@ -9,29 +9,20 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from grader.errors import GraderFault, SubmissionError
+from grader.errors import GraderFault, SubmissionError, machine_fault
 from grader.submission.intake.leftovers import COLCON_FOLDERS, is_left_out, is_leftover
-from grader.submission.intake.members import (
-    MIB,
-    ArchiveLimits,
-    LeadsOut,
-    resolve_link,
-)
+from grader.submission.intake.members import MIB, ArchiveLimits, LeadsOut, links_inside
 from grader.submission.intake.paths import is_within, join, parents, shown
 from grader.submission.read.manifest import MANIFEST
 
-SOURCE_SPACE = "src"
-"""Where a colcon workspace has its packages."""
-IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
+_SOURCE_SPACE = "src"
+_IGNORE_MARKERS = ("COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE")
 _CHANGED = frozenset({errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ESTALE})
-_OF_THE_MACHINE = frozenset(
-    {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE, errno.EIO, errno.ENOMEM}
-)
 
 
 @dataclass(frozen=True)
@@ -69,7 +60,7 @@ class Listing:
 
 
 class ChangedMeanwhile(GraderFault):
-    """Somebody writes to the submission while it is read: an editor, `git`, a synced folder."""
+    """The submission is written to while it is read: by an editor, `git`, a synced folder."""
 
     def __init__(self, path: str) -> None:
         """Name the file."""
@@ -83,9 +74,8 @@ def unreadable(path: str, error: OSError) -> SubmissionError | GraderFault:
     """Whose fault it is that a file cannot be read."""
     if error.errno in _CHANGED:
         return ChangedMeanwhile(path)
-    if error.errno in _OF_THE_MACHINE:
-        return GraderFault(f"no private copy of the submission could be made: {error}")
-    return SubmissionError(f"{shown(path)}: cannot be read: {error.strerror}")
+    cannot_be_read = SubmissionError(f"{shown(path)}: cannot be read: {error.strerror}")
+    return machine_fault(error, Path(path)) or cannot_be_read
 
 
 def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
@@ -96,29 +86,31 @@ def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
             link that leads out of the folder.
         GraderFault: This machine cannot read it now.
     """
-    try:
-        return _list_files(root, limits or ArchiveLimits())
-    except OSError as error:
-        raise unreadable(str(error.filename), error) from error
-
-
-def _list_files(root: Path, limits: ArchiveLimits) -> Listing:
+    limits = limits or ArchiveLimits()
     listing = Listing()
     links: dict[str, str] = {}
     total = 0
-    for path, entry in _walk(root, ".", False, listing.skipped, limits.depth):
-        if entry.is_symlink():
-            links[path] = _target(root, path)
-        elif entry.is_file(follow_symlinks=False):
-            status = entry.stat(follow_symlinks=False)
-            total += status.st_size
-            executable = bool(status.st_mode & stat.S_IXUSR)
-            listing.files.append(SubmissionFile(path, status.st_size, executable))
-        if len(listing.files) + len(links) > limits.members:
-            raise SubmissionError(f"the submission holds more than {limits.members} files")
-        if total > limits.total_bytes:
-            raise SubmissionError(_too_large(listing.files, limits))
-    listing.files += _links_inside(links, listing.files)
+    try:
+        for path, entry in _walk(root, ".", False, listing.skipped, limits.depth):
+            if entry.is_symlink():
+                links[path] = _target(root, path)
+            elif entry.is_file(follow_symlinks=False):
+                status = entry.stat(follow_symlinks=False)
+                total += status.st_size
+                executable = bool(status.st_mode & stat.S_IXUSR)
+                listing.files.append(SubmissionFile(path, status.st_size, executable))
+            if len(listing.files) + len(links) > limits.members:
+                raise SubmissionError(f"the submission holds more than {limits.members} files")
+            if total > limits.total_bytes:
+                raise SubmissionError(_too_large(listing.files, limits))
+    except OSError as error:
+        raise unreadable(str(error.filename), error) from error
+    files = [file.path for file in listing.files]
+    try:
+        kept = links_inside(links, {*files, *(f for path in files for f in parents(path))}, links)
+    except LeadsOut as error:
+        raise _leads_out(str(error)) from None
+    listing.files += [SubmissionFile(path, 0, link=links[path]) for path in kept]
     listing.files.sort(key=lambda file: os.fsencode(file.path))
     listing.skipped.sort()
     return listing
@@ -157,29 +149,12 @@ def _target(root: Path, path: str) -> str:
         inside = os.path.relpath(target, base)
         if inside.split("/")[0] != "..":
             return os.path.relpath(inside, path.rpartition("/")[0] or ".")
-    raise SubmissionError(_leads_out(path, target))
+    raise _leads_out(f"{shown(path)}: the link to {shown(target)!r}")
 
 
-def _links_inside(links: dict[str, str], files: list[SubmissionFile]) -> list[SubmissionFile]:
-    if not links:
-        return []
-    present = {file.path for file in files}
-    present.update(folder for path in list(present) for folder in parents(path))
-    kept = []
-    for path, target in links.items():
-        try:
-            end = resolve_link(path, links)
-        except LeadsOut:
-            raise SubmissionError(_leads_out(path, target)) from None
-        if end in present:
-            kept.append(SubmissionFile(path, 0, link=target))
-    return kept
-
-
-def _leads_out(path: str, target: str) -> str:
-    return (
-        f"{shown(path)}: the link to {shown(target)!r} leads out of the submission; "
-        "put what it leads to there instead"
+def _leads_out(which: str) -> SubmissionError:
+    return SubmissionError(
+        f"{which} leads out of the submission; put what it leads to there instead"
     )
 
 
@@ -191,33 +166,25 @@ def _too_large(files: list[SubmissionFile], limits: ArchiveLimits) -> str:
     )
 
 
-def wrapper_of(files: Iterable[SubmissionFile]) -> str:
+def wrapper_of(files: Sequence[SubmissionFile]) -> str:
     """The folders around the packages that hold nothing else: ``ana_hw1`` in ``ana_hw1/src/...``.
 
     The same work is packed under another name by everybody who hands it in.
 
     Returns:
         The deepest one. ``src`` and what is in it belong to the submission; ``.`` where there is
-        no such folder, or no package, or where a link needs it.
+        no such folder, or no package, or where links may need it.
     """
-    files = tuple(files)
     packages = find_packages(file.path for file in files)
-    if not packages:
-        return "."
     wrapper = "."
+    if not packages or any(file.link for file in files):
+        return wrapper
     for folder in reversed(parents(packages[0])):
-        if folder.rpartition("/")[2] == SOURCE_SPACE:
+        if folder.rpartition("/")[2] == _SOURCE_SPACE:
             break
         if not all(file.path.startswith(f"{folder}/") for file in files):
             break
         wrapper = folder
-    start = 0 if wrapper == "." else len(wrapper) + 1
-    links = {file.path[start:]: file.link for file in files if file.link is not None}
-    try:
-        for path in links:
-            resolve_link(path, links)
-    except LeadsOut:
-        return "."
     return wrapper
 
 
@@ -233,7 +200,7 @@ def find_packages(paths: Iterable[str]) -> list[str]:
         folder, _, name = path.rpartition("/")
         if name == MANIFEST:
             folders.add(folder or ".")
-        elif name in IGNORE_MARKERS:
+        elif name in _IGNORE_MARKERS:
             ignored.add(folder or ".")
     found: list[str] = []
     for folder in sorted(folders, key=lambda folder: (folder != ".", folder.count("/"))):

@@ -13,7 +13,7 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,8 +36,8 @@ from grader.submission.intake.paths import is_within, shown
 NO_FILES = hashlib.sha256().hexdigest()
 """The hash of a submission that is empty."""
 _CHUNK = 1024 * 1024
+# Before it is read again because it was written to meanwhile.
 _PAUSES_S = (0.05, 0.5)
-"""Before it is read again because somebody wrote to it meanwhile."""
 _URL = re.compile(r"(https?|ssh|git|file|ftp):/|[\w.-]+@[\w.-]+:")
 
 
@@ -77,13 +77,11 @@ def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Lo
     limits = limits or ArchiveLimits()
     source = check_path(path)
     with Scratch("submission") as scratch:
+        listed = source
         if not source.is_dir():
-            unpacked = scratch / "unpacked"
-            unpacked.mkdir()
-            archive.unpack(source, unpacked, limits)
-            listed = unpacked
-        else:
-            listed = source
+            listed = scratch / "unpacked"
+            listed.mkdir()
+            archive.unpack(source, listed, limits)
         root = scratch / "submission"
         listing, sha256 = _snapshot(listed, root, limits)
         yield Located(
@@ -114,7 +112,7 @@ def only(located: Located, folder: str, name: str) -> Iterator[Located]:
     with tempfile.TemporaryDirectory(prefix="apart-", dir=located.root.parent) as scratch:
         root = Path(scratch, "submission")
         root.mkdir()
-        sha256 = _copy(located.root / folder, Listing(inside), root / name)
+        sha256 = _copy(located.root / folder, inside, root / name)
         files = tuple(replace(file, path=f"{name}/{file.path}") for file in inside)
         yield Located(located.id, sha256, root, files, (name,))
 
@@ -149,27 +147,25 @@ def submission_id(source: Path) -> str:
 
 def _snapshot(source: Path, root: Path, limits: ArchiveLimits) -> tuple[Listing, str]:
     """Copy a folder as it was at one moment, as far as one can tell."""
-    for pause_s in _PAUSES_S:
+    for pause_s in (*_PAUSES_S, None):
         try:
-            return _snapshot_once(source, root, limits)
+            listing = list_files(source, limits)
+            wrapper = wrapper_of(listing.files)
+            listing = listing.inside(wrapper)
+            return listing, _copy(source / wrapper, listing.files, root)
         except ChangedMeanwhile:
+            if pause_s is None:
+                raise
             shutil.rmtree(root, ignore_errors=True)
             time.sleep(pause_s)
-    return _snapshot_once(source, root, limits)
+    raise AssertionError  # the last attempt returned or raised
 
 
-def _snapshot_once(source: Path, root: Path, limits: ArchiveLimits) -> tuple[Listing, str]:
-    listing = list_files(source, limits)
-    wrapper = wrapper_of(listing.files)
-    listing = listing.inside(wrapper)
-    return listing, _copy(source / wrapper, listing, root)
-
-
-def _copy(source: Path, listing: Listing, root: Path) -> str:
+def _copy(source: Path, files: Sequence[SubmissionFile], root: Path) -> str:
     """Copy the listed files and hash what was copied, so that both agree for certain."""
     total = hashlib.sha256()
     root.mkdir()
-    for file in listing.files:
+    for file in files:
         target = root / file.path
         try:
             target.parent.mkdir(parents=True, exist_ok=True)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import os
 import re
 from collections import deque
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from grader.errors import SubmissionError
@@ -73,38 +73,26 @@ class Member:
     target: str = ""
 
 
-@dataclass(frozen=True)
-class Entry:
-    """An admitted member with its safe relative path."""
-
-    path: str
-    member: Member
-
-
 class Refused(Exception):
     """Why one member is refused; :func:`admit` adds which one, and of which archive."""
 
 
 def admit(
-    members: Iterable[Member],
-    *,
-    archive: str,
-    archive_bytes: int,
-    limits: ArchiveLimits,
-) -> list[Entry]:
+    members: Iterable[Member], *, archive: str, archive_bytes: int, limits: ArchiveLimits
+) -> list[Member]:
     """Check every member; nothing may be unpacked when one of them is refused.
 
     Args:
         members: In the archive's order; read no further than the limits allow.
 
     Returns:
-        What to unpack. Folders above a file are implied. Links that lead to nothing inside
-        the archive are left out.
+        What to unpack, with safe relative paths as names. Folders above a file are implied. Links
+        that lead to nothing inside the archive are left out.
 
     Raises:
         SubmissionError: A member is unsafe or too much; names the archive and the member.
     """
-    entries: list[Entry] = []
+    entries: list[Member] = []
     total = 0
     kinds: dict[str, Kind] = {}
     for count, member in enumerate(members, start=1):
@@ -115,22 +103,22 @@ def admit(
                 raise Refused(f"the archive holds more than {limits.members} members")
             if not kept:
                 continue
-            _check_kind(member)
+            if member.kind is Kind.SPECIAL:
+                raise Refused("a device, pipe or other special file is refused")
+            if member.size < 0:
+                raise Refused("its size is negative")
             total += member.size
             _check_size(total, archive_bytes, limits)
             _check_place(path, member.kind, kinds)
         except Refused as reason:
             raise SubmissionError(f"{archive}: {shown(member.name)}: {reason}") from None
         kinds[path] = member.kind
-        entries.append(Entry(path, member))
+        entries.append(replace(member, name=path))
     return _with_safe_links(entries, archive)
 
 
 def safe_path(name: str, limits: ArchiveLimits) -> str:
-    """Turn a member's name into a relative path without ``.`` and ``..``.
-
-    Returns:
-        The path, empty for the archive's root.
+    """A member's name as a relative path without ``.`` and ``..``; empty for the archive's root.
 
     Raises:
         Refused: The name leads out of the folder, or is too long.
@@ -153,13 +141,6 @@ def safe_path(name: str, limits: ArchiveLimits) -> str:
     return "/".join(parts)
 
 
-def _check_kind(member: Member) -> None:
-    if member.kind is Kind.SPECIAL:
-        raise Refused("a device, pipe or other special file is refused")
-    if member.size < 0:
-        raise Refused("its size is negative")
-
-
 def _check_size(total: int, archive_bytes: int, limits: ArchiveLimits) -> None:
     if total > limits.total_bytes:
         raise Refused(f"with it the archive unpacks to more than {limits.total_bytes // MIB} MiB")
@@ -176,33 +157,41 @@ def _check_place(path: str, kind: Kind, kinds: dict[str, Kind]) -> None:
             raise Refused(f"{shown(folder)} is not a folder in this archive")
 
 
-def _with_safe_links(entries: list[Entry], archive: str) -> list[Entry]:
-    links = {e.path: e.member.target for e in entries if e.member.kind is Kind.LINK}
+def _with_safe_links(entries: list[Member], archive: str) -> list[Member]:
+    links = {one.name: one.target for one in entries if one.kind is Kind.LINK}
     if not links:
         return entries
-    present = {entry.path for entry in entries if entry.member.kind is not Kind.LINK}
-    present.update(folder for path in (*present, *links) for folder in parents(path))
-    kept = []
-    for entry in entries:
-        if entry.member.kind is Kind.LINK:
-            # `colcon build --symlink-install` and venv fill their folders with links out.
-            if is_within_leftover(entry.path, present):
-                continue
-            try:
-                end = resolve_link(entry.path, links)
-            except LeadsOut:
-                raise SubmissionError(
-                    f"{archive}: {shown(entry.path)}: the link to "
-                    f"{shown(entry.member.target)!r} leads out of the archive"
-                ) from None
-            if end not in present:
-                continue
-        kept.append(entry)
-    return kept
+    paths = [path for one in entries for path in (one.name, *parents(one.name))]
+    present = set(paths) - links.keys()
+    # `colcon build --symlink-install` and venv fill their folders with links out.
+    wanted = [path for path in links if not is_within_leftover(path, present)]
+    try:
+        kept = links_inside(links, present, wanted)
+    except LeadsOut as error:
+        raise SubmissionError(f"{archive}: {error} leads out of the archive") from None
+    return [one for one in entries if one.kind is not Kind.LINK or one.name in kept]
 
 
 class LeadsOut(Exception):
     """A symbolic link leads out of the folder that it must stay in."""
+
+
+def links_inside(
+    links: Mapping[str, str], present: Collection[str], wanted: Iterable[str]
+) -> set[str]:
+    """Those of the wanted links that lead to a file or folder that is present.
+
+    Raises:
+        LeadsOut: One leads out; the text names it and its target.
+    """
+    kept = set()
+    for path in wanted:
+        try:
+            if resolve_link(path, links) in present:
+                kept.add(path)
+        except LeadsOut:
+            raise LeadsOut(f"{shown(path)}: the link to {shown(links[path])!r}") from None
+    return kept
 
 
 def resolve_link(path: str, links: Mapping[str, str]) -> str | None:

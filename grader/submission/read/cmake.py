@@ -1,8 +1,8 @@
 """Commands of a CMakeLists.txt, read to explain it and never executed.
 
-A small reader of the language's syntax: comments, quoted and bracket arguments, variables that
-``set`` and ``list(APPEND ...)`` fill. What it cannot know (functions, conditions, globs) it
-leaves as it is written, so what it says is a hint and no verdict.
+A small reader of the language's syntax: comments, quoted arguments, variables that ``set`` and
+``list(APPEND ...)`` fill. What it cannot know (functions, conditions, globs) it leaves as it is
+written, so what it says is a hint and no verdict.
 
 Source: https://cmake.org/cmake/help/latest/manual/cmake-language.7.html
 """
@@ -15,14 +15,11 @@ from dataclasses import dataclass
 
 _TOKEN = re.compile(
     r"""
-    (?P<bracket>\#?\[(?P<level>=*)\[)
-    |(?P<comment>\#[^\n]*)
+    \#?\[(?P<level>=*)\[(?P<bracket>.*?)(\](?P=level)\]|\Z)
+    |\#[^\n]*
     |"(?P<quoted>(?:\\.|[^"\\])*)"
-    |(?P<open>\()
-    |(?P<close>\))
-    |(?P<separator>[\s;]+)
+    |(?P<parenthesis>[()])
     |(?P<word>(?:\\.|[^\s()"\#;\\])+)
-    |(?P<other>.)
     """,
     re.VERBOSE | re.DOTALL,
 )
@@ -55,7 +52,7 @@ class CMakeCommand:
 
 
 def read_commands(text: str) -> tuple[CMakeCommand, ...]:
-    """The commands of a CMakeLists.txt in their order; what comes after broken syntax is lost."""
+    """The commands of a CMakeLists.txt in their order."""
     variables: dict[str, str] = {}
     found = []
     for name, written, line in _commands(text):
@@ -64,58 +61,35 @@ def read_commands(text: str) -> tuple[CMakeCommand, ...]:
         if name == "project" and arguments:
             variables["PROJECT_NAME"] = arguments[0]
         elif name == "set" and arguments:
-            variables[arguments[0]] = _joined(arguments[1:])
+            variables[arguments[0]] = ";".join(arguments[1:])[:_LONGEST_VALUE]
         elif name == "list" and len(arguments) > 2 and arguments[0] == "APPEND":
-            known = variables.get(arguments[1])
-            variables[arguments[1]] = _joined((*([known] if known else []), *arguments[2:]))
+            parts = (variables.get(arguments[1], ""), *arguments[2:])
+            variables[arguments[1]] = ";".join(filter(None, parts))[:_LONGEST_VALUE]
     return tuple(found)
-
-
-def _joined(values: tuple[str, ...]) -> str:
-    return ";".join(values)[:_LONGEST_VALUE]
 
 
 def _commands(text: str) -> Iterator[tuple[str, list[tuple[str, bool]], int]]:
     """Name, arguments (with whether they are quoted) and line of each command."""
-    name, name_line, depth = "", 0, 0
+    name, line, depth, position = "", 1, 0, 0
     arguments: list[tuple[str, bool]] = []
-    for kind, value, line in _tokens(text):
-        if kind == "open":
+    for match in _TOKEN.finditer(text):
+        quoted = match["bracket"] if match[0][0] == "[" else match["quoted"]
+        if match["parenthesis"] == "(":
             depth += 1
-        elif kind == "close":
+        elif match["parenthesis"]:
             depth -= 1
             if depth == 0 and name:
-                yield name.lower(), arguments, name_line
+                yield name.lower(), arguments, line
             if depth <= 0:
                 name, arguments, depth = "", [], 0
-        elif depth:
-            if kind in ("word", "quoted"):
-                arguments.append((value, kind == "quoted"))
-        elif kind == "word":
-            name, name_line = value, line
-
-
-def _tokens(text: str) -> Iterator[tuple[str, str, int]]:
-    """Kind, value and line of everything but comments and blanks."""
-    position, line = 0, 1
-    while position < len(text):
-        match = _TOKEN.match(text, position)
-        assert match is not None  # any character is a token
-        end = match.end()
-        kind, value = match.lastgroup or "", match[0]
-        if match["bracket"]:
-            closing = f"]{match['level']}]"
-            inner_end = text.find(closing, end)
-            if inner_end < 0:
-                return
-            kind, value = "quoted", text[end:inner_end]
-            end = inner_end + len(closing)
-        elif match["quoted"] is not None:
-            kind, value = "quoted", re.sub(r"\\(.)", r"\1", match["quoted"], flags=re.DOTALL)
-        if kind in ("open", "close", "word") or (kind == "quoted" and match[0][0] != "#"):
-            yield kind, value, line
-        line += text.count("\n", position, end)
-        position = end
+        elif depth and quoted is not None:
+            arguments.append((re.sub(r"\\(.)", r"\1", quoted, flags=re.DOTALL), True))
+        elif depth and match["word"]:
+            arguments.append((match["word"], False))
+        elif match["word"]:
+            name = match["word"]
+            line += text.count("\n", position, match.start())
+            position = match.start()
 
 
 def _expanded(written: list[tuple[str, bool]], variables: Mapping[str, str]) -> Iterator[str]:

@@ -16,36 +16,20 @@ _SYSTEM_KEY = re.compile(
 )
 _POSSIBLE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 _APT_NAME = re.compile(r"ros-[a-z]+-")
-# Names that students type most; here a looser likeness counts as a slip.
-_COMMON = frozenset(
-    {
-        "rclpy",
-        "rclcpp",
-        "std_msgs",
-        "geometry_msgs",
-        "sensor_msgs",
-        "nav_msgs",
-        "std_srvs",
-        "example_interfaces",
-        "visualization_msgs",
-        "action_msgs",
-        "tf2_ros",
-        "turtlesim",
-        "launch_ros",
-        "ament_index_python",
-        "ament_cmake",
-    }
-)
+# Names that students type most; here a looser likeness counts as a mistyped name.
+_OFTEN = """
+rclpy rclcpp std_msgs geometry_msgs sensor_msgs nav_msgs std_srvs example_interfaces
+visualization_msgs action_msgs tf2_ros turtlesim launch_ros ament_index_python ament_cmake
+"""
+_COMMON = frozenset(_OFTEN.split())
 
 
 def is_known(name: str, *, installed: Collection[str], submitted: Collection[str]) -> bool | None:
     """Tell whether a ROS package or rosdep key of this name exists.
 
     Returns:
-        True when it is one of these, of :mod:`grader.submission.read.rosdistro`, or looks like a
-        rosdep key of a system package. False when it cannot be the name of either, is known not
-        to exist, or is a slip of a known name (:func:`meant`). None when it may exist all the
-        same.
+        False when it cannot be the name of either, is known not to exist, or is a mistyped known
+        name (:func:`meant`). None when it may exist all the same.
     """
     if name in installed or name in submitted or name in PACKAGES or name in ROSDEP_KEYS:
         return True
@@ -57,38 +41,29 @@ def is_known(name: str, *, installed: Collection[str], submitted: Collection[str
 
 
 def meant(name: str, more: Iterable[str] = ()) -> str | None:
-    """Find the ROS package that was most likely meant by a name that is none.
+    """The ROS package that was most likely meant by a name that is none, or None.
 
-    Returns:
-        The package that differs only in case, hyphens, a plural or a part such as ``.msg``, or
-        by one letter (two in long names); None where nothing is that near.
+    It differs only in case, hyphens, a plural or a part such as ``.msg``, or by one letter (two in
+    long names).
     """
-    first = re.split(r"[./:\s]", _APT_NAME.sub("", name.strip()), maxsplit=1)[0]
-    key = _folded(first)
+    key = _folded(re.split(r"[./:\s]", _APT_NAME.sub("", name.strip()), maxsplit=1)[0])
     near = []
-    for candidate, folded, slips in (*_candidates(), *map(_candidate, more)):
-        if abs(len(folded) - len(key)) <= slips:
-            distance = _distance(key, folded, slips)
+    for candidate in (*PACKAGES, *more):
+        folded, most = _folded(candidate), _most_wrong(candidate)
+        if abs(len(folded) - len(key)) <= most:
+            distance = _distance(key, folded, most)
             if distance is not None:
                 near.append((distance, candidate))
     return min(near)[1] if near else None
 
 
-def _candidate(name: str) -> tuple[str, str, int]:
-    return name, _folded(name), _slips(name)
-
-
-@lru_cache(maxsize=1)
-def _candidates() -> tuple[tuple[str, str, int], ...]:
-    return tuple(map(_candidate, sorted(PACKAGES)))
-
-
+@lru_cache(maxsize=4096)
 def _folded(name: str) -> str:
     """What stays of a name without case, separators and plural."""
     return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("s")
 
 
-def _slips(candidate: str) -> int:
+def _most_wrong(candidate: str) -> int:
     """How many letters may differ: few, since many packages have names alike."""
     stem = candidate.removesuffix("_msgs").removesuffix("_interfaces")
     if candidate in _COMMON:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 
 from grader.submission.record import Import
 
@@ -13,26 +14,19 @@ _GUARDS = frozenset({"ImportError", "ModuleNotFoundError", "Exception", "BaseExc
 
 
 def is_code(path: str) -> bool:
-    """Whether a Python file of a package counts as its code.
-
-    Args:
-        path: Relative to the package.
-    """
+    """Whether a Python file counts as its package's code; the path is relative to the package."""
     *folders, name = path.split("/")
-    if folders and folders[0] in _NOT_CODE:
+    if path == "setup.py" or name == "conftest.py" or _NOT_CODE.intersection(folders[:1]):
         return False
-    if not folders and name == "setup.py":
-        return False
-    return name != "conftest.py" and not name.endswith((".launch.py", "_launch.py"))
+    return not name.endswith((".launch.py", "_launch.py"))
 
 
 def find_imports(tree: ast.Module, file: str) -> list[Import]:
     """List the modules that a file imports, each once per line.
 
     Returns:
-        Absolute imports, also ``importlib.import_module("literal")`` and
-        ``__import__("literal")``, by line. Relative imports stay within the package and are
-        left out.
+        Absolute imports, also ``importlib.import_module("literal")``, by line. Relative imports
+        stay within the package and are left out.
     """
     found = {
         Import(name.partition(".")[0], file, line, optional)
@@ -54,29 +48,22 @@ def _walk(tree: ast.Module) -> Iterator[tuple[str, int, bool]]:
         elif isinstance(node, ast.Call):
             yield _dynamic(node), node.lineno, optional
         guarded = _guarded(node)
-        pending.extend(
-            (child, optional or id(child) in guarded) for child in ast.iter_child_nodes(node)
-        )
+        pending += [(child, optional or child in guarded) for child in ast.iter_child_nodes(node)]
 
 
 def _dynamic(call: ast.Call) -> str:
-    function = call.func
-    name = function.attr if isinstance(function, ast.Attribute) else ""
-    name = function.id if isinstance(function, ast.Name) else name
-    if name not in ("import_module", "__import__") or not call.args:
+    if _last_name(call.func) not in ("import_module", "__import__") or not call.args:
         return ""
-    first = call.args[0]
-    if isinstance(first, ast.Constant) and isinstance(first.value, str):
-        return "" if first.value.startswith(".") else first.value
-    return ""
+    name = getattr(call.args[0], "value", None)
+    return name if isinstance(name, str) and not name.startswith(".") else ""
 
 
-def _guarded(node: ast.AST) -> set[int]:
-    """Identities of the children without which the code still runs."""
+def _guarded(node: ast.AST) -> set[ast.AST]:
+    """The children without which the code still runs."""
     if isinstance(node, ast.Try) and any(map(_catches_import_error, node.handlers)):
-        return {id(child) for child in (*node.body, *node.handlers)}
-    if isinstance(node, ast.If) and _is_type_checking(node.test):
-        return {id(child) for child in node.body}
+        return {*node.body, *node.handlers}
+    if isinstance(node, ast.If) and _last_name(node.test) == "TYPE_CHECKING":
+        return {*node.body}
     return set()
 
 
@@ -85,25 +72,18 @@ def _catches_import_error(handler: ast.ExceptHandler) -> bool:
     return any(kind is None or _last_name(kind) in _GUARDS for kind in kinds)
 
 
-def _is_type_checking(test: ast.expr) -> bool:
-    return _last_name(test) == "TYPE_CHECKING"
-
-
 def _last_name(node: ast.expr) -> str:
-    if isinstance(node, ast.Attribute):
-        return node.attr
-    return node.id if isinstance(node, ast.Name) else ""
+    name = getattr(node, "attr", getattr(node, "id", ""))
+    assert isinstance(name, str)
+    return name
 
 
 def ros_imports(
-    imports: Iterable[Import],
-    *,
-    own: Collection[str],
-    packages: Mapping[str, str],
+    imports: Iterable[Import], *, own: Collection[str], packages: Mapping[str, str]
 ) -> list[Import]:
-    """Keep the imports that a ROS package must provide."""
+    """Keep the imports that a ROS package must provide, named after that package."""
     return [
-        Import(packages[item.module], item.file, item.line, item.optional)
+        replace(item, module=packages[item.module])
         for item in imports
         if item.module in packages
         and item.module not in own

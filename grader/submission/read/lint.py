@@ -15,7 +15,7 @@ import subprocess
 import sys
 import sysconfig
 from collections import Counter
-from collections.abc import Callable, Collection
+from collections.abc import Collection, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -35,7 +35,7 @@ _PYTHON = (3, 12)
 """The Python of ROS 2 Jazzy."""
 _NEWER = re.compile(r"on Python [\d.]+ \(syntax was added in Python (\d+)\.(\d+)\)")
 _WALL_S = 20.0
-# No finding is decided by more places of one rule than a student can look at.
+# More places of one rule help no student.
 _MOST_PLACES = 20
 
 
@@ -67,70 +67,56 @@ def known_rules(ruff: Path) -> frozenset[str]:
 
 
 def lint(root: Path, files: Collection[str], ruff: Path | None = None) -> Lint:
-    """Let ruff look at files; they are neither changed nor run.
-
-    Args:
-        ruff: The program, by default the one that is found.
-    """
+    """Let ruff look at files; they are neither changed nor run."""
     ruff = ruff or find_ruff()
     if ruff is None:
         return Lint("ruff is not installed: `pip install ruff`")
-    if not files:
-        return Lint()
-    found: list[LintFinding] = []
-    problem = _check(ruff, root, files, _PYTHON, found.append)
-    # The code of a syntax error is a word, that of a rule begins with its family.
-    rules = [item for item in found if item.code[:1].isupper()]
-    return Lint(problem, () if problem else _first_of_each(rules))
+    problem, found = _check(ruff, root, files, _PYTHON)
+    seen: Counter[str] = Counter()
+    kept = []
+    for finding in sorted(found, key=lambda item: (item.file, item.line, item.code)):
+        seen[finding.code] += 1
+        if not _is_syntax_error(finding) and seen[finding.code] <= _MOST_PLACES:
+            kept.append(finding)
+    return Lint(problem, () if problem else tuple(kept))
 
 
 def newer_syntax(
-    root: Path,
-    files: Collection[str],
-    python: tuple[int, int] = sys.version_info[:2],
-    ruff: Path | None = None,
+    root: Path, files: Collection[str], python: tuple[int, int] = sys.version_info[:2]
 ) -> tuple[SourceError, ...]:
-    """Find files that only the Python of ROS 2 Jazzy can parse, and not the one that is here.
-
-    Args:
-        ruff: The program, by default the one that is found.
-    """
-    ruff = ruff or find_ruff()
-    if python >= _PYTHON or ruff is None or not files:
+    """Find files that only the Python of ROS 2 Jazzy can parse, and not the one that is here."""
+    ruff = find_ruff()
+    if python >= _PYTHON or ruff is None:
         return ()
-    found: list[LintFinding] = []
-    if _check(ruff, root, files, python, found.append) is not None:
-        return ()
+    problem, found = _check(ruff, root, files, python)
     errors: dict[str, list[LintFinding]] = {}
-    for item in found:
-        if not item.code[:1].isupper():
+    for item in found if problem is None else ():
+        if _is_syntax_error(item):
             errors.setdefault(item.file, []).append(item)
     return tuple(
         SourceError(file, items[0].line, items[0].message)
         for file, items in sorted(errors.items())
-        if all(map(_is_jazzy_s, items))
+        if all(map(_is_jazzy_syntax, items))
     )
 
 
-def _is_jazzy_s(error: LintFinding) -> bool:
+def _is_syntax_error(finding: LintFinding) -> bool:
+    """The code of a syntax error is a word, that of a rule begins with its family."""
+    return not finding.code[:1].isupper()
+
+
+def _is_jazzy_syntax(error: LintFinding) -> bool:
     newer = _NEWER.search(error.message)
     return newer is not None and (int(newer[1]), int(newer[2])) <= _PYTHON
 
 
 def _check(
-    ruff: Path,
-    root: Path,
-    files: Collection[str],
-    python: tuple[int, int],
-    take: Callable[[LintFinding], object],
-) -> str | None:
-    """Run ruff with all rules; returns why that was not possible, or None."""
-
-    def read(line: str) -> None:
-        finding = _finding(line, root)
-        if finding is not None:
-            take(finding)
-
+    ruff: Path, root: Path, files: Collection[str], python: tuple[int, int]
+) -> tuple[str | None, list[LintFinding]]:
+    """Run ruff with all rules; why that was not possible, or None, and what it finds."""
+    found: list[LintFinding] = []
+    if not files:
+        return None, found
     options = (
         "--isolated --no-cache --no-fix --exit-zero --ignore-noqa --no-respect-gitignore --quiet "
         f"--select ALL --line-length {LINE_LENGTH} --target-version py{python[0]}{python[1]} "
@@ -143,33 +129,22 @@ def _check(
             environment={"PATH": os.defpath},
             wall_s=_WALL_S,
             output=OutputLimits(head=0, tail=2000),
-            on_line=read,
+            on_line=lambda line: found.extend(_findings(line, root)),
         )
     except GraderFault as fault:
-        return f"ruff could not be run: {fault}"
-    if outcome.status != 0:
-        how = f"was ended for its {outcome.ended_by_us}" if outcome.ended_by_us else "failed"
-        return f"ruff {how}"
-    return None
+        return f"ruff could not be run: {fault}", found
+    if outcome.ended_by_us:
+        return f"ruff was ended for its {outcome.ended_by_us}", found
+    return "ruff failed" if outcome.status else None, found
 
 
-def _finding(line: str, root: Path) -> LintFinding | None:
-    """What a line of ruff's output says; None for other output."""
+def _findings(line: str, root: Path) -> Iterator[LintFinding]:
+    """What a line of ruff's output says; nothing for other output."""
     try:
         said = json.loads(line)
         code, message = str(said["code"]), str(said["message"])
         file = os.path.relpath(said["filename"], root)
         number = int(said["location"]["row"])
     except (ValueError, KeyError, TypeError):
-        return None
-    return LintFinding(code, shown(file), number, shown(message.partition("\n")[0]))
-
-
-def _first_of_each(found: list[LintFinding]) -> tuple[LintFinding, ...]:
-    seen: Counter[str] = Counter()
-    kept = []
-    for finding in sorted(found, key=lambda item: (item.file, item.line, item.code)):
-        seen[finding.code] += 1
-        if seen[finding.code] <= _MOST_PLACES:
-            kept.append(finding)
-    return tuple(kept)
+        return
+    yield LintFinding(code, shown(file), number, shown(message.partition("\n")[0]))

@@ -11,23 +11,14 @@ from grader.errors import GraderFault
 from grader.submission.record import Dependency, SourceError
 
 MANIFEST = "package.xml"
-MAX_BYTES = 256 * 1024
-DEPENDENCY_KINDS = frozenset(
-    {
-        "depend",
-        "build_depend",
-        "build_export_depend",
-        "buildtool_depend",
-        "buildtool_export_depend",
-        "exec_depend",
-        "run_depend",
-        "test_depend",
-        "doc_depend",
-    }
-)
+_KINDS = """
+depend build_depend build_export_depend buildtool_depend buildtool_export_depend exec_depend
+run_depend test_depend doc_depend
+"""
+DEPENDENCY_KINDS = frozenset(_KINDS.split())
 """Tags of package.xml that name another package or a rosdep key (REP-149)."""
 
-_MAX_DEPTH = 30
+_MAX_BYTES = 256 * 1024
 _MAX_DEPENDENCIES = 500
 _DEFAULT_BUILD_TYPE = "catkin"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
@@ -35,8 +26,8 @@ _UNCLOSED = (
     expat.errors.codes[expat.errors.XML_ERROR_TAG_MISMATCH],
     expat.errors.codes[expat.errors.XML_ERROR_NO_ELEMENTS],
 )
-_UNKNOWN_TAGS = re.compile(r"following tags: ([\w, -]+)")
-_QUOTED = re.compile(r"\"([^\"]+)\"|'([^']+)'")
+_UNKNOWN_TAG = re.compile(r"following tags: ([\w-]+)")
+_QUOTED = re.compile(r"[\"'](.+?)[\"']")
 
 
 @dataclass(frozen=True)
@@ -87,24 +78,20 @@ class _Refused(Exception):
 
 
 def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Manifest:
-    """Read a package.xml."""
+    """Read a package.xml; conditions of its entries (REP-149) are judged in ``environment``."""
     document = _parse(data)
     names = [name for name in document.texts("name") if _NAME.fullmatch(name)]
     build_types = document.texts("export/build_type")
     default = None if document.error else _DEFAULT_BUILD_TYPE
-    dependencies = [
-        Dependency(element.text.strip(), element.tag, element.line)
-        for element in document.elements
-        if element.tag in DEPENDENCY_KINDS
-        and element.text.strip()
-        and _applies(element, environment)
-    ]
-    misplaced = [
-        Dependency(element.text.strip(), element.tag, element.line)
-        for element in document.elements
-        if element.tag.removeprefix("export/") in (*DEPENDENCY_KINDS, "member_of_group")
-        and element.tag.startswith("export/")
-    ]
+    dependencies: list[Dependency] = []
+    misplaced: list[Dependency] = []
+    for element in document.elements:
+        entry = Dependency(element.text.strip(), element.tag, element.line)
+        tag = element.tag.removeprefix("export/")
+        if element.tag in DEPENDENCY_KINDS and entry.name and _applies(element, environment):
+            dependencies.append(entry)
+        elif tag != element.tag and tag in (*DEPENDENCY_KINDS, "member_of_group"):
+            misplaced.append(entry)
     error = document.error or _violation(data, document)
     if error is None and len(dependencies) > _MAX_DEPENDENCIES:
         error = (None, f"names more than {_MAX_DEPENDENCIES} dependencies")
@@ -121,26 +108,20 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
 
 def _parse(data: bytes) -> _Document:
     document = _Document()
-    path: list[str] = []
-    opened: list[int] = []
+    path: list[tuple[str, int]] = []
     parser = expat.ParserCreate()
     parser.buffer_text = True
 
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        path.append(tag)
-        opened.append(parser.CurrentLineNumber)
-        if len(path) > _MAX_DEPTH:
-            raise _Refused("elements are nested too deeply")
-        if len(path) == 2 or (len(path) == 3 and path[1] == "export"):
-            name = "/".join(path[1:])
-            document.elements.append(_Element(name, parser.CurrentLineNumber, attributes))
+    def place() -> str:
+        return "/".join(tag for tag, _ in path[1:4])
 
-    def end(_tag: str) -> None:
-        path.pop()
-        opened.pop()
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        path.append((tag, parser.CurrentLineNumber))
+        if len(path) == 2 or (len(path) == 3 and path[1][0] == "export"):
+            document.elements.append(_Element(place(), parser.CurrentLineNumber, attributes))
 
     def text(characters: str) -> None:
-        if document.elements and document.elements[-1].tag == "/".join(path[1:]):
+        if document.elements and document.elements[-1].tag == place():
             document.elements[-1].text += characters
 
     def refuse_doctype(*_: object) -> None:
@@ -148,18 +129,19 @@ def _parse(data: bytes) -> _Document:
         raise _Refused("a document type declaration (<!DOCTYPE ...>) is refused")
 
     parser.StartElementHandler = start
-    parser.EndElementHandler = end
+    parser.EndElementHandler = lambda _: path.pop()
     parser.CharacterDataHandler = text
     parser.StartDoctypeDeclHandler = refuse_doctype
-    if len(data) > MAX_BYTES:
-        document.error = (None, f"larger than {MAX_BYTES // 1024} KiB; not read")
+    if len(data) > _MAX_BYTES:
+        document.error = (None, f"larger than {_MAX_BYTES // 1024} KiB; not read")
         return document
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:
         if error.code in _UNCLOSED and path:
             # The place to correct is where the element begins, not where expat noticed.
-            document.error = (opened[-1], f"invalid XML: <{path[-1]}> is not closed")
+            tag, line = path[-1]
+            document.error = (line, f"invalid XML: <{tag}> is not closed")
         else:
             reason = expat.ErrorString(error.code)
             document.error = (error.lineno, f"invalid XML: {reason} (column {error.offset + 1})")
@@ -189,20 +171,14 @@ def _violation(data: bytes, document: _Document) -> tuple[int | None, str] | Non
 
 
 def _line_of(message: str, document: _Document) -> int | None:
-    """Find the element that a message of catkin_pkg is about."""
-    unknown = _UNKNOWN_TAGS.search(message)
-    if unknown:
-        tags = unknown[1].split(", ")
-        return next((item.line for item in document.elements if item.tag in tags), None)
-    quoted = [first or second for first, second in _QUOTED.findall(message)]
-    for value in quoted:
-        for element in document.elements:
-            if value == element.text.strip() or value in element.attributes.values():
-                return element.line
-    for value in quoted:
-        for element in document.elements:
-            if value == element.tag:
-                return element.line
+    """Find the element that a message of catkin_pkg quotes: what stands in it, or its tag."""
+    quoted = _UNKNOWN_TAG.findall(message) or _QUOTED.findall(message)
+    for is_tag in (False, True):
+        for value in quoted:
+            for element in document.elements:
+                inside = (element.text.strip(), *element.attributes.values())
+                if value in ([element.tag] if is_tag else inside):
+                    return element.line
     return None
 
 

@@ -1,14 +1,14 @@
 """From the syntax tree of a student's Python file to the facts that checks of the source need.
 
-Nothing is imported or run; names are kept as they are written, and what they stand for is
-found out by who judges.
+Nothing is imported or run; names are kept as they are written, and the checks find out what they
+stand for.
 """
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from grader.submission.read.code_facts import SourceClass, SourceFile, SourceFunction
 
@@ -19,10 +19,7 @@ _CONSOLE = ("sys.stdout", "sys.stderr", "stdout", "stderr", "sys.__stdout__", "s
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
-@dataclass(frozen=True)
-class _Scope:
-    """Where a node stands."""
-
+class _Scope(NamedTuple):
     prefix: str = ""
     in_class: bool = False
 
@@ -33,7 +30,8 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
     functions: list[SourceFunction] = []
     names: dict[str, str] = {}
     stars: list[str] = []
-    prints: set[int] = set()
+    prints: dict[ast.expr, int] = {}
+    to_file: set[ast.expr] = set()
     redefined = False
     for node, scope in _walk(tree):
         if isinstance(node, ast.ClassDef):
@@ -43,7 +41,10 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
             functions.append(_function(node, scope))
             redefined |= node.name == "print" and not scope.in_class
         elif isinstance(node, ast.Import):
-            names.update(_imported(node))
+            for alias in node.names:
+                # `import a.b` binds a; `import a.b as c` binds c to a.b.
+                first = alias.name.partition(".")[0]
+                names[alias.asname or first] = alias.name if alias.asname else first
         elif isinstance(node, ast.ImportFrom):
             origin = _origin(node, module, path)
             for alias in node.names:
@@ -53,11 +54,15 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
                     names[alias.asname or alias.name] = f"{origin}.{alias.name}"
         elif isinstance(node, ast.Assign):
             dotted = _dotted(node.value)
-            targets = [target.id for target in node.targets if isinstance(target, ast.Name)]
-            redefined |= "print" in targets
             if dotted and not scope.prefix:
+                targets = (item.id for item in node.targets if isinstance(item, ast.Name))
                 names.update(dict.fromkeys(targets, dotted))
-        prints.update(_prints(node))
+        elif isinstance(node, ast.Call) and not _is_to_console(node):
+            to_file.add(node.func)
+        elif isinstance(node, ast.Name) and node.id == "print":
+            prints[node] = node.lineno
+            redefined |= isinstance(node.ctx, ast.Store)
+    lines = {line for node, line in prints.items() if node not in to_file}
     return SourceFile(
         path=path,
         module=module,
@@ -66,7 +71,7 @@ def outline(tree: ast.Module, path: str, module: str) -> SourceFile:
         functions=tuple(sorted(functions, key=lambda item: item.line)[:_MOST]),
         names=tuple(sorted(names.items())[:_MOST]),
         stars=tuple(dict.fromkeys(stars)),
-        prints=() if redefined else tuple(sorted(prints)[:_MOST]),
+        prints=() if redefined else tuple(sorted(lines)[:_MOST]),
     )
 
 
@@ -76,13 +81,12 @@ def _walk(tree: ast.Module) -> Iterator[tuple[ast.AST, _Scope]]:
     while pending:
         node, scope = pending.pop()
         yield node, scope
-        inner = scope
         if isinstance(node, ast.ClassDef):
-            inner = _Scope(f"{scope.prefix}{node.name}."[-_LONGEST_NAME:], in_class=True)
+            scope = _Scope(f"{scope.prefix}{node.name}."[-_LONGEST_NAME:], in_class=True)
         elif isinstance(node, _Function):
-            inner = _Scope(f"{scope.prefix}{node.name}.<locals>."[-_LONGEST_NAME:])
+            scope = _Scope(f"{scope.prefix}{node.name}.<locals>."[-_LONGEST_NAME:])
         # Reversed, so that the stack gives them in the order of the file.
-        pending += [(child, inner) for child in reversed(list(ast.iter_child_nodes(node)))]
+        pending += [(child, scope) for child in reversed(list(ast.iter_child_nodes(node)))]
 
 
 def _class(node: ast.ClassDef, scope: _Scope) -> SourceClass:
@@ -111,24 +115,17 @@ def _function(node: _Function, scope: _Scope) -> SourceFunction:
     positional = [*arguments.posonlyargs, *arguments.args]
     if scope.in_class and "staticmethod" not in decorators:
         positional = positional[1:]
-    rest = [one for one in (arguments.vararg, arguments.kwarg) if one is not None]
+    others = [*arguments.kwonlyargs, arguments.vararg, arguments.kwarg]
     return SourceFunction(
         name=scope.prefix + node.name,
         line=node.lineno,
         documented=bool(ast.get_docstring(node)),
         decorators=tuple(name for name in decorators if name),
         unannotated=tuple(
-            one.arg for one in (*positional, *arguments.kwonlyargs, *rest) if one.annotation is None
+            one.arg for one in (*positional, *others) if one is not None and one.annotation is None
         ),
         returns=node.returns is not None,
     )
-
-
-def _imported(node: ast.Import) -> Iterator[tuple[str, str]]:
-    for alias in node.names:
-        # `import a.b` binds a; `import a.b as c` binds c to a.b.
-        first = alias.name.partition(".")[0]
-        yield (alias.asname, alias.name) if alias.asname else (first, first)
 
 
 def _origin(node: ast.ImportFrom, module: str, path: str) -> str:
@@ -136,37 +133,15 @@ def _origin(node: ast.ImportFrom, module: str, path: str) -> str:
     if not node.level:
         return node.module or ""
     package = module.split(".")
-    if not path.endswith("/__init__.py"):
-        package = package[:-1]
-    package = package[: len(package) - (node.level - 1)]
+    up = node.level - path.endswith("/__init__.py")
+    package = package[: len(package) - up]
     return ".".join([*package, *([node.module] if node.module else [])])
 
 
-def _prints(node: ast.AST) -> Iterator[int]:
-    """Lines where ``print`` is called or handed on, unless it writes to a file."""
-    if isinstance(node, ast.Call) and _is_print(node.func):
-        if _to_console(node):
-            yield node.lineno
-        return
-    # print handed on as a function; called, its name was seen with the call.
-    inner: list[ast.expr] = []
-    if isinstance(node, ast.Call):
-        inner = [*node.args, *(keyword.value for keyword in node.keywords)]
-    elif isinstance(node, ast.Assign) and node.value is not None:
-        inner = [node.value]
-    yield from (item.lineno for item in inner if _is_print(item))
-
-
-def _is_print(node: ast.expr) -> bool:
-    return _dotted(node) in ("print", "builtins.print")
-
-
-def _to_console(call: ast.Call) -> bool:
-    for keyword in call.keywords:
-        if keyword.arg == "file":
-            constant = isinstance(keyword.value, ast.Constant)
-            return constant or _dotted(keyword.value) in _CONSOLE
-    return True
+def _is_to_console(call: ast.Call) -> bool:
+    """Whether a call of ``print`` would write to the console, and not to a file."""
+    files = [keyword.value for keyword in call.keywords if keyword.arg == "file"]
+    return all(isinstance(file, ast.Constant) or _dotted(file) in _CONSOLE for file in files)
 
 
 def _dotted(node: ast.expr) -> str:
@@ -177,6 +152,5 @@ def _dotted(node: ast.expr) -> str:
         node = node.value
     if not isinstance(node, ast.Name):
         return ""
-    parts.append(node.id)
-    name = ".".join(reversed(parts))
+    name = ".".join(reversed([*parts, node.id]))
     return name if len(name) <= _LONGEST_NAME else ""

@@ -16,27 +16,24 @@ from grader.submission.build.installed import (
     in_folder,
     normalised,
 )
+from grader.submission.intake.listing import SubmissionFile
 from grader.submission.intake.locate import Located
 from grader.submission.intake.paths import is_within, join, shown
 from grader.submission.read import source
-from grader.submission.read.code_facts import Lint, SourceFile
+from grader.submission.read.code_facts import Lint
 from grader.submission.read.dependencies import is_known
-from grader.submission.read.entrypoints import EntryPoint, Setup, read_setup
 from grader.submission.read.imports import find_imports, is_code, ros_imports
 from grader.submission.read.lint import lint, newer_syntax
 from grader.submission.read.manifest import MANIFEST, Manifest, read_manifest
 from grader.submission.read.outline import outline
 from grader.submission.read.rosdistro import PYTHON_MODULES
+from grader.submission.read.setup_py import EntryPoint, Setup, read_setup
 from grader.submission.read.targets import Modules, missing_target
-from grader.submission.record import Definition, Dependency, Import, PackageRecord, SourceError
+from grader.submission.record import Definition, Import, PackageRecord, SourceError
 
-CMAKE = "CMakeLists.txt"
-
+SETUP_PY, CMAKE = "setup.py", "CMakeLists.txt"
 _INTERFACES = (".msg", ".srv", ".action")
-_MAX_INTERFACE_BYTES = 256 * 1024
 _MOST_DEFINITIONS = 200
-_MOST_LINES = 1000
-"""Of a definition, in which names that the build's log quotes are looked for."""
 _WORD = re.compile(r"\w+")
 _CONDITIONS = {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
 
@@ -47,8 +44,8 @@ class Package:
 
     Attributes:
         cmake: Its CMakeLists.txt, or None where it has none.
-        texts: Lines of setup.py and the first ones of the interface files, by path in the
-            submission.
+        setup_py: The lines of its setup.py, or None where it has none.
+        hashes: Path of each Python file in the submission -> hash of its content.
         lint: What ruff says of what runs, or None where it was not asked.
         newer_syntax: What only the Python of ROS 2 Jazzy can parse, and not the one here.
     """
@@ -58,7 +55,7 @@ class Package:
     manifest: Manifest
     setup: Setup
     cmake: str | None
-    texts: Mapping[str, Sequence[str]]
+    setup_py: Sequence[str] | None
     definitions: tuple[Definition, ...]
     hashes: Mapping[str, str]
     trees: Mapping[str, ast.Module | SourceError]
@@ -68,42 +65,108 @@ class Package:
     @property
     def build_type(self) -> str:
         """As colcon takes it; guessed where package.xml is broken before it says."""
-        if self.manifest.build_type is not None:
-            return self.manifest.build_type
-        has_setup_py = join(self.folder, "setup.py") in self.texts
-        return "ament_python" if has_setup_py else "ament_cmake"
-
-    @property
-    def module_root(self) -> str:
-        """Folder in the submission that holds the package's Python modules."""
-        below = self.setup.package_dir
-        return self.folder if below == "." else join(self.folder, below)
+        guessed = "ament_cmake" if self.setup_py is None else "ament_python"
+        return self.manifest.build_type or guessed
 
     @property
     def named(self) -> set[str]:
         """Names of packages that its files may need, and of much else."""
         found = {dependency.name for dependency in self.manifest.dependencies}
-        found |= {item.module for item in _imports(self)}
+        found |= {item.module for item in self.imports}
         return found | set(_WORD.findall(self.cmake or ""))
 
-    def code(self) -> dict[str, ast.Module | SourceError]:
-        """Trees of what runs: no tests, launch files, setup.py."""
-        return {p: t for p, t in self.trees.items() if is_code(_below(p, self.folder))}
+    @property
+    def texts(self) -> dict[str, Sequence[str]]:
+        """Lines of setup.py and of the definitions, by path: what messages of a build quote."""
+        found: dict[str, Sequence[str]] = {
+            one.file: one.text.splitlines() for one in self.definitions
+        }
+        if self.setup_py is not None:
+            found[join(self.folder, SETUP_PY)] = self.setup_py
+        return found
 
     @property
-    def unreadable(self) -> list[SourceError]:
-        """Files that the Python here cannot parse, sorted."""
-        return [tree for _, tree in sorted(self.trees.items()) if isinstance(tree, SourceError)]
+    def code(self) -> dict[str, ast.Module | SourceError]:
+        """Trees of what runs: no tests, launch files, setup.py."""
+        return {path: tree for path, tree in sorted(self.trees.items()) if is_code(self._in(path))}
+
+    @property
+    def imports(self) -> list[Import]:
+        """Everything that its code imports."""
+        return [item for path, tree in self._parsed() for item in find_imports(tree, shown(path))]
+
+    def _parsed(self) -> Iterator[tuple[str, ast.Module]]:
+        return ((path, tree) for path, tree in self.code.items() if isinstance(tree, ast.Module))
+
+    def _in(self, path: str) -> str:
+        return path if self.folder == "." else path[len(self.folder) + 1 :]
+
+    def _module_path(self, path: str) -> str:
+        """Path of a file below the folder of the Python modules, which may be ``src``."""
+        return self._in(path).removeprefix("src/")
 
     def modules(self, installed: Collection[str] | None = None) -> Modules:
         """The package's Python modules."""
-        root = self.module_root
         trees = {
-            _below(path, root): tree if isinstance(tree, ast.Module) else None
-            for path, tree in self.code().items()
-            if is_within(path, root) and path.endswith(".py")
+            self._module_path(path): tree if isinstance(tree, ast.Module) else None
+            for path, tree in self.code.items()
+            if path.endswith(".py")
         }
         return Modules(trees, installed)
+
+    def record(
+        self,
+        packages: Sequence[Package],
+        providers: Mapping[str, tuple[str, ...]],
+        ros: RosInstallation,
+    ) -> PackageRecord:
+        """What is known of it before it is built.
+
+        Args:
+            packages: All of the submission.
+            providers: Importable module -> packages of which each provides it.
+        """
+        submitted = {other.name for other in packages}
+        declared = {dependency.name for dependency in self.manifest.dependencies}
+        imports = self.imports
+        newer = {error.file for error in self.newer_syntax}
+        errors = (tree for _, tree in sorted(self.trees.items()) if isinstance(tree, SourceError))
+        dependencies = (
+            replace(
+                one,
+                name=shown(one.name),
+                known=is_known(one.name, installed=ros.packages, submitted=submitted),
+            )
+            for one in self.manifest.dependencies
+        )
+        return PackageRecord(
+            name=self.name,
+            path=shown(self.folder),
+            build_type=self.build_type,
+            manifest_error=self.manifest.error,
+            dependencies=(*dependencies, *self.manifest.misplaced),
+            imports=tuple(imports),
+            ros_imports=tuple(
+                ros_imports(
+                    imports,
+                    own=self.modules().top_level | {self.name},
+                    packages={
+                        module: next((name for name in names if name in declared), names[0])
+                        for module, names in providers.items()
+                    },
+                )
+            ),
+            syntax_errors=tuple(error for error in errors if error.file not in newer),
+            newer_syntax=self.newer_syntax,
+            groups=self.manifest.groups,
+            cmake=None if self.cmake is None else self.cmake[:MOST_BYTES],
+            definitions=tuple(replace(one, file=shown(one.file)) for one in self.definitions),
+            sources=tuple(
+                outline(tree, shown(path), _module(shown(self._module_path(path))))
+                for path, tree in self._parsed()
+            ),
+            lint=self.lint,
+        )
 
 
 def read_package(
@@ -113,27 +176,22 @@ def read_package(
     allowance: source.Allowance | None = None,
 ) -> Package:
     """Read a package from the private copy of its submission."""
+
+    def content(name: str) -> bytes | None:
+        return _bytes(located, join(folder, name))
+
     allowance = allowance or source.Allowance()
     manifest = read_manifest(
-        _bytes(located, join(folder, MANIFEST)) or b"",
+        content(MANIFEST) or b"",
         shown(join(folder, MANIFEST)),
         {**_CONDITIONS, "ROS_DISTRO": ros.distro},
     )
-    setup_py = _bytes(located, join(folder, "setup.py"))
-    setup_cfg = _bytes(located, join(folder, "setup.cfg"))
-    setup = read_setup(setup_py, setup_cfg, shown(folder), allowance)
-    cmake = _bytes(located, join(folder, CMAKE))
+    setup_py, cmake = content(SETUP_PY), content(CMAKE)
+    setup = read_setup(setup_py, shown(folder), allowance)
+    files = [file for file in located.files if is_within(file.path, folder)]
     hashes: dict[str, str] = {}
     trees: dict[str, ast.Module | SourceError] = {}
-    texts = {join(folder, "setup.py"): _lines(setup_py)} if setup_py is not None else {}
-    interfaces = 0
-    for file in located.files:
-        if not is_within(file.path, folder):
-            continue
-        if file.path.endswith(_INTERFACES) and file.size <= _MAX_INTERFACE_BYTES:
-            interfaces += 1
-            if interfaces <= _MOST_DEFINITIONS:
-                texts[file.path] = _lines(_bytes(located, file.path) or b"")[:_MOST_LINES]
+    for file in files:
         suffixed = file.path.endswith(".py")
         if not suffixed and "." in file.path.rpartition("/")[2]:
             continue
@@ -147,16 +205,19 @@ def read_package(
         folder=folder,
         manifest=manifest,
         setup=setup,
-        cmake=None if cmake is None else cmake.decode("utf-8", "replace"),
-        texts=texts,
-        definitions=tuple(_definitions(located, folder)),
+        cmake=None if cmake is None else _text(cmake),
+        setup_py=None if setup_py is None else _text(setup_py).splitlines(),
+        definitions=tuple(
+            Definition(file.path, _text(_bytes(located, file.path) or b""))
+            for file in [one for one in files if _is_definition(one)][:_MOST_DEFINITIONS]
+        ),
         hashes=hashes,
         trees=trees,
     )
     broken = [path for path, tree in trees.items() if isinstance(tree, SourceError)]
     return replace(
         package,
-        lint=lint(located.root, package.code()),
+        lint=lint(located.root, package.code),
         newer_syntax=newer_syntax(located.root, broken),
     )
 
@@ -169,51 +230,20 @@ def record_packages(
     Args:
         installed: What the build made, or None where nothing was built.
     """
-    providers = _providers(packages, ros)
-    records = [_record(package, packages, providers, ros, installed) for package in packages]
+    providers: dict[str, tuple[str, ...]] = {name: (name,) for name in ros.python_modules}
+    providers.update(PYTHON_MODULES)
+    for package in packages:
+        providers[package.name] = (package.name,)
+        providers.update({module: (package.name,) for module in package.modules().top_level})
+    elsewhere = {*providers, *sys.stdlib_module_names}
+    alone = len(packages) == 1
+    records = [
+        _with_executables(
+            package.record(packages, providers, ros), package, elsewhere, installed, alone=alone
+        )
+        for package in packages
+    ]
     return tuple(sorted(records, key=lambda record: record.name))
-
-
-def _record(
-    package: Package,
-    packages: Sequence[Package],
-    providers: Mapping[str, tuple[str, ...]],
-    ros: RosInstallation,
-    installed: InstallSpace | None,
-) -> PackageRecord:
-    submitted = {other.name for other in packages}
-    declared = {dependency.name for dependency in package.manifest.dependencies}
-    imports = _imports(package)
-    newer = {error.file for error in package.newer_syntax}
-    record = PackageRecord(
-        name=package.name,
-        path=shown(package.folder),
-        build_type=package.build_type,
-        manifest_error=package.manifest.error,
-        dependencies=(
-            *(_told(dependency, ros, submitted) for dependency in package.manifest.dependencies),
-            *package.manifest.misplaced,
-        ),
-        imports=tuple(imports),
-        ros_imports=tuple(
-            ros_imports(
-                imports,
-                own=package.modules().folders | {package.name},
-                packages={
-                    module: next((name for name in names if name in declared), names[0])
-                    for module, names in providers.items()
-                },
-            )
-        ),
-        syntax_errors=tuple(error for error in package.unreadable if error.file not in newer),
-        newer_syntax=package.newer_syntax,
-        groups=package.manifest.groups,
-        cmake=None if package.cmake is None else package.cmake[:MOST_BYTES],
-        definitions=package.definitions,
-        sources=tuple(_sources(package)),
-        lint=package.lint,
-    )
-    return _with_executables(record, package, set(providers), installed, alone=len(packages) == 1)
 
 
 def _with_executables(
@@ -226,34 +256,33 @@ def _with_executables(
 ) -> PackageRecord:
     entries = list(package.setup.entry_points)
     modules = package.modules()
-    files: dict[str, str] = {}
-    executables: tuple[str, ...] = ()
-    generated: tuple[Definition, ...] = ()
-    registered = True
-    misplaced: list[str] = []
     if installed is not None:
         files = {shown(i): shown(p) for i, p in in_folder(installed.origins, package.folder)}
-        generated = installed.definitions.get(package.name, ())
-        registered = package.name in installed.registered
-        executables = installed.executables.get(package.name, ())
         distribution = normalised(package.setup.name or package.name)
         built = installed.entry_points.get(distribution)
         if built is not None:
             entries = [_at_declaration(entry, package) for entry in built]
             modules = package.modules(installed.python)
         names = {entry.name for entry in entries}
-        misplaced = [name for name in installed.in_bin if alone or name in names]
-    elsewhere = elsewhere | sys.stdlib_module_names
-    missing = [(e.name, missing_target(e, modules, elsewhere=elsewhere)) for e in entries]
+        record = replace(
+            record,
+            files=tuple(sorted(files.items())),
+            generated=installed.definitions.get(package.name, ())[:_MOST_DEFINITIONS],
+            registered=package.name in installed.registered,
+            executables=installed.executables.get(package.name, ()),
+            misplaced_executables=tuple(
+                name for name in installed.in_bin if alone or name in names
+            ),
+        )
+    missing = [(entry, missing_target(entry, modules, elsewhere=elsewhere)) for entry in entries]
     return replace(
         record,
         entry_points=tuple((entry.name, entry.target) for entry in entries),
-        executables=executables,
-        misplaced_executables=tuple(misplaced),
-        missing_targets=tuple((name, error) for name, error in missing if error is not None),
-        files=tuple(sorted(files.items())),
-        generated=generated[:_MOST_DEFINITIONS],
-        registered=registered,
+        missing_targets=tuple(
+            (entry.name, SourceError(entry.file, entry.line, problem))
+            for entry, problem in missing
+            if problem is not None
+        ),
     )
 
 
@@ -262,21 +291,7 @@ def _at_declaration(entry: EntryPoint, package: Package) -> EntryPoint:
     for declared in package.setup.entry_points:
         if declared.name == entry.name:
             return replace(entry, file=declared.file, line=declared.line)
-    return replace(entry, file=shown(join(package.folder, "setup.py")))
-
-
-def _imports(package: Package) -> list[Import]:
-    found: list[Import] = []
-    for path, tree in sorted(package.code().items()):
-        if isinstance(tree, ast.Module):
-            found += find_imports(tree, shown(path))
-    return found
-
-
-def _sources(package: Package) -> Iterator[SourceFile]:
-    for path, tree in sorted(package.code().items()):
-        if isinstance(tree, ast.Module):
-            yield outline(tree, shown(path), _module(shown(_below(path, package.module_root))))
+    return replace(entry, file=shown(join(package.folder, SETUP_PY)))
 
 
 def _module(path: str) -> str:
@@ -284,45 +299,16 @@ def _module(path: str) -> str:
     return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
-def _providers(packages: Sequence[Package], ros: RosInstallation) -> dict[str, tuple[str, ...]]:
-    """Importable module -> packages of which each provides it."""
-    providers: dict[str, tuple[str, ...]] = {name: (name,) for name in ros.python_modules}
-    providers.update(PYTHON_MODULES)
-    for package in packages:
-        providers[package.name] = (package.name,)
-        providers.update({module: (package.name,) for module in package.modules().folders})
-    return providers
+def _is_definition(file: SubmissionFile) -> bool:
+    """Whether a file is the definition of an interface, or seems to be meant as one."""
+    *folders, name = file.path.split("/")
+    kinds = {f".{name.rpartition('.')[2]}", *(f".{folder}" for folder in folders[-1:])}
+    meant = any(kind.lower() in _INTERFACES for kind in kinds)
+    return meant and file.size <= MOST_BYTES
 
 
-def _told(dependency: Dependency, ros: RosInstallation, submitted: set[str]) -> Dependency:
-    known = is_known(dependency.name, installed=ros.packages, submitted=submitted)
-    return replace(dependency, name=shown(dependency.name), known=known)
-
-
-def _definitions(located: Located, folder: str) -> Iterator[Definition]:
-    """Files of a package that are definitions of interfaces, or seem to be meant as such."""
-    found = 0
-    for file in located.files:
-        *folders, name = file.path.split("/")
-        suffix = "." + name.rpartition(".")[2]
-        meant = suffix.lower() in _INTERFACES or (
-            folders[-1:] and f".{folders[-1].lower()}" in _INTERFACES
-        )
-        if not meant or not is_within(file.path, folder) or file.size > MOST_BYTES:
-            continue
-        found += 1
-        if found > _MOST_DEFINITIONS:
-            return
-        data = _bytes(located, file.path) or b""
-        yield Definition(shown(file.path), data.decode("utf-8", "replace"))
-
-
-def _below(path: str, folder: str) -> str:
-    return path if folder == "." else path[len(folder) + 1 :]
-
-
-def _lines(data: bytes) -> list[str]:
-    return data.decode("utf-8", "replace").splitlines()
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "replace")
 
 
 def _bytes(located: Located, path: str) -> bytes | None:

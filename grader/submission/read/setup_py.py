@@ -1,221 +1,163 @@
 """What setup.py passes to ``setup()``, read from its syntax tree without running it.
 
-Covers what students and ``ros2 pkg create`` write: literals, names assigned once at the top,
-f-strings, ``+``, ``%`` and ``.format``. What needs running stays unknown.
+Covers what students and ``ros2 pkg create`` write: literals, names assigned at the top, f-strings
+and ``+``. What needs running stays unknown, until the build shows it.
 """
 
 from __future__ import annotations
 
 import ast
-import contextlib
 import re
-import string
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Union
 
-_MAX_DEPTH = 50
-_MAX_STEPS = 20_000
+from grader.submission.intake.paths import join
+from grader.submission.read import source
+from grader.submission.record import SourceError
+
+_GROUP = "console_scripts"
 _MAX_TEXT = 10_000
-_PERCENT = re.compile(r"%(.)", re.DOTALL)
-
-
-class Unknown(Exception):
-    """An expression whose value cannot be told without running it."""
+_MAX_ENTRY = 500
+_ENTRY = re.compile(
+    r"\s*(?P<name>[^=\[\]]+?)\s*=\s*(?P<module>[\w.]+)\s*(:\s*(?P<function>[\w.]+))?"
+    r"\s*(\[[^\]]*\])?\s*"
+)
+_INSTALLED = re.compile(rf"^\[{_GROUP}\]\s*$(.*?)(?=^\[|\Z)", re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True)
-class Text:
+class EntryPoint:
+    """A console script.
+
+    Attributes:
+        function: Dotted name in the module, empty where none is named.
+    """
+
+    name: str
+    module: str
+    function: str
+    file: str
+    line: int | None = None
+
+    @property
+    def target(self) -> str:
+        """``module:function``, or the module alone."""
+        return f"{self.module}:{self.function}" if self.function else self.module
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a package's setup.py says.
+
+    Attributes:
+        name: The distribution's name, or None where it cannot be told.
+        malformed: Entry points that setuptools refuses.
+    """
+
+    name: str | None = None
+    entry_points: tuple[EntryPoint, ...] = ()
+    malformed: tuple[SourceError, ...] = ()
+
+
+class _Text(str):
     """A string and the line where it stands."""
 
-    value: str
     line: int
 
 
-Value = Union[Text, "list[Value]", "dict[str, Value]"]
+_Value = Union[_Text, "list[_Value]", "dict[str, _Value]", None]
 
 
-def setup_keywords(tree: ast.Module) -> dict[str, Value]:
-    """Evaluate the keyword arguments of the first call of ``setup``.
-
-    Returns:
-        The keywords whose values can be told: strings, lists (also for tuples) and
-        dictionaries with string keys. Items of a list that cannot be told are left out.
-    """
-    evaluator = _Evaluator(_assigned(tree))
-    call = next((node for node in ast.walk(tree) if _is_setup(node)), None)
-    found: dict[str, Value] = {}
-    if not isinstance(call, ast.Call):
-        return found
-    for keyword in call.keywords:
+def read_setup(
+    setup_py: bytes | None, folder: str, allowance: source.Allowance | None = None
+) -> Setup:
+    """Read a setup.py; None stands for one that is not there."""
+    file = join(folder, "setup.py")
+    tree = source.parse(setup_py or b"", file, allowance)
+    keywords: Mapping[str, _Value] = {}
+    if not isinstance(tree, SourceError):
         try:
-            value = evaluator.value(keyword.value)
-        except Unknown:
+            keywords = _setup_keywords(tree)
+        except RecursionError:
+            keywords = {}
+    groups = keywords.get("entry_points")
+    scripts = groups.get(_GROUP) if isinstance(groups, dict) else None
+    found, malformed = [], []
+    for script in scripts if isinstance(scripts, list) else []:
+        if not isinstance(script, _Text):
             continue
-        if keyword.arg is not None:
-            found[keyword.arg] = value
-        elif isinstance(value, dict):
-            found.update(value)
-    return found
+        entry = parse_entry_point(script, file, script.line)
+        if entry is not None:
+            found.append(entry)
+        else:
+            message = f"the entry point {str(script)!r} is not of the form 'name = module:function'"
+            malformed.append(SourceError(file, script.line, message))
+    name = keywords.get("name")
+    return Setup(str(name) if isinstance(name, _Text) else None, tuple(found), tuple(malformed))
 
 
-def _is_setup(node: ast.AST) -> bool:
-    if not isinstance(node, ast.Call):
-        return False
-    function = node.func
-    name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
-    return name == "setup"
+def parse_entry_point(text: str, file: str, line: int | None = None) -> EntryPoint | None:
+    """Parse ``name = module:function``; None when setuptools would not accept it."""
+    match = _ENTRY.fullmatch(text) if len(text) <= _MAX_ENTRY else None
+    if match is None:
+        return None
+    return EntryPoint(match["name"], match["module"], match["function"] or "", file, line)
 
 
-def _assigned(tree: ast.Module) -> dict[str, ast.expr]:
-    """Names that the top level assigns exactly once."""
-    names: dict[str, ast.expr] = {}
-    again: set[str] = set()
+def parse_installed(text: str, file: str) -> list[EntryPoint]:
+    """Parse the ``entry_points.txt`` of an installed distribution."""
+    section = _INSTALLED.search(text)
+    entries = (parse_entry_point(line, file) for line in section[1].split("\n")) if section else ()
+    return [entry for entry in entries if entry is not None]
+
+
+def _setup_keywords(tree: ast.Module) -> dict[str, _Value]:
+    """The keyword arguments of the first call of ``setup``, as far as they can be told."""
+    names: dict[str, _Value] = {}
     for node in tree.body:
-        targets: list[ast.expr] = []
         if isinstance(node, ast.Assign):
-            targets, value = node.targets, node.value
-        elif isinstance(node, ast.AnnAssign) and node.value is not None:
-            targets, value = [node.target], node.value
-        for target in targets:
-            if isinstance(target, ast.Name):
-                if target.id in names:
-                    again.add(target.id)
-                names[target.id] = value
-    return {name: value for name, value in names.items() if name not in again}
+            value = _value(node.value, names)
+            names.update((item.id, value) for item in node.targets if isinstance(item, ast.Name))
+    for call in ast.walk(tree):
+        if isinstance(call, ast.Call) and _is_setup(call.func):
+            return {one.arg: _value(one.value, names) for one in call.keywords if one.arg}
+    return {}
 
 
-class _Evaluator:
-    """Evaluates expressions, with a budget: nested names could double at every level."""
-
-    def __init__(self, names: Mapping[str, ast.expr]) -> None:
-        self._names = names
-        self._steps = 0
-
-    def value(self, node: ast.expr, depth: int = 0) -> Value:
-        """Evaluate an expression.
-
-        Raises:
-            Unknown: It would have to be run.
-        """
-        self._steps += 1
-        if depth > _MAX_DEPTH or self._steps > _MAX_STEPS:
-            raise Unknown
-        below = depth + 1
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            return Text(node.value, node.lineno)
-        if isinstance(node, ast.Name) and node.id in self._names:
-            value = self.value(self._names[node.id], below)
-            return Text(value.value, node.lineno) if isinstance(value, Text) else value
-        if isinstance(node, (ast.List, ast.Tuple)):
-            return self._items(node.elts, below)
-        if isinstance(node, ast.Dict):
-            return self._dictionary(node, below)
-        if isinstance(node, ast.JoinedStr):
-            return _joined([self._text(part, below) for part in node.values], node)
-        if isinstance(node, ast.FormattedValue) and node.format_spec is None:
-            return _joined([self._text(node.value, below)], node)
-        if isinstance(node, ast.BinOp):
-            return self._operation(node, below)
-        if isinstance(node, ast.Call):
-            return self._call(node, below)
-        raise Unknown
-
-    def _text(self, node: ast.expr, depth: int) -> str:
-        value = self.value(node, depth)
-        if not isinstance(value, Text):
-            raise Unknown
-        return value.value
-
-    def _items(self, nodes: list[ast.expr], depth: int) -> list[Value]:
-        items: list[Value] = []
-        for node in nodes:
-            with contextlib.suppress(Unknown):
-                items.append(self.value(node, depth))
-        return items
-
-    def _dictionary(self, node: ast.Dict, depth: int) -> dict[str, Value]:
-        result: dict[str, Value] = {}
-        for key, item in zip(node.keys, node.values, strict=True):
-            with contextlib.suppress(Unknown):
-                value = self.value(item, depth)
-                if key is not None:
-                    result[self._text(key, depth)] = value
-                elif isinstance(value, dict):
-                    result.update(value)
-        return result
-
-    def _operation(self, node: ast.BinOp, depth: int) -> Value:
-        left = self.value(node.left, depth)
-        if isinstance(node.op, ast.Mod) and isinstance(left, Text):
-            right = node.right.elts if isinstance(node.right, ast.Tuple) else [node.right]
-            values = [self._text(part, depth) for part in right]
-            return _joined(_percent(left.value, values), node)
-        if isinstance(node.op, ast.Add):
-            right_value = self.value(node.right, depth)
-            if isinstance(left, Text) and isinstance(right_value, Text):
-                return _joined([left.value, right_value.value], node)
-            if isinstance(left, list) and isinstance(right_value, list):
-                return [*left, *right_value]
-        raise Unknown
-
-    def _call(self, node: ast.Call, depth: int) -> Value:
-        function = node.func
-        if isinstance(function, ast.Attribute) and function.attr == "format":
-            template = self._text(function.value, depth)
-            values = [self._text(argument, depth) for argument in node.args]
-            named = {
-                keyword.arg: self._text(keyword.value, depth)
-                for keyword in node.keywords
-                if keyword.arg is not None
-            }
-            return _joined(_braces(template, values, named), node)
-        if isinstance(function, ast.Name) and function.id == "dict" and not node.args:
-            return {
-                keyword.arg: self.value(keyword.value, depth)
-                for keyword in node.keywords
-                if keyword.arg is not None
-            }
-        raise Unknown
+def _is_setup(function: ast.expr) -> bool:
+    return getattr(function, "attr", getattr(function, "id", "")) == "setup"
 
 
-def _joined(parts: list[str], node: ast.expr) -> Text:
-    if sum(map(len, parts)) > _MAX_TEXT:
-        raise Unknown
-    return Text("".join(parts), node.lineno)
+def _value(node: ast.expr, names: Mapping[str, _Value]) -> _Value:
+    """What an expression is; None where it would have to be run."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return _joined([node.value], node)
+    if isinstance(node, ast.Name):
+        value = names.get(node.id)
+        return _joined([value], node) if isinstance(value, str) else value
+    if isinstance(node, ast.List | ast.Tuple):
+        return [_value(item, names) for item in node.elts]
+    if isinstance(node, ast.Dict):
+        keys = [key and _value(key, names) for key in node.keys]
+        return {
+            key: _value(item, names)
+            for key, item in zip(keys, node.values, strict=True)
+            if isinstance(key, str)
+        }
+    if isinstance(node, ast.JoinedStr):
+        return _joined([_value(part, names) for part in node.values], node)
+    if isinstance(node, ast.FormattedValue) and node.format_spec is None:
+        return _value(node.value, names)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        return _joined([_value(node.left, names), _value(node.right, names)], node)
+    return None
 
 
-def _percent(template: str, values: list[str]) -> list[str]:
-    """Split ``"a %s"`` with its values filled in; widths and the like stay unknown."""
-    pieces = _PERCENT.split(template)
-    ahead = iter(values)
-    for place in range(1, len(pieces), 2):
-        if pieces[place] == "s":
-            filled = next(ahead, None)
-            if filled is None:
-                raise Unknown
-            pieces[place] = filled
-        elif pieces[place] != "%":
-            raise Unknown
-    return pieces
-
-
-def _braces(template: str, values: list[str], named: Mapping[str, str]) -> list[str]:
-    """Split ``"a {}"`` with its values filled in; formats and the like stay unknown."""
-    pieces: list[str] = []
-    place = 0
-    try:
-        for literal, name, spec, conversion in string.Formatter().parse(template):
-            pieces.append(literal)
-            if name is None:
-                continue
-            if spec or conversion:
-                raise Unknown
-            if name == "":
-                pieces.append(values[place])
-                place += 1
-            else:
-                pieces.append(values[int(name)] if name.isdecimal() else named[name])
-    except (ValueError, LookupError) as error:
-        raise Unknown from error
-    return pieces
+def _joined(parts: Sequence[_Value | str], node: ast.expr) -> _Text | None:
+    texts = [part for part in parts if isinstance(part, str)]
+    if len(texts) < len(parts) or sum(map(len, texts)) > _MAX_TEXT:
+        return None
+    text = _Text("".join(texts))
+    text.line = node.lineno
+    return text

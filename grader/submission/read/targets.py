@@ -11,9 +11,10 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 from grader.spec.nearest_name import did_you_mean, nearest
-from grader.submission.intake.paths import shown
-from grader.submission.read.entrypoints import EntryPoint
-from grader.submission.record import SourceError
+from grader.submission.intake.paths import parents, shown
+from grader.submission.read.setup_py import EntryPoint
+
+_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 
 @dataclass(frozen=True)
@@ -34,84 +35,59 @@ class Modules:
         return next((p for p in (f"{path}.py", f"{path}/__init__.py") if p in self.trees), None)
 
     @property
-    def folders(self) -> set[str]:
+    def top_level(self) -> set[str]:
         """Top-level modules that the package has."""
         return {path.partition("/")[0].removesuffix(".py") for path in self.trees}
 
 
 def missing_target(
     entry: EntryPoint, modules: Modules, *, elsewhere: Collection[str]
-) -> SourceError | None:
-    """Say what an executable's target lacks.
+) -> str | None:
+    """What an executable's target lacks; None when it exists or may exist.
 
-    Returns:
-        None when the target exists or may exist.
+    Args:
+        elsewhere: Top-level modules of other packages.
     """
     path = modules.find(entry.module)
     if path is None:
         top = entry.module.partition(".")[0]
-        if top in elsewhere and top not in modules.folders:
+        if top in elsewhere and top not in modules.top_level:
             return None
-        return _error(entry, _no_module(entry.module, modules))
+        wanted = f"{entry.module.replace('.', '/')}.py"
+        known = [other for other in modules.trees if not other.endswith("__init__.py")]
+        match = nearest(wanted, known, cutoff=0.0)
+        has = f"; the package has {shown(match)}" if match else ""
+        return f"there is no module {wanted}{has}"
     if modules.installed is not None and path not in modules.installed:
-        return _error(entry, _not_installed(path, modules))
+        return _why_not_installed(path, modules)
     if not entry.function:
-        return _error(entry, f"names no function; write '{entry.name} = {entry.module}:main'")
-    function = entry.function.partition(".")[0]
-    tree = modules.trees[path]
-    if tree is None:
+        return f"names no function; write '{entry.name} = {entry.module}:main'"
+    function, tree = entry.function.partition(".")[0], modules.trees[path]
+    names = defined_names(tree) if tree is not None else None
+    if tree is None or names is None or function in names:
         return None
-    names = defined_names(tree)
-    if names is None or function in names:
-        return None
-    near = did_you_mean(function, names) or _functions(tree)
-    return _error(entry, f"{shown(path)} has no function {function!r}.{near}")
+    there = [node.name for node in tree.body if isinstance(node, _DEFINITIONS[:2])]
+    has = f" It has {', '.join(map(repr, there[:5]))}." if there else ""
+    return f"{shown(path)} has no function {function!r}.{did_you_mean(function, names) or has}"
 
 
-def _error(entry: EntryPoint, message: str) -> SourceError:
-    return SourceError(entry.file, entry.line, message)
-
-
-def _no_module(module: str, modules: Modules) -> str:
-    path = f"{module.replace('.', '/')}.py"
-    message = f"there is no module {path}"
-    known = [other for other in modules.trees if not other.endswith("__init__.py")]
-    name = path.rpartition("/")[2]
-    same_name = sorted(other for other in known if other.rpartition("/")[2] == name)
-    match = same_name[0] if same_name else nearest(path, known)
-    if match is None and len(known) == 1:
-        match = known[0]
-    return f"{message}; the package has {shown(match)}" if match else message
-
-
-def _not_installed(path: str, modules: Modules) -> str:
-    folder = path
-    while "/" in folder:
-        folder = folder.rpartition("/")[0]
+def _why_not_installed(path: str, modules: Modules) -> str:
+    for folder in parents(path):
         if f"{folder}/__init__.py" not in modules.trees:
             return f"{shown(path)} is not installed: there is no {shown(folder)}/__init__.py"
     return f"{shown(path)} is not installed: setup.py's 'packages' leaves it out"
 
 
-def _functions(tree: ast.Module) -> str:
-    found = [
-        node.name for node in tree.body if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-    ]
-    return f" It has {', '.join(map(repr, found[:5]))}." if found else ""
-
-
 def defined_names(tree: ast.Module) -> set[str] | None:
-    """List the names that a module defines when it is imported.
+    """Names that a module defines when it is imported, also below ``if``, ``try`` and loops.
 
     Returns:
-        Functions, classes, variables and imports at its top level, also below ``if``, ``try``,
-        ``with`` and loops; None where it could define any name (star import, ``__getattr__``,
-        ``globals()``, ``exec``).
+        None where it could define any name (star import, ``__getattr__``, ``globals()``).
     """
     names: set[str] = set()
     used: set[str] = set()
     for node in _top_level(tree):
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+        if isinstance(node, _DEFINITIONS):
             names.add(node.name)
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             names.update(alias.asname or alias.name.partition(".")[0] for alias in node.names)
@@ -127,5 +103,5 @@ def _top_level(tree: ast.Module) -> Iterator[ast.AST]:
     while pending:
         node = pending.pop()
         yield node
-        if not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)):
+        if not isinstance(node, (*_DEFINITIONS, ast.Lambda)):
             pending.extend(ast.iter_child_nodes(node))

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
 from grader.errors import UsageError
-from grader.submission.record import SubmissionRecord
-from grader.submission.record_json import read_record
+from grader.submission.record import SubmissionRecord, read_record
 
 st.register_type_strategy(float, st.floats(allow_nan=False, allow_infinity=False))
 st.register_type_strategy(str, st.text(st.characters(blacklist_categories=["Cs"]), max_size=10))
@@ -30,9 +29,7 @@ def test_a_record_survives_json(tmp_path: Path, record: SubmissionRecord) -> Non
 @pytest.mark.parametrize(
     ("text", "place"),
     [
-        ('{"id": "a"}', "sha256"),
         ('{"id": "a", "sha256": "0", "packages": [{"name": 1, "path": "."}]}', "packages.0.name"),
-        ("[]", "Input should be an object"),
         ("{", "EOF"),
     ],
 )
@@ -41,8 +38,5 @@ def test_a_file_that_holds_no_record_is_refused(tmp_path: Path, text: str, place
     file.write_text(text)
     with pytest.raises(UsageError, match=f"is no record of a submission.*(?s:.*){place}"):
         read_record(file)
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="is no record of a submission"):
         read_record(tmp_path / "none.json")

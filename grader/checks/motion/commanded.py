@@ -1,0 +1,211 @@
+"""Checks of the commands that the robot gets: within its limits, and slower near the goal."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+
+from pydantic import Field
+
+from grader.checks.check import Subject, check
+from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.first_seen import first_seen
+from grader.checks.motion.robot_check import RobotParameters
+from grader.checks.wording import code, counted, percent
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.no_motion import (
+    why_cut_short,
+    why_not_judged,
+    why_not_moved,
+    why_rejected,
+)
+from grader.diagnosis.no_messages import why_silent
+from grader.measure.motion.approach import NO_SPEED_M_S
+from grader.measure.motion.command import VelocityCommand, command_topic, commands
+from grader.measure.motion.quantities import speed, turn
+from grader.recording.model import NS, Recording
+from grader.recording.simulated import Scene
+from grader.spec.quantity import Ratio
+
+# Limits are written down with three digits.
+_ROUNDING = 1.001
+_MOST_POINTS = 400
+# The last command alone may be of a callback that was late.
+_LAST = 5
+# Of a proportion that is limited, the limit comes again and again, but nothing below it does.
+_SWITCHED = 2
+_SEVERAL = 3
+_DIGITS = 4
+# Of one with two decimals, the limit and the step below it may be all that comes.
+_STEP_M_S = 0.01
+# One that is computed at 2 Hz may be published more often, and be the only one below the limit.
+_HELD_NS = NS
+
+
+class WithinLimits(RobotParameters):
+    """Parameters of motion.within_limits."""
+
+    share: Ratio = Field(0.0, description="Share of the commands that may be beyond a limit.")
+
+
+@check("motion.within_limits", Subject.RECORDING, WithinLimits)
+def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
+    """Every command is within the limits of the robot.
+
+    Judged by the commands as they were published. The robot itself does no more than it can,
+    so that what it is asked for beyond it shows only here.
+    """
+    cause = why_not_judged(recording)
+    scene = recording.scene
+    if cause is not None or scene is None:
+        cause = cause or Cause("there is no world", ours=True)
+        return cause.finding("commands within the limits of the robot")
+    expected = (
+        f"commands of at most {speed(scene.max_linear_m_s)} and {turn(scene.max_angular_rad_s)}, "
+        "either way"
+    )
+    sent = commands(recording)
+    if not sent:
+        return why_silent(recording, command_topic(recording)).finding(expected)
+    cause = why_rejected(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    beyond = [item for item in sent if _excess(item, scene) > _ROUNDING]
+    plots = (
+        _plot(recording, sent, "linear.x (m/s)", scene.max_linear_m_s),
+        _plot(recording, sent, "angular.z (rad/s)", scene.max_angular_rad_s),
+    )
+    if len(beyond) <= parameters.share * len(sent):
+        widest = max(sent, key=lambda item: _excess(item, scene))
+        return Finding.passed(
+            expected,
+            f"{counted(len(sent), 'command')}, at most {_words(widest, scene)}",
+            Evidence(plots=plots),
+        )
+    first, worst = beyond[0], max(beyond, key=lambda item: _excess(item, scene))
+    when_s = recording.since_launch_s(first.time_ns)
+    share = percent(round(len(beyond) / len(sent), 3))
+    most = "" if worst is first else f", the largest {_words(worst, scene)}"
+    return Finding.failed(
+        expected,
+        f"{len(beyond)} of {counted(len(sent), 'command')} ({share}): the first is "
+        f"{_words(first, scene)}{most}",
+        "Clamp before you publish: max(-limit, min(limit, value)).",
+        Evidence(moments=(Moment("first command beyond", when_s),), plots=plots),
+    )
+
+
+def _excess(item: VelocityCommand, scene: Scene) -> float:
+    """How many times the nearer limit is asked for."""
+    return max(
+        abs(item.twist.linear_m_s) / scene.max_linear_m_s,
+        abs(item.twist.angular_rad_s) / scene.max_angular_rad_s,
+    )
+
+
+def _words(item: VelocityCommand, scene: Scene) -> str:
+    twist = item.twist
+    linear = abs(twist.linear_m_s) / scene.max_linear_m_s
+    if linear >= abs(twist.angular_rad_s) / scene.max_angular_rad_s:
+        return f"linear.x = {speed(twist.linear_m_s)}"
+    return f"angular.z = {turn(twist.angular_rad_s)}"
+
+
+class SlowsDown(RobotParameters):
+    """Parameters of motion.slows_down."""
+
+    share: Ratio = Field(
+        0.8, description="Speed of the last commands that drive, as a share of the fastest."
+    )
+
+
+@check("motion.slows_down", Subject.RECORDING, SlowsDown)
+def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
+    """The speed ahead becomes less towards the end of the way.
+
+    Judged by linear.x of the commands as they were published: the slowest of the last five that
+    drive must be at most a share of the fastest. A speed in proportion to the distance is so with
+    any gain and any clamp, as long as the goal's tolerance is small enough to leave the clamp.
+
+    It is no proportion either where all commands have one of two sizes, each of them several times,
+    unless these are next to each other where a command has two decimals, or the lower one comes for
+    1 s at most.
+    """
+    expected = (
+        f"linear.x at the end of the way at most {percent(parameters.share)} of its largest value"
+    )
+    cause = why_not_moved(recording) or why_cut_short(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    driving = [item for item in commands(recording) if _size(item) > NO_SPEED_M_S]
+    if not driving:
+        topic = command_topic(recording)
+        if not recording.on(topic):
+            return why_silent(recording, topic).finding(expected)
+        return Finding.failed(
+            expected,
+            f"no command on {code(topic)} has a linear.x other than 0",
+            "linear.x = gain * distance, on the way to the goal's position.",
+            Evidence(moments=first_seen(recording, recording.on(topic))),
+        )
+    fastest = max(map(_size, driving))
+    last = min(driving[-_LAST:], key=_size)
+    evidence = Evidence(
+        moments=(Moment("end of the way", recording.since_launch_s(last.time_ns)),),
+        plots=(_plot(recording, driving, "linear.x (m/s)"),),
+    )
+    seen = f"{speed(_size(last))} at the end, {speed(fastest)} at most"
+    levels = Counter(round(_size(item), _DIGITS) for item in driving)
+    if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and _stays(driving, levels):
+        sizes = " and ".join(speed(size) for size in sorted(levels, reverse=True))
+        return Finding.failed(
+            expected,
+            f"linear.x is switched between {sizes}, whatever the distance is",
+            "linear.x = gain * distance, at most the limit: it becomes less with every command.",
+            evidence,
+        )
+    if _size(last) <= parameters.share * fastest:
+        return Finding.passed(expected, seen, evidence)
+    same = all(abs(_size(item) - fastest) <= NO_SPEED_M_S for item in driving)
+    observed = (
+        f"all of {counted(len(driving), 'command')} that drive have linear.x = {speed(fastest)}"
+        if same
+        else seen
+    )
+    return Finding.failed(
+        expected,
+        observed,
+        "linear.x = gain * distance: far from the goal the robot is fast, near it slow.",
+        evidence,
+    )
+
+
+def _stays(driving: list[VelocityCommand], levels: Collection[float]) -> bool:
+    """Whether the lower of two sizes is no step of a proportion that was rounded or held."""
+    lower = min(levels)
+    times_ns = [item.time_ns for item in driving if round(_size(item), _DIGITS) == lower]
+    difference_m_s = round(max(levels) - lower, _DIGITS)
+    return difference_m_s > _STEP_M_S and times_ns[-1] - times_ns[0] > _HELD_NS
+
+
+def _size(item: VelocityCommand) -> float:
+    return abs(item.twist.linear_m_s)
+
+
+def _plot(
+    recording: Recording,
+    sent: Sequence[VelocityCommand],
+    field: str,
+    limit: float | None = None,
+) -> Plot:
+    """A field of the commands over time, with the robot's limit."""
+    shown = sent[:: max(1, len(sent) // _MOST_POINTS)]
+    is_linear = field.startswith("linear")
+    return Plot(
+        "Commanded speed" if is_linear else "Commanded turn",
+        "time since launch (s)",
+        field,
+        tuple(recording.since_launch_s(item.time_ns) for item in shown),
+        tuple(item.twist.linear_m_s if is_linear else item.twist.angular_rad_s for item in shown),
+        None if limit is None else (-limit, limit),
+    )

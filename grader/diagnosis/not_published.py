@@ -1,0 +1,219 @@
+"""Why a program does not publish, or stops, although its publisher is matched."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from grader.checks.finding import Evidence, Moment
+from grader.checks.first_seen import until_the_end
+from grader.checks.wording import code, counted, listing
+from grader.diagnosis.cause import Cause
+from grader.diagnosis.explanation import explanation
+from grader.diagnosis.no_answer import why_raised
+from grader.diagnosis.no_messages import (
+    ENDED_HINT,
+    SECONDS_HINT,
+    FewMessages,
+    NoMessages,
+    OnTopic,
+    why_not_delivered,
+)
+from grader.diagnosis.process.blocked_executor import left_s, why_blocked, why_never_spun
+from grader.diagnosis.process.raised import interrupted_place
+from grader.measure import declarations
+from grader.recording.model import NS, Kind, Recording
+from grader.spec.unit import format_duration
+from grader.submission.record import SourceError
+
+_LOG_LINES = 5
+# Share of the observation that the host may take before silence says nothing any more.
+_STARVED = 0.5
+# Without what the host took: in so long a node answers what it was asked.
+_OWN_S = 2.0
+# After so many periods of silence a timer has stopped.
+_ENDED_PERIODS = 3.0
+
+
+@explanation(NoMessages)
+def slow_timer(symptom: NoMessages) -> Cause | None:
+    """The timer's period is longer than the observation: milliseconds were given as seconds."""
+    recording, timers = symptom.recording, declarations.timers(symptom.recording)
+    if symptom.asked or not timers or _firing(recording):
+        return None
+    timer = min(timers, key=lambda one: one.period_s)
+    watched_s = recording.since_launch_s(recording.stop_ns)
+    return Cause(
+        f"{symptom.seen} in {format_duration(watched_s)}: the process declared a "
+        f"timer of {format_duration(timer.period_s)}",
+        SECONDS_HINT,
+        Evidence(
+            moments=(
+                Moment("timer declared", recording.since_launch_s(timer.declared_ns)),
+                until_the_end(recording),
+            )
+        ),
+    )
+
+
+@explanation(NoMessages)
+def no_cpu_time(symptom: NoMessages) -> Cause | None:
+    """The machine gave the process too little CPU time; an error, and never a lost point."""
+    recording = symptom.recording
+    if symptom.stolen_s < _STARVED * symptom.watched_s:
+        return None
+    # A callback that never returns burns what CPU the machine leaves it.
+    guilty = blocked_executor(symptom)
+    begins_ns = [recording.sent[name][0].stamp_ns for name in symptom.asked if recording.sent[name]]
+    if not guilty and begins_ns and left_s(recording, min(begins_ns), recording.stop_ns) >= _OWN_S:
+        guilty = no_answer(symptom)
+    if guilty:
+        return replace(guilty, disturbed=True)
+    return Cause.to_repeat(
+        f"{symptom.seen}, but the machine took {format_duration(symptom.stolen_s)} of "
+        f"{format_duration(symptom.watched_s)} from the process"
+    )
+
+
+@explanation(NoMessages, FewMessages)
+def never_spun(symptom: OnTopic) -> Cause | None:
+    """rclpy.spin() is never called, or the node is not given to the executor that spins."""
+    # A program may publish without a timer, and needs no spin for that.
+    if symptom.recording.on(symptom.topic) and not declarations.timers(symptom.recording):
+        return None
+    return why_never_spun(symptom.recording, symptom.seen, symptom.nodes)
+
+
+@explanation(NoMessages)
+def blocked_executor(symptom: NoMessages) -> Cause | None:
+    """A callback does not return, and blocks the executor."""
+    sent = symptom.recording.sent
+    begin_ns = [sent[name][0].stamp_ns for name in symptom.asked if sent[name]]
+    since_ns = min(begin_ns, default=symptom.recording.launched_ns)
+    return why_blocked(symptom.recording, symptom.seen, symptom.nodes, since_ns)
+
+
+@explanation(NoMessages)
+def no_answer(symptom: NoMessages) -> Cause | None:
+    """The subscription's callback gets its message, but does not publish, or raises."""
+    recording = symptom.recording
+    name = next((name for name in symptom.asked if recording.sent[name]), None)
+    if name is None:
+        return None
+    sent = recording.sent[name]
+    seen = (
+        f"{symptom.seen}, although {counted(len(sent), 'message')} on {code(name)} reached the node"
+    )
+    return why_raised(recording, seen, sent[0].stamp_ns) or Cause(
+        seen,
+        "Is publish(msg) reached in the subscription's callback? An `except: pass` hides the error "
+        "that would tell why not, and a lock or a loop that never ends keeps it waiting. A "
+        "callback that begins with `async def` must await what it calls.",
+        Evidence(
+            moments=(Moment(f"sent on {name}", recording.since_launch_s(sent[0].stamp_ns)),),
+            places=_interrupted(recording),
+        ),
+    )
+
+
+@explanation(NoMessages)
+def no_timer(symptom: NoMessages) -> Cause | None:
+    """No timer was created, so nothing calls the callback that publishes."""
+    recording = symptom.recording
+    traced, timer = declarations.traced(recording), declarations.said(recording, "timer")
+    if not traced or timer or _heard(recording, symptom.topic):
+        return None
+    return Cause(
+        f"{_idle(symptom)}, and the process declared no timer that would call it",
+        "Is publish(msg) reached? Look for a condition before it, and for a loop that waits "
+        "for what never comes, such as subscriptions. A callback publishes only if something "
+        "calls it: self.create_timer(period_in_seconds, self.callback) does.",
+        _idle_evidence(symptom),
+    )
+
+
+@explanation(NoMessages, general=True)
+def publish_not_reached(symptom: NoMessages) -> Cause:
+    """The publisher is there, but the program does not come to its publish()."""
+    recording = symptom.recording
+    heard = _heard(recording, symptom.topic)
+    periods = [format_duration(timer.period_s) for timer in _firing(recording)]
+    although = ""
+    if heard and not declarations.said(recording, "timer"):
+        although = f", although {heard} reached the node"
+    elif periods and declarations.said(recording, "spin"):
+        although = f", although the process declared a timer of {listing(periods)}"
+    return Cause(
+        _idle(symptom) + although,
+        "Is publish(msg) reached in the callback? Look for a condition or a `return` before it, "
+        "for an `except: pass` that hides an error, for timer.cancel() and timer.reset(), and for "
+        "a lambda without brackets after the method's name. Printing or logging a message does "
+        "not send it. With use_sim_time a timer waits for a simulator that publishes /clock.",
+        _idle_evidence(symptom),
+    )
+
+
+@explanation(FewMessages, general=True)
+def publishing_stopped(symptom: FewMessages) -> Cause:
+    """A timer stopped or is too slow, or the program publishes without a timer, and stops."""
+    recording, evidence = symptom.recording, Evidence(moments=symptom.moments)
+    period_s = [timer.period_s for timer in declarations.timers(recording)]
+    if not period_s:
+        return Cause(
+            symptom.seen,
+            "Publish from the callback of a timer, which goes on as long as the node spins.",
+            evidence,
+        )
+    timers = f"; the process declared a timer of {listing(map(format_duration, period_s))}"
+    silent_s = (recording.stop_ns - recording.on(symptom.topic)[-1].stamp_ns) / NS
+    stopped = silent_s > _ENDED_PERIODS * max(period_s)
+    last = f", none in the last {format_duration(silent_s)}" if stopped else ""
+    is_slow = symptom.needed * min(period_s) > symptom.watched_s and not stopped
+    return Cause(f"{symptom.seen}{last}{timers}", SECONDS_HINT if is_slow else ENDED_HINT, evidence)
+
+
+def _idle(symptom: NoMessages) -> str:
+    return f"the publisher on {code(symptom.topic)} is there but silent"
+
+
+def _idle_evidence(symptom: NoMessages) -> Evidence:
+    recording = symptom.recording
+    # What it prints after Ctrl+C tells of its end, which any right node may word as a traceback.
+    complaints = [
+        line.text
+        for line in recording.log
+        if line.stream == "stderr" and line.time_ns <= recording.stop_ns
+    ]
+    return Evidence(
+        moments=(
+            *symptom.moments,
+            until_the_end(recording, "still no message when the observation ended"),
+        ),
+        places=_interrupted(recording),
+        log=tuple(complaints[-_LOG_LINES:]),
+    )
+
+
+def _firing(recording: Recording) -> list[declarations.DeclaredTimer]:
+    """Declared timers that could fire before the end of the observation."""
+    return [
+        timer
+        for timer in declarations.timers(recording)
+        if timer.declared_ns + timer.period_s * NS <= recording.stop_ns
+    ]
+
+
+def _heard(recording: Recording, topic: str) -> str:
+    """What the node was sent, in words, but for what it answers elsewhere; empty without any."""
+    topics = {item.topic for item in recording.student_endpoints(Kind.SUBSCRIPTION)}
+    return listing(
+        f"{counted(len(recording.carried(name)), 'message')} on {code(name)}"
+        for name in sorted(topics)
+        if recording.answers.get(name, topic) == topic
+        and recording.carried(name)
+        and why_not_delivered(recording, name) is None
+    )
+
+
+def _interrupted(recording: Recording) -> tuple[SourceError, ...]:
+    places = (interrupted_place(recording, process.name) for process in recording.processes)
+    return tuple(place for place in places if place)

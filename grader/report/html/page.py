@@ -1,0 +1,131 @@
+"""What all pages for a browser share: templates, style, script, and the policy that guards them.
+
+A page needs no network. Whatever a student chose is untrusted: every value is cleaned of control
+characters and escaped on its way into the page, and the page's own policy forbids requests and
+every script and style but its own, which it names by their hashes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from base64 import b64encode
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from markupsafe import Markup, escape
+
+from grader import resources
+from grader.checks.finding import Status
+from grader.checks.wording import counted
+from grader.report.text import explanation, words
+from grader.safe_text import clean
+
+if TYPE_CHECKING:
+    from jinja2 import Environment, FileSystemBytecodeCache
+
+
+def render_page(
+    template: str, styles: tuple[str, ...], script: str = "", policy: str = "", **values: Any
+) -> str:
+    """Render a page.
+
+    Args:
+        template: Its file, as that of the others in ``templates/``.
+        script: A page without one runs none.
+        policy: What it may do besides, as in a Content-Security-Policy.
+        values: What the template prints.
+
+    Returns:
+        A whole HTML document; the same input gives the same text.
+    """
+    style, code = "".join(map(_asset, styles)), _asset(script) if script else ""
+    return (
+        environment()
+        .get_template(template)
+        .render(
+            values,
+            style=Markup(style),
+            script=Markup(code),
+            policy=_content_security_policy(style, code) + policy,
+        )
+    )
+
+
+@cache
+def _asset(name: str) -> str:
+    return (resources.templates() / name).read_text(encoding="utf-8")
+
+
+def _content_security_policy(style: str, script: str) -> str:
+    """The page's own style and script by their hashes, and nothing else at all.
+
+    https://www.w3.org/TR/CSP3/
+    """
+    scripts = _hash_of(script) if script else "'none'"
+    return (
+        f"default-src 'none'; style-src {_hash_of(style)}; script-src {scripts}; "
+        "base-uri 'none'; form-action 'none'"
+    )
+
+
+def _hash_of(text: str) -> str:
+    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
+
+
+@cache
+def environment() -> Environment:
+    """The templates, with all that they call; whatever they print is cleaned and escaped."""
+    # Imported late: the commands that write no report start faster without it.
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(resources.templates()),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_cleaned,
+        bytecode_cache=compiled_templates(resources.cache_folder() / "templates"),
+    )
+    environment.filters["prose"] = prose
+    environment.filters["number"] = words.number
+    environment.globals.update(Status=Status, counted=counted, explanation=explanation, words=words)
+    return environment
+
+
+def compiled_templates(folder: Path) -> FileSystemBytecodeCache | None:
+    """A folder that keeps compiled templates from one start to the next.
+
+    Only its owner may look into it. None where it cannot be made: then each start compiles.
+    """
+    from jinja2 import FileSystemBytecodeCache
+    from jinja2.bccache import Bucket
+
+    class CompiledTemplates(FileSystemBytecodeCache):
+        def dump_bytecode(self, bucket: Bucket) -> None:
+            # The disk may be full, or the folder not writable.
+            with contextlib.suppress(OSError):
+                super().dump_bytecode(bucket)
+
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return CompiledTemplates(str(folder))
+
+
+def _cleaned(value: Any) -> Any:
+    return clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
+def prose(text: str) -> Markup:
+    """Text of a finding, with what stands between backticks as code."""
+    parts = clean(text).split("`")
+    if len(parts) % 2 == 0:
+        parts[-2:] = [f"{parts[-2]}`{parts[-1]}"]
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if index % 2 else escape(part)
+        for index, part in enumerate(parts)
+    )
