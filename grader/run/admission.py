@@ -1,9 +1,8 @@
 """How many cells may run, and how many of them may be starting, at the same time.
 
-Starting a node costs nearly all of its CPU time (imports, DDS), and many starts at one
-instant disturb the timing of those that already run; so starts are counted apart. Beyond a
-few, another cell is let in only while the machine, with all that others do on it, has a CPU
-and memory to spare.
+Starting a node costs nearly all of its CPU time, and many starts at one instant disturb the timing
+of those that already run; so starts are counted separately. Beyond a few, another cell is let in
+only while the machine has a CPU and memory to spare.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ _CELLS_PER_CPU = 24
 _STARTS_PER_CPU = 3.0
 """More than one, because a start also waits: for processes, and for DDS to discover them."""
 _BUSY_PER_CPU = 6.0
-"""Runnable threads of the machine for each CPU from which on nobody more is let in."""
+"""Runnable threads of the machine for each CPU from which on no cell is let in."""
 _FREE_MEMORY = 0.125
 """Share of the memory that stays free; a cell of the course takes some 40 MB."""
 _FILES_PER_CELL = 4
@@ -61,11 +60,7 @@ class Admission:
 
     @contextmanager
     def cell(self, *, alone: bool = False) -> Iterator[Ticket]:
-        """Wait for a place, first come, first served; the newest who wants to be alone goes before.
-
-        Args:
-            alone: Wait until no other cell runs, and let none start meanwhile.
-        """
+        """Wait for a place, first come, first served; one that must be ``alone`` goes first."""
         ticket = self._enter(alone)
         try:
             yield ticket
@@ -116,16 +111,11 @@ class Admission:
             ticket.is_starting and began_s > since_s for ticket, began_s in self._running.items()
         )
 
-    def _note_started(self) -> None:
-        with self._lock:
-            self._call_next()
-
 
 class Ticket:
     """The place of one cell."""
 
     def __init__(self, admission: Admission, called: threading.Condition) -> None:
-        """Made by :meth:`Admission.cell` only."""
         self._admission = admission
         self.called = called
         self.is_starting = True
@@ -134,11 +124,11 @@ class Ticket:
         """The cell has started: another one may."""
         if self.is_starting:
             self.is_starting = False
-            self._admission._note_started()
+            with self._admission._lock:
+                self._admission._call_next()
 
 
 def _with_descriptors(cells: int) -> int:
-    """Get descriptors for so many cells; how many cells there are enough for."""
     wanted = _FILES_PER_CELL * cells + _OTHER_FILES
     soft = raise_open_files(wanted)
     if soft == resource.RLIM_INFINITY or soft >= wanted:

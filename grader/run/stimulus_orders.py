@@ -22,11 +22,7 @@ def stimulus_orders(
     seed: int,
     drawn: Mapping[str, float],
 ) -> tuple[dict[str, Any], ...]:
-    """Make the orders.
-
-    Raises:
-        GraderFault: A message of a stimulus cannot be made.
-    """
+    """Make the orders."""
     from grader.assignment.stimuli.message import StimulusError
     from grader.assignment.stimuli.stimulus_model import Making
 

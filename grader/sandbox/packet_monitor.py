@@ -29,22 +29,15 @@ _MOST_WRITERS, _MOST_KEPT, _MOST_HEARTBEATS = 1000, 2**31, 64
 _UDP_HEADER_BYTES = 8
 
 
-class Wire:
+class PacketMonitor:
     """Packets to the ports of the middleware: what is not RTPS, and heartbeats of writers.
 
-    Opened while there is the right to; anybody may read it.
-
     Attributes:
-        heartbeats: Of each writer, by its identifier as hex: the most messages that one of its
-            heartbeats said it keeps, and how many heartbeats told of another newest message.
+        heartbeats: Writer as hex -> the most messages that it said it keeps, and how many
+            heartbeats told of another newest message.
     """
 
     def __init__(self) -> None:
-        """Listen from now on.
-
-        Raises:
-            OSError: There is no such right, or the kernel has no packet sockets.
-        """
         self._count = 0
         self._newest: dict[str, int] = {}
         self.heartbeats: dict[str, tuple[int, int]] = {}
@@ -84,10 +77,6 @@ class Wire:
                 number += self._newest.get(writer) != last
                 self._newest[writer] = last
                 self.heartbeats[writer] = max(kept, last - first + 1), number
-
-    def close(self) -> None:
-        """Listen no more."""
-        self._socket.close()
 
 
 def bound_ports() -> frozenset[int]:
@@ -139,5 +128,5 @@ def _filter() -> list[bytes]:
 
 
 def _distance(number: int, place: int | None) -> int:
-    """How far a jump goes; to None, and to 0 of what is no jump, is to go on."""
+    """How far a jump goes; None, and 0 in what is no jump, go on."""
     return place - number - 1 if place else 0

@@ -13,10 +13,10 @@ from grader.sandbox.packet_monitor import heartbeats
 
 SOURCE = """\
 import fcntl, socket, struct
-from grader.sandbox.packet_monitor import Wire, bound_ports
+from grader.sandbox.packet_monitor import PacketMonitor, bound_ports
 from grader.sandbox.namespaces import _bring_up_loopback
 _bring_up_loopback()
-wire = Wire()
+wire = PacketMonitor()
 ear, mouth = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
 ear.bind(('127.0.0.1', 7410))
 ours = bound_ports()

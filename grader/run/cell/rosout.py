@@ -22,11 +22,7 @@ _LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
 
 
 def told_of_matches(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
-    """Events of a subscription of the probe's.
-
-    Without rclpy's own, which only print a warning that nobody reads, and which each turn of the
-    executor would ask for.
-    """
+    """Events of a subscription without rclpy's own, which only warn and cost CPU time."""
     return SubscriptionEventCallbacks(matched=on_match, use_default_callbacks=False)
 
 
@@ -34,7 +30,6 @@ class RosoutLog:
     """Subscribes to /rosout; the probe itself publishes nothing there."""
 
     def __init__(self) -> None:
-        """Nothing is heard yet."""
         self._kept = KeptLines(0)
 
     def listen(self, node: Node, limit_bytes: int, on_match: Callable[[Any], None]) -> None:
@@ -51,16 +46,16 @@ class RosoutLog:
     @property
     def lines(self) -> tuple[LogLine, ...]:
         """Everything kept so far, in the order of its arrival."""
-        return (*self._kept.head, *self._kept.tail)
+        return tuple(self._kept.lines)
 
     def _take(self, record: Any) -> None:
         stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
         if stamp_ns < 0:
-            # Nobody's clock; what is recorded has a time after 1970.
+            # What is recorded has a time after 1970.
             stamp_ns = time.time_ns()
         name, text = (
-            str(said)[:longest].encode(errors="replace").decode()
-            for said, longest in ((record.name, _LONGEST_NAME), (record.msg, _LONGEST))
+            str(value)[:longest].encode(errors="replace").decode()
+            for value, longest in ((record.name, _LONGEST_NAME), (record.msg, _LONGEST))
         )
         level = _LEVELS.get(int(record.level), str(record.level))
         self._kept.add(LogLine(stamp_ns, name, "rosout", text, level))

@@ -1,10 +1,11 @@
-"""How busy this machine is, whoever keeps it busy."""
+"""How busy this machine is."""
 
 from __future__ import annotations
 
 import contextlib
 import math
 import os
+import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,30 +32,22 @@ class Load:
     """Threads that run or wait for a CPU, on average over the last moment."""
 
     def __init__(self) -> None:
-        """Nothing is known yet: an idle machine is assumed."""
         self._average = 0.0
         self._sampled_s = time.monotonic()
 
     def runnable(self) -> float:
-        """Sample if it is time, and return the average.
-
-        The samples are ``procs_running`` of /proc/stat (proc(5)): runnable threads of the whole
-        machine, less the one that asks. Older samples fade with a time constant of 0.4 s.
-        """
+        """Average, with a time constant of 0.4 s, of ``procs_running`` of /proc/stat."""
         now_s = time.monotonic()
         passed_s = now_s - self._sampled_s
         if passed_s >= _SAMPLE_S:
+            (line,) = re.findall(r"^procs_running (\d+)$", _STAT.read_text(), re.MULTILINE)
             weight = 1 - math.exp(-passed_s / _MEMORY_S)
-            self._average += weight * (_procs_running() - 1 - self._average)
+            self._average += weight * (int(line) - 1 - self._average)
             self._sampled_s = now_s
         return self._average
 
     def free_memory(self) -> float:
-        """Share of the memory that a program can still get without swapping.
-
-        ``MemAvailable`` of ``MemTotal`` in /proc/meminfo, see proc_meminfo(5), or what is left of
-        the limit of a container, which that does not show; see cgroups(7).
-        """
+        """Share of the memory that a program can still get: proc_meminfo(5), cgroups(7)."""
         sizes = _numbers(_MEMINFO)
         total = 1024 * sizes["MemTotal:"]
         shares = [sizes["MemAvailable:"] / sizes["MemTotal:"]]
@@ -71,10 +64,7 @@ class Load:
 
 
 def _groups() -> Iterator[Path]:
-    """Folders of the groups whose limits of memory hold for this process.
-
-    A container may see its own group as the outermost one and still name it as the machine does.
-    """
+    """Folders of the groups whose limits of memory hold for this process, also in a container."""
     with contextlib.suppress(OSError):
         for line in _GROUPS.read_text().splitlines():
             _, controllers, path = line.split(":", 2)
@@ -85,13 +75,5 @@ def _groups() -> Iterator[Path]:
 
 
 def _numbers(file: Path) -> dict[str, int]:
-    """A file of names and numbers, one of each in a line."""
     lines = map(str.split, file.read_text().splitlines())
     return {name: int(number) for name, number, *_ in lines}
-
-
-def _procs_running() -> int:
-    for line in _STAT.read_bytes().splitlines():
-        if line.startswith(b"procs_running"):
-            return int(line.split()[1])
-    return 1

@@ -13,7 +13,6 @@ class Stopwatch:
     """Time since its start, less what the host took from us meanwhile."""
 
     def __init__(self, meter: DisturbanceMeter) -> None:
-        """Start now."""
         self._meter = meter
         self._wall_s = time.monotonic()
         self._stolen_s = meter.stolen_s

@@ -1,9 +1,8 @@
 """Shared memory that killed nodes leave: Fast DDS removes its segments only at a clean end.
 
 A living participant holds a lock on ``fastrtps_<hex>_el`` beside each of its segments
-``fastrtps_<hex>`` in /dev/shm; where nobody holds it, the owner is dead. The command
-``fastdds shm clean`` decides in the same way. Port files are few and Fast DDS takes them over
-by itself.
+``fastrtps_<hex>`` in /dev/shm; without one the owner is dead. The command ``fastdds shm clean``
+decides in the same way. Fast DDS takes over port files by itself.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from grader.run.host.disturbance import DisturbanceMeter
 from grader.run.host.stopwatch import Stopwatch
 from grader.run.order import RunLimits
 from grader.run.process.descendants import (
-    descendants,
+    descendant_pids,
     is_init,
     is_stopped,
     kill_descendants,
@@ -64,7 +64,7 @@ class _Running:
     def _own_pids(self) -> Iterable[int]:
         """Its processes, as far as they are found without looking at all of the machine's."""
         init = self.popen.init if isinstance(self.popen, SandboxedProcess) else None
-        return (self.popen.pid, *([] if init is None else (init, *descendants(init))))
+        return (self.popen.pid, *([] if init is None else (init, *descendant_pids(init))))
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to its process group, if that is still there."""
@@ -92,14 +92,6 @@ class StudentProcesses:
         output: OutputReader,
         process_sandbox: ProcessSandbox | None = None,
     ) -> None:
-        """Prepare; nothing is started yet.
-
-        Args:
-            process_sandbox: The sandbox that each of them gets, or None.
-
-        Raises:
-            OSError: Nobody can watch over a sandbox here.
-        """
         self._output = output
         self._sandbox = process_sandbox
         self._guard: Guard | None = None
@@ -125,20 +117,18 @@ class StudentProcesses:
 
         Args:
             of_run: Further variables, of this run; the tracer's pipe is added.
-
-        Raises:
-            OSError: It cannot be executed.
         """
         tracer_read, tracer_write = os.pipe()
         seen_read, seen_write = os.pipe()
         try:
             variables = {
+                **environment,
                 **of_run,
                 "ROSGRADE_TRACER_FD": str(tracer_write),
                 "ROSGRADE_TRACER_PIPE": str(os.fstat(tracer_write).st_ino),
                 "ROSGRADE_SEEN_FD": str(seen_read),
             }
-            popen = self._popen(argv, environment, variables, folder, (tracer_write, seen_read))
+            popen = self._popen(argv, variables, folder, (tracer_write, seen_read))
         except OSError:
             os.close(tracer_read)
             os.close(seen_write)
@@ -157,12 +147,10 @@ class StudentProcesses:
     def _popen(
         self,
         argv: tuple[str, ...],
-        environment: Mapping[str, str],
-        of_run: Mapping[str, str],
+        variables: Mapping[str, str],
         folder: Path,
         pass_fds: tuple[int, int],
     ) -> subprocess.Popen[bytes]:
-        variables = {**environment, **of_run}
         if self._sandbox is not None and self._guard is not None:
             return self._guard.start(
                 partial(SandboxedProcess, self._sandbox, argv, variables, pass_fds)
@@ -190,7 +178,7 @@ class StudentProcesses:
 
     @property
     def violations(self) -> tuple[str, ...]:
-        """System calls of theirs that nobody may make, in words."""
+        """System calls of theirs that are never allowed, in words."""
         return self._guard.violations if self._guard is not None else ()
 
     @property
@@ -200,7 +188,7 @@ class StudentProcesses:
 
     def refresh(self) -> None:
         """Look for descendants that are not known yet."""
-        self._pids |= frozenset(descendants(os.getpid()))
+        self._pids |= frozenset(descendant_pids(os.getpid()))
 
     def poll(self) -> bool:
         """Note ended processes; whether any is still running."""
@@ -276,9 +264,9 @@ class StudentProcesses:
         """Kill whatever is left and remove what it left in shared memory."""
         # Helpers such as multiprocessing's resource tracker end by themselves a moment later.
         deadline = time.monotonic() + _AFTERMATH_S
-        while not self.poll() and descendants(os.getpid()) and time.monotonic() < deadline:
+        while not self.poll() and descendant_pids(os.getpid()) and time.monotonic() < deadline:
             time.sleep(0.01)
-        inits = {pid for pid in descendants(os.getpid()) if is_init(pid)}
+        inits = {pid for pid in descendant_pids(os.getpid()) if is_init(pid)}
         self._survivors = tuple(
             command
             for pid, command in kill_descendants(os.getpid()).items()
@@ -305,8 +293,8 @@ class StudentProcesses:
     def ended_from_outside(self, breaches: Sequence[Breach]) -> str | None:
         """That something outside of its sandbox killed or stopped a process; None if not.
 
-        Within a sandbox only its own processes can send a signal, and a guard is told of that.
-        Without one, or where they may have done it, it cannot be told who did.
+        Within a sandbox only its own processes can send a signal, and the guard sees that.
+        Without one, or where they may have done it, the sender is unknown.
         """
         # A sandbox's own processes end with the status of what was started in it.
         started = [item.popen for item in self._running if isinstance(item.popen, SandboxedProcess)]
