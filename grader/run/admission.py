@@ -56,76 +56,60 @@ class Admission:
         self._running: dict[Ticket, float] = {}
         self._queue: deque[Ticket] = deque()
         self._alone = False
-        self._lock = threading.Lock()
+        self.changed = threading.Condition()
 
     @contextmanager
     def cell(self, *, alone: bool = False) -> Iterator[Ticket]:
         """Wait for a place, first come, first served; one that must be ``alone`` goes first."""
-        ticket = self._enter(alone)
-        try:
-            yield ticket
-        finally:
-            with self._lock:
-                del self._running[ticket]
-                self._alone = self._alone and not alone
-                self._call_next()
-
-    def _enter(self, alone: bool) -> Ticket:
-        ticket = Ticket(self, threading.Condition(self._lock))
-        with self._lock:
-            if alone:
-                self._queue.appendleft(ticket)
-            else:
-                self._queue.append(ticket)
+        ticket = Ticket(self)
+        with self.changed:
+            (self._queue.appendleft if alone else self._queue.append)(ticket)
             try:
                 # Only the first one looks again: the others would be the load that they see.
                 while self._queue[0] is not ticket or not self._is_free(alone):
                     is_first = self._queue[0] is ticket
-                    ticket.called.wait(_LOOK_AGAIN_S if is_first else None)
+                    self.changed.wait(_LOOK_AGAIN_S if is_first else None)
                 self._running[ticket] = time.monotonic()
                 self._alone = alone
             finally:
                 self._queue.remove(ticket)
-                self._call_next()
-        return ticket
-
-    def _call_next(self) -> None:
-        if self._queue:
-            self._queue[0].called.notify()
+                self.changed.notify_all()
+        try:
+            yield ticket
+        finally:
+            with self.changed:
+                del self._running[ticket]
+                self._alone = self._alone and not alone
+                self.changed.notify_all()
 
     def _is_free(self, alone: bool) -> bool:
         running = len(self._running)
         if alone:
             return running == 0
-        if self._alone or running >= self.most:
-            return False
-        if self._starting() >= self._starts:
+        since_s = time.monotonic() - _LONGEST_START_S
+        starting = sum(
+            ticket.is_starting and began_s > since_s for ticket, began_s in self._running.items()
+        )
+        if self._alone or running >= self.most or starting >= self._starts:
             return False
         if running < self._always:
             return True
         return self._load.runnable() < self._busy and self._load.free_memory() > _FREE_MEMORY
 
-    def _starting(self) -> int:
-        since_s = time.monotonic() - _LONGEST_START_S
-        return sum(
-            ticket.is_starting and began_s > since_s for ticket, began_s in self._running.items()
-        )
-
 
 class Ticket:
     """The place of one cell."""
 
-    def __init__(self, admission: Admission, called: threading.Condition) -> None:
+    def __init__(self, admission: Admission) -> None:
         self._admission = admission
-        self.called = called
         self.is_starting = True
 
     def started(self) -> None:
         """The cell has started: another one may."""
         if self.is_starting:
             self.is_starting = False
-            with self._admission._lock:
-                self._admission._call_next()
+            with self._admission.changed:
+                self._admission.changed.notify_all()
 
 
 def _with_descriptors(cells: int) -> int:

@@ -12,9 +12,9 @@ import random
 import socket
 from collections.abc import Collection
 from contextlib import AbstractContextManager
-from pathlib import Path
 
 from grader.errors import GraderFault
+from grader.sandbox.packet_monitor import bound_ports
 
 DOMAINS = range(1, 102)
 _BASE_PORT = 32768
@@ -54,10 +54,10 @@ def lock_domain(avoid: Collection[int] = ()) -> DomainLock:
 
 def joined_domains() -> tuple[int, ...]:
     """Domains with participants in a network of one's own, by the UDP ports that are bound."""
-    return domains_of_ports(Path("/proc/net/udp").read_text(encoding="ascii"))
+    return domains_of_ports(bound_ports())
 
 
-def domains_of_ports(table: str) -> tuple[int, ...]:
+def domains_of_ports(bound: Collection[int]) -> tuple[int, ...]:
     """Domains of which the ports of a participant are bound.
 
     A participant binds 7400 + 250 * domain for discovery by multicast, and two of its own,
@@ -65,8 +65,7 @@ def domains_of_ports(table: str) -> tuple[int, ...]:
     standard; see About-Domain-ID). One of these alone may be any socket's, whose port the system
     chose.
     """
-    lines = table.splitlines()[1:]
-    ports = {int(line.split()[1].rpartition(":")[2], 16) - _FIRST_PORT for line in lines}
+    ports = {port - _FIRST_PORT for port in bound}
     domains = (port for port in sorted(ports) if port >= 0 and port % _PORTS == 0)
     return tuple(
         first // _PORTS

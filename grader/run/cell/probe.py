@@ -138,13 +138,7 @@ class Probe:
         def receive(data: bytes, info: Any) -> None:
             self._keep(topic, type, data, info, name)
 
-        return self.node.create_subscription(
-            import_interface(type),
-            topic,
-            receive,  # type: ignore[arg-type]  # with raw=True the info comes too
-            profile,
-            raw=True,
-        )
+        return self._create_subscription(topic, type, profile, receive)
 
     def matches(self, endpoint: Endpoint) -> bool:
         """Whether it is a publisher that is recorded, or subscribes to the simulator."""
@@ -218,13 +212,12 @@ class Probe:
         def receive(data: bytes, info: Any) -> None:
             self._receive(topic, data, info)
 
-        self.node.create_subscription(
-            import_interface(topic.type),
-            topic.name,
-            receive,  # type: ignore[arg-type]  # with raw=True the info comes too
-            profile,
-            event_callbacks=told_of_matches(self._note_match),
-            raw=True,
+        self._create_subscription(topic.name, topic.type, profile, receive)
+
+    def _create_subscription(self, topic: str, type: str, profile: QoSProfile, receive: Any) -> Any:
+        events = told_of_matches(self._note_match)
+        return self.node.create_subscription(
+            import_interface(type), topic, receive, profile, event_callbacks=events, raw=True
         )
 
     def _note_match(self, _: Any) -> None:

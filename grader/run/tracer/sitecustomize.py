@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from typing import Any
 
 _FD = int(os.environ.get("ROSGRADE_TRACER_FD", "-1"))
-SEEN_FD = int(os.environ.get("ROSGRADESEEN_FD", "-1"))
+SEEN_FD = int(os.environ.get("ROSGRADE_SEEN_FD", "-1"))
 HELD_TOPICS = frozenset(filter(None, os.environ.get("ROSGRADE_HOLD", "").split(":")))
 LEAST_THREADS = 4
 THRESHOLDS = gc.get_threshold()
