@@ -69,7 +69,6 @@ class Player:
     """Gives the inputs and prints the rest."""
 
     def __init__(self, order: ReplayOrder, domain_id: int) -> None:
-        """Join the graph."""
         self._order = order
         self._domain_id = domain_id
         self._printing = threading.Lock()
@@ -185,7 +184,6 @@ class Player:
         self._students.let_exit()
 
     def _await_listener(self) -> None:
-        """Wait until the node listens to anything that is given."""
         deadline = time.monotonic() + self._order.discovery_s
         while not any(p.get_subscription_count() for p in self._publishers.values()):
             if time.monotonic() > deadline:

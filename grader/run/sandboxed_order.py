@@ -111,7 +111,6 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
 
 
 def _moved(paths: Iterable[str], places: dict[str, str]) -> tuple[str, ...]:
-    """Replace the beginnings of paths."""
     moved = list(paths)
     for number, path in enumerate(moved):
         for outside, inside in places.items():

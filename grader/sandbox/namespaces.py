@@ -143,7 +143,6 @@ def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
 
 
 def _wait_for(child: int, sentence: Callable[[], int | None]) -> None:
-    """End as the child does."""
     os.closerange(0, 256)
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGCHLD,))
     ended, status = os.waitpid(child, os.WNOHANG)

@@ -168,7 +168,6 @@ def _installed() -> dict[str, metadata.Distribution]:
 
 
 def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:
-    """Installed distributions by name: the roots, and all that they need."""
     installed = _installed()
     queue = [name for name in installed if _ROOTS.fullmatch(name) or name in libraries]
     found: dict[str, metadata.Distribution] = {}
@@ -209,7 +208,6 @@ def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribut
 
 
 def _list_file(tree: Path) -> Path:
-    """The file beside an environment that says what is in it."""
     return tree.with_name(f"{tree.name}.files")
 
 

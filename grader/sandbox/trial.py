@@ -103,7 +103,6 @@ def _remedy(settings: Path = Path("/proc/sys")) -> str:
 
 
 def _forbids(settings: Path, name: str) -> bool:
-    """Whether a setting of the kernel is too low; one that this kernel does not have is not."""
     try:
         value = int(settings.joinpath(*name.split(".")).read_text())
     except (OSError, ValueError):

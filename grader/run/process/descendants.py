@@ -16,10 +16,7 @@ _LONGEST_COMMAND = 1000
 
 
 def become_subreaper() -> None:
-    """Make orphaned descendants our children, so that none can leave us by forking twice.
-
-    Source: prctl(2), PR_SET_CHILD_SUBREAPER.
-    """
+    """Make orphaned descendants our children (prctl(2)): none can leave us by forking twice."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
@@ -78,10 +75,7 @@ def is_init(pid: int) -> bool:
 
 
 def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:
-    """SIGKILL every descendant until none is left.
-
-    New ones may be forked while we kill, so this repeats; they are stopped first.
-    """
+    """SIGKILL every descendant, which are stopped first, until none is left."""
     killed: dict[int, str] = {}
     deadline = time.monotonic() + limit_s
     while (alive := descendants(of)) and time.monotonic() < deadline:
@@ -114,10 +108,7 @@ def reap() -> None:
 
 
 def kill_by_variable(name: str, value: str, *, limit_s: float = 5.0) -> None:
-    """SIGKILL every process that was started with a variable of this value.
-
-    For what a cell left behind that was killed itself: its processes are no descendants any more.
-    """
+    """SIGKILL what a cell left behind that was killed itself: by a variable of this value."""
     wanted = f"{name}={value}".encode()
     deadline = time.monotonic() + limit_s
     while time.monotonic() < deadline:

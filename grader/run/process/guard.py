@@ -118,8 +118,7 @@ def _install(programs: tuple[bytes, bytes], call: int) -> int | None:
     """Put this thread under a filter: the first, or the second where we cannot listen.
 
     Returns:
-        What the kernel asks through. None where a container around us listens already: what is
-        asked otherwise is then refused without our knowing.
+        What the kernel asks through. None where a container around us listens already.
     """
     libc = ctypes.CDLL(None, use_errno=True)
 

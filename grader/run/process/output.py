@@ -67,8 +67,6 @@ class KeptLines:
 
 
 class _Stream:
-    """One pipe being read."""
-
     def __init__(
         self,
         process: str,
@@ -88,10 +86,9 @@ class _Stream:
         self._ended = False
 
     def feed(self, data: bytes, now_ns: int | None = None) -> None:
-        """Split into lines; a line without end is cut at a bound, and after 400 ms.
+        """Split into lines; what has no line end is cut at a bound, and after 400 ms.
 
-        A carriage return ends a line too, so that a line which is written over again and again
-        (a progress bar) counts as many.
+        A carriage return ends a line too: a progress bar writes many lines.
         """
         now_ns = time.time_ns() if now_ns is None else now_ns
         self.written_bytes += len(data)
@@ -130,14 +127,9 @@ class _Stream:
 
 
 class OutputReader:
-    """Reads all pipes of all processes in one thread."""
+    """Reads all pipes of all processes in one thread, which calls ``on_line`` with each line."""
 
     def __init__(self, limit_bytes: int, on_line: Callable[[LogLine], None] | None = None) -> None:
-        """Start reading.
-
-        Args:
-            on_line: Called with each line but a tracer's, in the thread that reads.
-        """
         self._limit = limit_bytes
         self._on_line = on_line
         self._selector = selectors.DefaultSelector()
@@ -152,10 +144,7 @@ class OutputReader:
         self._thread.start()
 
     def add(self, fd: int, process: str, stream: str) -> None:
-        """Read a pipe until its end; ``stream`` is stdout, stderr or tracer.
-
-        The descriptor belongs to the reader from here on.
-        """
+        """Read a pipe (stdout, stderr or tracer) until its end; it belongs to the reader now."""
         os.set_blocking(fd, False)
         on_line = self._on_line if stream != "tracer" else None
         target = _Stream(process, stream, self._limit, on_line)
@@ -256,7 +245,6 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def _is_of_tracer(data: dict[str, Any]) -> bool:
-    """Whether a tracer can have written it, as far as that shows."""
     kind = data.get("kind")
     if not isinstance(kind, str) or kind not in _KINDS or not isinstance(data.get("pid"), int):
         return False
@@ -264,10 +252,7 @@ def _is_of_tracer(data: dict[str, Any]) -> bool:
 
 
 def _is_fit(data: dict[str, Any]) -> bool:
-    """Whether it can be written down again.
-
-    The student's process can write to the pipe too, so nothing in it may be large or deep.
-    """
+    """Whether it can be written down: the student can write to the pipe too, large and deep."""
     inner = [value for value in data.values() if isinstance(value, dict)]
     values = [value for item in (data, *inner) for value in item.values() if value not in inner]
     keys = [key for item in (data, *inner) for key in item]

@@ -40,8 +40,7 @@ class ProcessSandbox:
     Attributes:
         arguments: Of bubblewrap.
         filter: File with the filter of system calls within the sandbox.
-        guard: File with the filter that asks the guard.
-        unheard: File with the filter in its place where the guard cannot listen.
+        guard: File with the filter that asks the guard; ``unheard`` where it cannot listen.
         calls: Numbers of the calls that the guard knows.
         folders: What a student sees at a path -> where the cell finds it.
     """

@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -38,10 +38,26 @@ _SUSPENDED_NS = NS // 2
 """What was stopped for so long will not go on by itself."""
 
 
+class PlainProcess(subprocess.Popen[bytes]):
+    """A process without a sandbox, with what there is to know of one in a sandbox."""
+
+    init: int | None = None
+    was_set_up = True
+
+    @property
+    def exit_code(self) -> int | None:
+        """As in :mod:`subprocess`."""
+        return self.returncode
+
+    def signal_group(self, number: signal.Signals) -> None:
+        """Send a signal to its process group."""
+        os.killpg(self.pid, number)
+
+
 @dataclass
 class _Running:
     name: str
-    popen: subprocess.Popen[bytes]
+    popen: PlainProcess | SandboxedProcess
     started_ns: int
     seen_fd: int | None
     exited_ns: int | None = None
@@ -53,7 +69,9 @@ class _Running:
 
     def end_if_suspended(self) -> None:
         """Kill it if a signal such as SIGSTOP stopped it some time ago: it would wait for ever."""
-        if not any(map(is_stopped, self._own_pids())):
+        init = self.popen.init
+        own = (self.popen.pid, *([] if init is None else (init, *descendant_pids(init))))
+        if not any(map(is_stopped, own)):
             self.suspended_ns = None
         elif self.suspended_ns is None:
             self.suspended_ns = time.time_ns()
@@ -61,27 +79,16 @@ class _Running:
             self.is_ended = True
             kill_tree(self.popen.pid)
 
-    def _own_pids(self) -> Iterable[int]:
-        """Its processes, as far as they are found without looking at all of the machine's."""
-        init = self.popen.init if isinstance(self.popen, SandboxedProcess) else None
-        return (self.popen.pid, *([] if init is None else (init, *descendant_pids(init))))
-
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to its process group, if that is still there."""
         with contextlib.suppress(ProcessLookupError):
-            if isinstance(self.popen, SandboxedProcess):
-                self.popen.signal_group(number)
-            else:
-                os.killpg(self.popen.pid, number)
+            self.stopped_by = number.name
+            self.popen.signal_group(number)
 
     @property
     def exit_code(self) -> int | None:
         """As in :mod:`subprocess`; of a process that was stopped, SIGSTOP ended it."""
-        if self.is_ended:
-            return -signal.SIGSTOP
-        if isinstance(self.popen, SandboxedProcess):
-            return self.popen.exit_code
-        return self.popen.returncode
+        return -signal.SIGSTOP if self.is_ended else self.popen.exit_code
 
 
 class StudentProcesses:
@@ -113,11 +120,7 @@ class StudentProcesses:
         of_run: Mapping[str, str],
         folder: Path,
     ) -> None:
-        """Start a process in a session of its own.
-
-        Args:
-            of_run: Further variables, of this run; the tracer's pipe is added.
-        """
+        """Start a process in a session of its own; variables ``of_run`` are added."""
         tracer_read, tracer_write = os.pipe()
         seen_read, seen_write = os.pipe()
         try:
@@ -150,12 +153,12 @@ class StudentProcesses:
         variables: Mapping[str, str],
         folder: Path,
         pass_fds: tuple[int, int],
-    ) -> subprocess.Popen[bytes]:
+    ) -> PlainProcess | SandboxedProcess:
         if self._sandbox is not None and self._guard is not None:
             return self._guard.start(
                 partial(SandboxedProcess, self._sandbox, argv, variables, pass_fds)
             )
-        return subprocess.Popen(
+        return PlainProcess(
             argv,
             cwd=folder,
             env=variables,
@@ -169,11 +172,7 @@ class StudentProcesses:
     @property
     def inits(self) -> tuple[int, ...]:
         """The first process of each sandbox that still stands."""
-        inits = [
-            process.popen.init
-            for process in self._running
-            if isinstance(process.popen, SandboxedProcess) and process.exited_ns is None
-        ]
+        inits = [one.popen.init for one in self._running if one.exited_ns is None]
         return tuple(init for init in inits if init is not None)
 
     @property
@@ -227,7 +226,6 @@ class StudentProcesses:
         running = self.is_running(name)
         for process in self._running:
             if process.name == name and process.exited_ns is None:
-                process.stopped_by = number.name
                 process.killed_ns = process.killed_ns or time.time_ns()
                 process.signal(number)
         return running
@@ -245,7 +243,6 @@ class StudentProcesses:
                 break
             for process in self._running:
                 if process.exited_ns is None:
-                    process.stopped_by = number.name
                     process.signal(number)
             step = Stopwatch(meter)
             while self.poll() and step.elapsed_s <= limit_s:
@@ -284,8 +281,7 @@ class StudentProcesses:
             f"the sandbox of {process.name} could not be set up: "
             f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'it said nothing'}"
             for process in self._running
-            if isinstance(process.popen, SandboxedProcess)
-            and process.stopped_by == "itself"
+            if process.stopped_by == "itself"
             and not process.is_ended
             and not process.popen.was_set_up
         )
@@ -293,12 +289,10 @@ class StudentProcesses:
     def ended_from_outside(self, breaches: Sequence[Breach]) -> str | None:
         """That something outside of its sandbox killed or stopped a process; None if not.
 
-        Within a sandbox only its own processes can send a signal, and the guard sees that.
-        Without one, or where they may have done it, the sender is unknown.
+        Within one only its own processes can send a signal, and the guard sees that.
         """
         # A sandbox's own processes end with the status of what was started in it.
-        started = [item.popen for item in self._running if isinstance(item.popen, SandboxedProcess)]
-        ours = {pid for popen in started for pid in (popen.pid, popen.init)}
+        ours = {pid for one in self._running for pid in (one.popen.pid, one.popen.init)}
         if breaches or self._guard is None or self._guard.can_have_ended(ours):
             return None
         for process in self._running:

@@ -123,10 +123,7 @@ class Requesting(Playing):
         return None if self.is_done else max(self._order.after_s, self._now_s + _POLL_S)
 
     def holds_up(self, other: Requesting) -> bool:
-        """Whether another one has to wait for it: it is due before, or stands before it.
-
-        Of those that are due at once, one that is not there holds up none.
-        """
+        """Whether another one has to wait for it: it is due or stands before it, and is there."""
         if self.is_through or self._place == other._place:
             return False
         if self._order.after_s == other._order.after_s:
@@ -139,7 +136,6 @@ class Requesting(Playing):
         return not any(item.holds_up(self) for item in self._context.requests)
 
     def _wait_for_answer(self) -> None:
-        """Begin to wait; what the machine takes meanwhile does not count."""
         self._since_sent = Stopwatch(self._context.meter)
 
     @property

@@ -148,7 +148,6 @@ class Publishing(Playing):
         return bool(able) and matched >= len(able) and self._context.is_heard
 
     def _listen(self) -> None:
-        """Take note of the answers that came since the last time."""
         if self._order.answer is None:
             return
         messages = self._context.probe.messages

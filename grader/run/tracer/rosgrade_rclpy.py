@@ -161,7 +161,6 @@ def flush() -> None:
 
 
 def _wrap(owner: Any, name: str, before: Any = None, after: Any = None) -> None:
-    """Replace a method by one that calls ``before(self)`` and ``after(self, result)``."""
     import functools
 
     original = getattr(owner, name)

@@ -147,8 +147,6 @@ _PATCHES = {
 
 
 class _Finder:
-    """Finds the modules to patch as Python would, and patches them once they are loaded."""
-
     @classmethod
     def find_spec(cls, name: str, path: Any = None, target: Any = None) -> Any:
         quietly(_note_import, name)
