@@ -8,7 +8,6 @@ only while the machine has a CPU and memory to spare.
 from __future__ import annotations
 
 import math
-import resource
 import threading
 import time
 from collections import deque
@@ -26,9 +25,6 @@ _BUSY_PER_CPU = 6.0
 """Runnable threads of the machine for each CPU from which on no cell is let in."""
 _FREE_MEMORY = 0.125
 """Share of the memory that stays free; a cell of the course takes some 40 MB."""
-_FILES_PER_CELL = 4
-"""Pipes to it, and what else is open for its submission."""
-_OTHER_FILES = 256
 _LONGEST_START_S = 2.0
 """What has not matched by then waits for something, and costs no CPU any more."""
 _LOOK_AGAIN_S = 0.05
@@ -43,12 +39,12 @@ class Admission:
         """Set the bounds.
 
         Args:
-            cells: Most cells at once, whatever the load; by default the load decides. No more
-                than the descriptors of this process suffice for.
+            cells: Most cells at once, whatever the load; by default the load decides.
             starts: Most cells that start at once; by default three for each CPU.
         """
         cpus = cpu_count()
-        self.most = _with_descriptors(cells if cells is not None else _CELLS_PER_CPU * cpus)
+        raise_open_files()
+        self.most = cells if cells is not None else _CELLS_PER_CPU * cpus
         self._always = self.most if cells is not None else cpus
         self._starts = starts if starts is not None else math.ceil(_STARTS_PER_CPU * cpus)
         self._busy = _BUSY_PER_CPU * cpus
@@ -110,11 +106,3 @@ class Ticket:
             self.is_starting = False
             with self._admission.changed:
                 self._admission.changed.notify_all()
-
-
-def _with_descriptors(cells: int) -> int:
-    wanted = _FILES_PER_CELL * cells + _OTHER_FILES
-    soft = raise_open_files(wanted)
-    if soft == resource.RLIM_INFINITY or soft >= wanted:
-        return cells
-    return max(1, (soft - _OTHER_FILES) // _FILES_PER_CELL)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.recording.fact import to_json
+from grader.recording.interface import definition_finder
 from grader.recording.mcap_writer import write_recording
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
@@ -25,7 +26,6 @@ from grader.run.environment import RMW, student_environment
 from grader.run.host.load import cpu_count
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, Until
 from grader.run.sandboxed_order import sandboxed
-from grader.run.stimulus_orders import stimulus_orders
 from grader.sandbox.python_tree import unlisted
 from grader.submission.record import SubmissionRecord
 
@@ -180,6 +180,32 @@ def _simulator(
         options=options.model_dump_json(),
         seed=seed,
     )
+
+
+def _stimuli(
+    scenario: Scenario,
+    commands: Sequence[ProcessCommand],
+    folder: Path,
+    prefixes: Sequence[str],
+    seed: int,
+    drawn: Mapping[str, float],
+) -> tuple[dict[str, Any], ...]:
+    """Make the orders."""
+    from grader.assignment.stimuli.message import StimulusError
+    from grader.assignment.stimuli.stimulus_model import Making
+
+    find = definition_finder(Path(prefix) for prefix in prefixes)
+    making = Making(folder, find, seed, drawn, [command.name for command in commands])
+    found = []
+    for item in scenario.stimuli:
+        what = f"the stimulus {item.key!r}" + (f" on {item.exchanged[0]}" if item.exchanged else "")
+        try:
+            found.append(item.order(making))
+        except StimulusError as error:
+            raise GraderFault(f"{what}: {error}") from error
+        except KeyError as error:
+            raise GraderFault(f"{what}: no definition of {error.args[0]} was found") from error
+    return tuple(found)
 
 
 @dataclass
@@ -362,7 +388,7 @@ class Runner:
             environment=student_environment(ros, install, scratch),
             prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),
-            stimuli=stimulus_orders(scenario, commands, worlds, definitions, seed, values),
+            stimuli=_stimuli(scenario, commands, worlds, definitions, seed, values),
             until=_until(scenario.until),
             limits=RunLimits(scenario.discovery, scenario.timeout, scenario.shutdown),
             scratch=str(scratch),

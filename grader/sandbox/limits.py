@@ -11,6 +11,7 @@ _OWN_SHARE = 4
 """What is on its way between processes (SCM_RIGHTS, unix(7)) counts for all that a user runs, and
 a process that may have more open may send more: a submission must not use up what the grader
 needs."""
+_WANTED_FILES = 8 * OPEN_FILES
 _SIGNALS = 1024
 _CPU_GRACE_S = 10
 """The watchdog counts all processes together: it comes first, and says what happened."""
@@ -59,14 +60,12 @@ class SandboxLimits:
         return ["prlimit", *(f"--{name}={bound}" for name, bound in bounds.items())]
 
 
-def raise_open_files(wanted: int = _OWN_SHARE * OPEN_FILES) -> int:
-    """Get so many open files, within the hard limit; how many there are then."""
+def raise_open_files() -> None:
+    """Get as many open files for this process, and those that it starts, as a class may need."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = max(wanted, _OWN_SHARE * OPEN_FILES)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    if soft != resource.RLIM_INFINITY and soft < _WANTED_FILES:
+        soft = _WANTED_FILES if hard == resource.RLIM_INFINITY else min(_WANTED_FILES, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-    return soft
 
 
 BUILD_OUTPUT_BYTES = 64 * MIB

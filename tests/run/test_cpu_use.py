@@ -16,8 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.run.host.cpu_use import CpuMeter, CpuTimes, Interval, idle_ticks, interval, others_share
-from grader.run.host.disturbance import DisturbanceMeter
-from grader.run.host.run_delay import run_delays
+from grader.run.host.disturbance import DisturbanceMeter, run_delays
 from grader.run.process.descendants import descendant_pids
 
 MS = 1_000_000

@@ -86,25 +86,6 @@ def test_everybody_may_read_the_students_python_whatever_the_umask(tmp_path: Pat
     assert all(path.stat().st_mode & 0o444 == 0o444 for path in (tree / "bin").iterdir())
 
 
-@pytest.mark.parametrize(
-    ("settings", "wanted"),
-    [
-        ({"user/max_user_namespaces": 0}, "sudo sysctl user.max_user_namespaces=10000"),
-        (
-            {"user/max_user_namespaces": 90_000, "kernel/unprivileged_userns_clone": 0},
-            "sudo sysctl kernel.unprivileged_userns_clone=1",
-        ),
-    ],
-)
-def test_a_setting_that_forbids_user_namespaces_is_named_with_the_way_to_change_it(
-    settings: dict[str, int], wanted: str, tmp_path: Path
-) -> None:
-    for name, value in settings.items():
-        (tmp_path / name).parent.mkdir()
-        (tmp_path / name).write_text(f"{value}\n")
-    assert trial._remedy(tmp_path).endswith(wanted)
-
-
 def test_the_student_s_python_holds_ros_and_nothing_of_ours(tmp_path: Path) -> None:
     tree = student_prefix(tmp_path).path
     (site,) = tree.glob("lib/python3*/site-packages")

@@ -18,9 +18,8 @@ from grader.run.cell.ending import EndingConditions, ExitBarrier
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
 from grader.run.cell.progress_events import LineTeller, tell
-from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
 from grader.run.host.machine_faults import MachineFaults
-from grader.run.host.stopwatch import Stopwatch
 from grader.run.host.watchdog import Watchdog
 from grader.run.order import CellOrder, ProcessCommand
 from grader.run.process.descendants import descendant_pids

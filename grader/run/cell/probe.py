@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import importlib
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import rclpy
+from rcl_interfaces.msg import Log
 from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidServiceNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -21,15 +24,20 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.mcap_writer import RawMessage
-from grader.recording.model import Call, Endpoint, Kind, Owner
-from grader.run.cell.rosout import RosoutLog, told_of_matches
+from grader.recording.model import NS, Call, Endpoint, Kind, LogLine, Owner
 from grader.run.order import RunLimits, Topic
+from grader.run.process.output import KeptLines
 
 NAME = "rosgrade_probe"
 _BEFORE_ALL_NS = 1
 _LAST_SEQUENCE = 2**32 - 1
 # One lost answer must not end the observation, and a blocked node must not be flooded.
 _MOST_UNANSWERED = 5
+_ROSOUT = "/rosout"
+_ROSOUT_DEPTH = 1000
+_LONGEST = 8192
+_LONGEST_NAME = 256
+_LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
 
 
 def import_interface(name: str) -> Any:
@@ -64,6 +72,46 @@ class _Pending:
         self.answers += 1
         if self.answers == self.servers:
             self.answered_ns = time.time_ns()
+
+
+def told_of_matches(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
+    """Events of a subscription without rclpy's own, which only warn and cost CPU time."""
+    return SubscriptionEventCallbacks(matched=on_match, use_default_callbacks=False)
+
+
+class RosoutLog:
+    """Subscribes to /rosout; the probe itself publishes nothing there."""
+
+    def __init__(self) -> None:
+        self._kept = KeptLines(0)
+
+    def listen(self, node: Node, limit_bytes: int, on_match: Callable[[Any], None]) -> None:
+        """Keep what comes from now on, and what was published before a logger was matched."""
+        self._kept = KeptLines(limit_bytes)
+        profile = QoSProfile(
+            depth=_ROSOUT_DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        )
+        events = told_of_matches(on_match)
+        node.create_subscription(Log, _ROSOUT, self._take, profile, event_callbacks=events)
+
+    @property
+    def lines(self) -> tuple[LogLine, ...]:
+        """Everything kept so far, in the order of its arrival."""
+        return tuple(self._kept.lines)
+
+    def _take(self, record: Any) -> None:
+        stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
+        if stamp_ns < 0:
+            # What is recorded has a time after 1970.
+            stamp_ns = time.time_ns()
+        name, text = (
+            str(value)[:longest].encode(errors="replace").decode()
+            for value, longest in ((record.name, _LONGEST_NAME), (record.msg, _LONGEST))
+        )
+        level = _LEVELS.get(int(record.level), str(record.level))
+        self._kept.add(LogLine(stamp_ns, name, "rosout", text, level))
 
 
 class Probe:

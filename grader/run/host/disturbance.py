@@ -7,6 +7,8 @@ both only what others than the student's processes can explain is counted.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import threading
 import time
 from collections import deque
@@ -15,7 +17,6 @@ from collections.abc import Callable, Iterable, Mapping
 from grader.recording.event import Disturbance
 from grader.recording.model import NS
 from grader.run.host.cpu_use import CpuMeter, CpuTimes, Interval, interval, others_share
-from grader.run.host.run_delay import run_delays
 
 _TICK_S = 0.02
 _TICKS_PER_SAMPLE = 5
@@ -25,8 +26,23 @@ _SAMPLES_PER_LOOK = 10
 of those that are known had to wait."""
 _TRIFLE_NS = 2_000_000
 """A wait in one sample that needs no explanation."""
+_LONGEST_STRETCH = 8.0
 _KEPT = 100
 """Samples of CPU times that are kept, for waits that were long."""
+
+
+def run_delays(pid: int) -> dict[int, int]:
+    """Run delay of each thread of a process so far, from schedstat: thread id -> nanoseconds."""
+    found: dict[int, int] = {}
+    # It may end meanwhile.
+    with contextlib.suppress(OSError):
+        for name in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208  often
+            with (
+                contextlib.suppress(OSError, IndexError),
+                open(f"/proc/{pid}/task/{name}/schedstat", "rb") as file,  # noqa: PTH123
+            ):
+                found[int(name)] = int(file.read().split()[1])
+    return found
 
 
 class DisturbanceMeter:
@@ -109,3 +125,18 @@ class DisturbanceMeter:
         if self._times is not None:
             self._intervals.append(interval(self._times, times, self._cpu.cpus))
         self._times = times
+
+
+class Stopwatch:
+    """Time since its start, less what the host took from us meanwhile."""
+
+    def __init__(self, meter: DisturbanceMeter) -> None:
+        self._meter = meter
+        self._wall_s = time.monotonic()
+        self._stolen_s = meter.stolen_s
+
+    @property
+    def elapsed_s(self) -> float:
+        """Undisturbed seconds; at least an eighth of the wall time, so that every wait ends."""
+        wall_s = time.monotonic() - self._wall_s
+        return max(wall_s - (self._meter.stolen_s - self._stolen_s), wall_s / _LONGEST_STRETCH)

@@ -8,7 +8,7 @@ from typing import Any
 
 from grader.recording.event import Wait
 from grader.recording.model import NS
-from grader.run.host.stopwatch import Stopwatch
+from grader.run.host.disturbance import Stopwatch
 from grader.run.stimuli.context import Playing, StimulusContext, plays
 from grader.run.stimuli.service_calls import NO_SERVER
 
