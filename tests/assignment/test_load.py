@@ -54,12 +54,11 @@ def test_a_loaded_assignment_has_its_checks_bound(write: Write, catalogue: Catal
     [
         (
             "{id: a, points: 1}",
-            "checks[0]: says neither what it 'uses' (a check of the catalogue) nor 'python' "
-            "(an own check)",
+            "checks[0]: give either 'uses', a check of the catalogue, or 'python', your own",
         ),
         (
             "{id: a, points: 1, uses: node.alive, python: 'checks.py:mine'}",
-            "checks[0]: give either 'uses' or 'python', not both",
+            "checks[0]: give either 'uses', a check of the catalogue, or 'python', your own",
         ),
         (
             "{id: a, points: 1, uses: node.alife}",

@@ -120,7 +120,10 @@ FIT = [
         + "      - {join: /chatter, type: std_msgs/msg/String, name: late, after: 1 s}\n",
         "17: .*a late joiner would hear that",
     ),
-    ("      - {kill: ecko, after: 1 s}\n", "14: .*does not launch 'ecko'. Did you mean 'echo'?"),
+    (
+        "      - {kill: ecko, after: 1 s}\n",
+        "14: .*launches 'ecko' 0 times.* Did you mean 'echo'?",
+    ),
     (
         publish("messages: [{}]\nbefore_launch: 3\ndurability: transient_local"),
         "17: .*there are only 1 messages",
