@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from grader.assignment.model import CheckSpec
 from grader.assignment.own_check import load_own_check
@@ -59,26 +58,21 @@ def _about(bound: BoundCheck, alike: Sequence[BoundCheck]) -> str:
 
 
 def bind(
-    source: Source, index: int, spec: CheckSpec, catalogue: Mapping[str, Check], folder: Path
+    source: Source, index: int, spec: CheckSpec, catalogue: Mapping[str, Check]
 ) -> tuple[BoundCheck | None, list[Problem]]:
     """Find the check that an entry uses, and read its parameters; or say why not."""
     place = ("checks", index)
-    if spec.uses is not None and spec.python is not None:
-        return None, [source.problem(place, "give either 'uses' or 'python', not both")]
-    if spec.uses is not None:
-        found = catalogue.get(spec.uses)
-        if found is None:
-            advice = nearest_or_all(spec.uses, sorted(catalogue), "The checks are")
-            text = f"there is no check {spec.uses!r}.{advice}"
-            return None, [source.problem((*place, "uses"), text)]
-    elif spec.python is not None:
+    if spec.python is not None:
         try:
-            found = load_own_check(spec.python, folder)
+            found = load_own_check(spec.python, source.file.parent)
         except ValueError as error:
             return None, [source.problem((*place, "python"), str(error))]
+    elif spec.uses in catalogue:
+        found = catalogue[str(spec.uses)]
     else:
-        text = "says neither what it 'uses' (a check of the catalogue) nor 'python' (an own check)"
-        return None, [source.problem(place, text)]
+        advice = nearest_or_all(str(spec.uses), sorted(catalogue), "The checks are")
+        text = f"there is no check {spec.uses!r}.{advice}"
+        return None, [source.problem((*place, "uses"), text)]
     parameters, problems = source.examine(found.parameters, (*place, "with"))
     if parameters is None:
         return None, problems

@@ -73,7 +73,7 @@ class Interfaces:
         return [*own, *(prefix / "share" / package for prefix in self.prefixes or ())]
 
 
-def problems(
+def interface_problems(
     source: Source, assignment: Assignment, checks: Sequence[BoundCheck], known: Interfaces
 ) -> Iterator[Problem]:
     """Find interfaces that are neither in ROS, nor beside the assignment, nor handed in.

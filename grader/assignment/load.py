@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
 from grader import resources
-from grader.assignment import expected, interfaces, rules, simulation
+from grader.assignment import expected, rules, simulation
 from grader.assignment.binding import BoundCheck, bind, tell_apart
+from grader.assignment.interfaces import Interfaces, interface_problems
 from grader.assignment.lesson_checks import lesson_checks
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
-from grader.errors import AssignmentError, Problem, UsageError
+from grader.errors import AssignmentError, UsageError
 from grader.spec.nearest_name import nearest_or_all
-from grader.spec.source import Source, in_order, read_source
+from grader.spec.source import in_order, read_source
 
 ASSIGNMENT_FILE = "assignment.yaml"
 
@@ -109,39 +110,24 @@ def load_assignment(
         own = lesson_checks(file.parent)
     except ValueError as error:
         raise AssignmentError(file, [source.problem(("checks",), str(error))]) from error
-    checks, found = _bind(source, assignment, {**catalogue, **own})
-    found += rules.problems(source, assignment, checks)
-    found += _folder_name(source, assignment)
-    bound = [check for check in checks if check is not None]
+    known = {**catalogue, **own}
+    tried = [bind(source, index, spec, known) for index, spec in enumerate(assignment.checks)]
+    bound = [check for check, _ in tried if check is not None]
+    found = [problem for _, problems in tried for problem in problems]
+    found += rules.problems(source, assignment, [check for check, _ in tried])
+    folder = file.resolve().parent.name
+    if file.name == ASSIGNMENT_FILE and assignment.id != folder:
+        text = f"{assignment.id!r} is not the name of its folder, {folder!r}"
+        found.append(source.problem(("id",), text))
     if not found:
-        known = interfaces.Interfaces.of(file.parent)
-        found += simulation.problems(source, assignment, known)
-        found += interfaces.problems(source, assignment, bound, known)
-        found += expected.problems(source, assignment, bound, known)
+        interfaces = Interfaces.of(file.parent)
+        found += simulation.problems(source, assignment, interfaces)
+        found += interface_problems(source, assignment, bound, interfaces)
+        found += expected.problems(source, assignment, bound, interfaces)
     if found:
         raise AssignmentError(file, in_order(found))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
     return LoadedAssignment(assignment, file, digest, tuple(tell_apart(bound)))
-
-
-def _bind(
-    source: Source, assignment: Assignment, catalogue: Mapping[str, Check]
-) -> tuple[list[BoundCheck | None], list[Problem]]:
-    """The check that each entry uses, or None where there is a problem."""
-    bound: list[BoundCheck | None] = []
-    found: list[Problem] = []
-    for index, spec in enumerate(assignment.checks):
-        check, problems = bind(source, index, spec, catalogue, source.file.parent)
-        bound.append(check)
-        found += problems
-    return bound, found
-
-
-def _folder_name(source: Source, assignment: Assignment) -> Iterator[Problem]:
-    """The id of an assignment is the name of its folder: ids are found by it."""
-    folder, name = source.file.resolve().parent.name, assignment.id
-    if source.file.name == ASSIGNMENT_FILE and name != folder:
-        yield source.problem(("id",), f"{name!r} is not the name of its folder, {folder!r}")
 
 
 def folder_sha256(folder: Path, besides: Path | None = None) -> str:

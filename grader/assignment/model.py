@@ -287,6 +287,12 @@ class CheckSpec(Model):
         Visibility.VISIBLE, description="When the student gets to see it."
     )
 
+    @model_validator(mode="after")
+    def _one_check(self) -> CheckSpec:
+        if (self.uses is None) == (self.python is None):
+            raise ValueError("give either 'uses', a check of the catalogue, or 'python', your own")
+        return self
+
 
 class Assignment(Model):
     """A lesson's assignment: `assignments/<id>/assignment.yaml`."""

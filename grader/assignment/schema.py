@@ -23,17 +23,21 @@ _DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, Any]:
     """The schema of ``assignment.yaml``, with the parameters of every check."""
-    models: list[type[Model]] = [Assignment, CheckSpec]
-    models += [check.parameters for check in catalogue.values()]
-    references, schema = _schemas(models)
-    entry = schema["$defs"][_name(references[CheckSpec])]
+    parameters = [check.parameters for check in catalogue.values()]
+    references, schema = _schemas(Assignment, CheckSpec, *parameters)
+    entry = schema["$defs"][references[CheckSpec]["$ref"].rpartition("/")[2]]
+    families = "|".join(sorted({check.family for check in catalogue.values()}))
+    of_the_lesson = {
+        "description": "A check of the package `checks/` beside this file.",
+        "type": "string",
+        "pattern": rf"^(?!({families})\.)[a-z]\w*\.[a-z]\w*$",
+    }
     entry["properties"]["uses"] = {
         "description": entry["properties"]["uses"]["description"],
         "oneOf": [
-            {"const": check.name, "description": check.title}
-            for check in sorted(catalogue.values(), key=lambda check: check.name)
-        ]
-        + [_own_check(catalogue)],
+            *({"const": name, "description": catalogue[name].title} for name in sorted(catalogue)),
+            of_the_lesson,
+        ],
     }
     entry["properties"]["python"] = {
         "description": entry["properties"]["python"]["description"],
@@ -47,32 +51,17 @@ def assignment_schema(catalogue: Mapping[str, Check] = CATALOGUE) -> dict[str, A
     return {"$schema": _DRAFT, **references[Assignment], **schema}
 
 
-def _own_check(catalogue: Mapping[str, Check]) -> dict[str, Any]:
-    families = "|".join(sorted({check.family for check in catalogue.values()}))
-    return {
-        "description": "A check of the package `checks/` beside this file.",
-        "type": "string",
-        "pattern": rf"^(?!({families})\.)[a-z]\w*\.[a-z]\w*$",
-    }
-
-
 def mutants_schema() -> dict[str, Any]:
     """The schema of ``mutants.yaml``."""
-    references, schema = _schemas([MutantFile])
+    references, schema = _schemas(MutantFile)
     return {"$schema": _DRAFT, **references[MutantFile], **schema}
 
 
-def _schemas(
-    models: list[type[Model]],
-) -> tuple[dict[type[Model], dict[str, Any]], dict[str, Any]]:
+def _schemas(*models: type[Model]) -> tuple[dict[type[Model], dict[str, Any]], dict[str, Any]]:
     """A reference to each model, and the definitions that they refer to."""
-    unique = list(dict.fromkeys(models))
+    unique = dict.fromkeys(models)
     found, schema = models_json_schema([(model, "validation") for model in unique], by_alias=True)
     return {model: found[model, "validation"] for model in unique}, schema
-
-
-def _name(reference: Mapping[str, Any]) -> str:
-    return str(reference["$ref"]).rpartition("/")[2]
 
 
 def _parameters_of(check: Check, reference: Mapping[str, Any]) -> dict[str, Any]:

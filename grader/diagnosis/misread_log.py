@@ -45,8 +45,6 @@ def _relation(number: float, value: float, decimals: int) -> str:
         return "with fewer decimals"
     if number * value < 0.0 and shows(number, -value, decimals):
         return "with the opposite sign"
-    if value.is_integer() and abs(number - value) == 1.0:
-        return "plus 1" if number > value else "minus 1"
     return ""
 
 

@@ -72,12 +72,6 @@ class NoAnswer(Symptom[Cause]):
         return answered if calls else None
 
     @property
-    def moment(self) -> Moment:
-        """When it was asked."""
-        when_s = self.recording.since_launch_s(self.asked_ns)
-        return Moment("asked, not answered in time", when_s)
-
-    @property
     def place(self) -> SourceError | None:
         """Where the process was when it was interrupted."""
         process = self.process
@@ -85,8 +79,10 @@ class NoAnswer(Symptom[Cause]):
 
     @property
     def evidence(self) -> Evidence:
-        """Both."""
-        return Evidence(moments=(self.moment,), places=(self.place,) if self.place else ())
+        """When it was asked, and the place."""
+        when_s = self.recording.since_launch_s(self.asked_ns)
+        moment = Moment("asked, not answered in time", when_s)
+        return Evidence(moments=(moment,), places=(self.place,) if self.place else ())
 
 
 def why_unanswered(
@@ -135,8 +131,7 @@ def never_spun(symptom: NoAnswer) -> Cause | None:
     """rclpy.spin() is never called, or the node is not given to the executor that spins."""
     if symptom.process is None:
         return None
-    nodes, moments = (symptom.node,), (symptom.moment,)
-    return why_never_spun(symptom.recording, symptom.what, nodes, (symptom.process,), moments)
+    return why_never_spun(symptom.recording, symptom.what, (symptom.node,), (symptom.process,))
 
 
 @explanation(NoAnswer)

@@ -28,7 +28,6 @@ _OWN_SERVICE = re.compile(
 )
 _SEND_GOAL = "/_action/send_goal"
 _MOST_ROWS = 50
-_MOST_MOMENTS = 5
 # The name becomes an argument, and a DDS participant that is not of ROS may use any.
 _NAME = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
@@ -89,11 +88,6 @@ class NoEndpoint(Symptom[Cause]):
     @property
     def evidence(self) -> Evidence:
         """What there is instead."""
-        since_launch_s = self.recording.since_launch_s
-        moments = tuple(
-            Moment(f"{self.word.noun} {item.name} appeared", since_launch_s(item.appeared_ns))
-            for item in self.there[:_MOST_MOMENTS]
-        )
         rows = [
             (item.node, word.noun, item.name, item.type)
             for word in _WORDS
@@ -101,9 +95,7 @@ class NoEndpoint(Symptom[Cause]):
         ]
         header = ("node", "kind", "name", "type")
         table = Table("What the student's nodes have", header, tuple(rows[:_MOST_ROWS]))
-        return Evidence(
-            moments=moments or nodes_seen(self.recording), tables=(table,) if rows else ()
-        )
+        return Evidence(moments=nodes_seen(self.recording), tables=(table,) if rows else ())
 
     @property
     def create(self) -> str:

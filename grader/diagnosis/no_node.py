@@ -180,21 +180,6 @@ def main_does_not_come_to_it(symptom: NoNode) -> Cause:
 
 
 @explanation(OtherNode)
-def in_a_namespace(symptom: OtherNode) -> Cause | None:
-    """The node is in a namespace."""
-    split = [name.rpartition("/") for name in symptom.names]
-    space = next((space for space, _, base in split if base == symptom.base), None)
-    if space is None:
-        return None
-    return Cause(
-        f"{symptom.seen}: the name is right, but the node is in the namespace {code(space or '/')}",
-        "Leave out the namespace argument of Node.__init__ (and any `__ns` remapping) "
-        "unless the assignment asks for it.",
-        Evidence(moments=nodes_seen(symptom.recording)),
-    )
-
-
-@explanation(OtherNode)
 def process_crashed(symptom: OtherNode) -> Cause | None:
     """The process of the node ended with a failure before it created the node."""
     # Without the namespaces, which make any two names alike.
@@ -225,11 +210,18 @@ def exchanged_executables(symptom: OtherNode) -> Cause | None:
 
 @explanation(OtherNode, general=True)
 def other_name(symptom: OtherNode) -> Cause:
-    """The node has another name, or upper and lower case of its name differ."""
-    same = symptom.wanted.lower() in [name.lower() for name in symptom.names]
+    """The node has another name: other case, a namespace, or a misspelling."""
+    how = ""
+    for name in symptom.names:
+        space, _, base = name.rpartition("/")
+        if name.lower() == symptom.wanted.lower():
+            how = ": upper and lower case differ"
+        elif base == symptom.base:
+            how = f": the name is right, but the node is in the namespace {code(space or '/')}"
     return Cause(
-        f"{symptom.seen}{': upper and lower case differ' if same else ''}",
+        f"{symptom.seen}{how}",
         f"The node's name is the argument of super().__init__('{symptom.base}') in its "
-        "constructor. Upper and lower case matter.",
+        "constructor. Upper and lower case matter, and a namespace (the argument or `__ns`) "
+        "stands in front of it.",
         Evidence(moments=nodes_seen(symptom.recording)),
     )

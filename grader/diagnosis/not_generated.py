@@ -159,29 +159,25 @@ def why_not_generated(
 
 
 @explanation(NoDefinition)
-def in_other_folder(symptom: NoDefinition) -> Cause | None:
-    """The file lies in a wrong folder, or in another package."""
-    wanted = PurePosixPath(symptom.interface.file).name
-    for package in (symptom.package, *symptom.submission.packages):
-        for item in package.definitions:
-            path = PurePosixPath(item.file)
-            if path.name == wanted:
-                return symptom.found(item, f"it lies in the folder {code(str(path.parent))}")
-    return None
-
-
-@explanation(NoDefinition)
-def other_name(symptom: NoDefinition) -> Cause | None:
-    """The file has another suffix, or its name is misspelt or not in CamelCase."""
-    name, suffix = symptom.interface.name, f".{symptom.interface.kind}"
-    stems = {PurePosixPath(item.file).stem: item for item in symptom.package.definitions}
-    folded = {stem.replace("_", "").lower(): stem for stem in stems}
-    match = name if name in stems else folded.get(name.lower()) or nearest(name, stems)
+def near_definition(symptom: NoDefinition) -> Cause | None:
+    """The file lies in a wrong folder or package, or its name or its suffix is another one."""
+    file, name = PurePosixPath(symptom.interface.file), symptom.interface.name
+    found = {
+        PurePosixPath(item.file): item
+        for package in (symptom.package, *symptom.submission.packages)
+        for item in package.definitions
+    }
+    for path, item in found.items():
+        if path.name == file.name:
+            return symptom.found(item, f"it lies in the folder {code(str(path.parent))}")
+    stems = {path.stem.replace("_", "").lower(): path for path in found}
+    match = nearest(name.lower(), stems)
     if match is None:
         return None
-    if match == name:
-        return symptom.found(stems[match], f"its suffix is not {code(suffix)}")
-    return symptom.found(stems[match], f"it is not called {code(name)}, in CamelCase")
+    what = f"it is not called {code(name)}, in CamelCase"
+    if stems[match].stem == name:
+        what = f"its suffix is not {code(file.suffix)}"
+    return symptom.found(found[stems[match]], what)
 
 
 @explanation(NoDefinition, general=True)

@@ -194,7 +194,7 @@ def definition_finder(prefixes: Iterable[Path]) -> Callable[[str], str]:
 
 
 def concatenated_definition(interface: str, find: Callable[[str], str]) -> str:
-    """A definition with those of all messages that it contains, as a ``ros2msg`` schema has them."""
+    """A definition with those of all messages that it contains, as ``ros2msg`` schemas are."""
     texts: dict[str, str] = {}
     queue = [interface]
     while queue:

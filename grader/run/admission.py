@@ -1,15 +1,13 @@
 """How many cells may run, and how many of them may be starting, at the same time.
 
-Starting a node costs nearly all of its CPU time (imports, DDS), and many starts at one
-instant disturb the timing of those that already run; so starts are counted apart. Beyond a
-few, another cell is let in only while the machine, with all that others do on it, has a CPU
-and memory to spare.
+Starting a node costs nearly all of its CPU time, and many starts at one instant disturb the timing
+of those that already run; so starts are counted separately. Beyond a few, another cell is let in
+only while the machine has a CPU and memory to spare.
 """
 
 from __future__ import annotations
 
 import math
-import resource
 import threading
 import time
 from collections import deque
@@ -24,12 +22,9 @@ _CELLS_PER_CPU = 24
 _STARTS_PER_CPU = 3.0
 """More than one, because a start also waits: for processes, and for DDS to discover them."""
 _BUSY_PER_CPU = 6.0
-"""Runnable threads of the machine for each CPU from which on nobody more is let in."""
+"""Runnable threads of the machine for each CPU from which on no cell is let in."""
 _FREE_MEMORY = 0.125
 """Share of the memory that stays free; a cell of the course takes some 40 MB."""
-_FILES_PER_CELL = 4
-"""Pipes to it, and what else is open for its submission."""
-_OTHER_FILES = 256
 _LONGEST_START_S = 2.0
 """What has not matched by then waits for something, and costs no CPU any more."""
 _LOOK_AGAIN_S = 0.05
@@ -44,12 +39,12 @@ class Admission:
         """Set the bounds.
 
         Args:
-            cells: Most cells at once, whatever the load; by default the load decides. No more
-                than the descriptors of this process suffice for.
+            cells: Most cells at once, whatever the load; by default the load decides.
             starts: Most cells that start at once; by default three for each CPU.
         """
         cpus = cpu_count()
-        self.most = _with_descriptors(cells if cells is not None else _CELLS_PER_CPU * cpus)
+        raise_open_files()
+        self.most = cells if cells is not None else _CELLS_PER_CPU * cpus
         self._always = self.most if cells is not None else cpus
         self._starts = starts if starts is not None else math.ceil(_STARTS_PER_CPU * cpus)
         self._busy = _BUSY_PER_CPU * cpus
@@ -57,90 +52,57 @@ class Admission:
         self._running: dict[Ticket, float] = {}
         self._queue: deque[Ticket] = deque()
         self._alone = False
-        self._lock = threading.Lock()
+        self.changed = threading.Condition()
 
     @contextmanager
     def cell(self, *, alone: bool = False) -> Iterator[Ticket]:
-        """Wait for a place, first come, first served; the newest who wants to be alone goes before.
-
-        Args:
-            alone: Wait until no other cell runs, and let none start meanwhile.
-        """
-        ticket = self._enter(alone)
-        try:
-            yield ticket
-        finally:
-            with self._lock:
-                del self._running[ticket]
-                self._alone = self._alone and not alone
-                self._call_next()
-
-    def _enter(self, alone: bool) -> Ticket:
-        ticket = Ticket(self, threading.Condition(self._lock))
-        with self._lock:
-            if alone:
-                self._queue.appendleft(ticket)
-            else:
-                self._queue.append(ticket)
+        """Wait for a place, first come, first served; one that must be ``alone`` goes first."""
+        ticket = Ticket(self)
+        with self.changed:
+            (self._queue.appendleft if alone else self._queue.append)(ticket)
             try:
                 # Only the first one looks again: the others would be the load that they see.
                 while self._queue[0] is not ticket or not self._is_free(alone):
                     is_first = self._queue[0] is ticket
-                    ticket.called.wait(_LOOK_AGAIN_S if is_first else None)
+                    self.changed.wait(_LOOK_AGAIN_S if is_first else None)
                 self._running[ticket] = time.monotonic()
                 self._alone = alone
             finally:
                 self._queue.remove(ticket)
-                self._call_next()
-        return ticket
-
-    def _call_next(self) -> None:
-        if self._queue:
-            self._queue[0].called.notify()
+                self.changed.notify_all()
+        try:
+            yield ticket
+        finally:
+            with self.changed:
+                del self._running[ticket]
+                self._alone = self._alone and not alone
+                self.changed.notify_all()
 
     def _is_free(self, alone: bool) -> bool:
         running = len(self._running)
         if alone:
             return running == 0
-        if self._alone or running >= self.most:
-            return False
-        if self._starting() >= self._starts:
+        since_s = time.monotonic() - _LONGEST_START_S
+        starting = sum(
+            ticket.is_starting and began_s > since_s for ticket, began_s in self._running.items()
+        )
+        if self._alone or running >= self.most or starting >= self._starts:
             return False
         if running < self._always:
             return True
         return self._load.runnable() < self._busy and self._load.free_memory() > _FREE_MEMORY
 
-    def _starting(self) -> int:
-        since_s = time.monotonic() - _LONGEST_START_S
-        return sum(
-            ticket.is_starting and began_s > since_s for ticket, began_s in self._running.items()
-        )
-
-    def _note_started(self) -> None:
-        with self._lock:
-            self._call_next()
-
 
 class Ticket:
     """The place of one cell."""
 
-    def __init__(self, admission: Admission, called: threading.Condition) -> None:
-        """Made by :meth:`Admission.cell` only."""
+    def __init__(self, admission: Admission) -> None:
         self._admission = admission
-        self.called = called
         self.is_starting = True
 
     def started(self) -> None:
         """The cell has started: another one may."""
         if self.is_starting:
             self.is_starting = False
-            self._admission._note_started()
-
-
-def _with_descriptors(cells: int) -> int:
-    """Get descriptors for so many cells; how many cells there are enough for."""
-    wanted = _FILES_PER_CELL * cells + _OTHER_FILES
-    soft = raise_open_files(wanted)
-    if soft == resource.RLIM_INFINITY or soft >= wanted:
-        return cells
-    return max(1, (soft - _OTHER_FILES) // _FILES_PER_CELL)
+            with self._admission.changed:
+                self._admission.changed.notify_all()

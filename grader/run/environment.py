@@ -48,11 +48,7 @@ def cell_environment(ros: RosInstallation, *, sandboxed: bool = False) -> dict[s
 
 
 def student_environment(ros: RosInstallation, install: Path, scratch: Path) -> dict[str, str]:
-    """Variables of a student's process: ROS, the packages handed in, and the tracer.
-
-    Args:
-        scratch: Home, working and temporary folder; exists.
-    """
+    """Variables of a student's process: ROS, the packages handed in, and the tracer."""
     environment = ros.environment(os.environ, (install,))
     temporary = scratch / "tmp"
     temporary.mkdir(exist_ok=True)

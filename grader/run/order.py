@@ -1,18 +1,14 @@
-"""What a cell is told to do: one scenario, without points, checks or anything else.
-
-Kept to the standard library, because a cell starts for every run.
-"""
+"""What a cell is to do: one scenario, without points, checks or anything else."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
+import pickle
 from dataclasses import dataclass, field
 from typing import Any
 
 from grader.run.process.process_sandbox import ProcessSandbox
 
-ORDER_FILE = "order.json"
+ORDER_FILE = "order.pickle"
 RECORDING_FILE = "recording.mcap"
 GO = b"go\n"
 """What a cell that is ready waits for on its standard input."""
@@ -20,12 +16,7 @@ GO = b"go\n"
 
 @dataclass(frozen=True)
 class ProcessCommand:
-    """A process of the student to start.
-
-    Attributes:
-        name: ``package/executable``.
-        argv: What to execute; the first entry is a path.
-    """
+    """A process of the student to start; its name is ``package/executable``."""
 
     name: str
     argv: tuple[str, ...]
@@ -48,8 +39,7 @@ class RunLimits:
     """Bounds of one run; times in seconds.
 
     Attributes:
-        settle_s: From the newest change of the student's graph until we stop to expect a
-            matching endpoint.
+        settle_s: How long after the graph's newest change a matching endpoint is still expected.
     """
 
     discovery_s: float
@@ -74,19 +64,10 @@ class Until:
     stimuli_done: bool = False
     any: tuple[Until, ...] = ()
 
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Until:
-        """Read what :func:`dataclasses.asdict` made."""
-        return cls(**{**data, "any": tuple(cls.from_dict(item) for item in data["any"])})
-
 
 @dataclass(frozen=True)
 class SimulatorOrder:
-    """The simulated robot of a scenario.
-
-    Attributes:
-        values: What stands for ``$name`` in it.
-    """
+    """The simulated robot of a scenario; ``values`` stand for ``$name`` in its world."""
 
     world: str
     values: dict[str, str]
@@ -123,25 +104,13 @@ class CellOrder:
     process_sandbox: ProcessSandbox | None = None
     tells_output: bool = False
 
-    def to_json(self) -> str:
-        """As one line."""
-        return json.dumps(dataclasses.asdict(self))
+    def to_bytes(self) -> bytes:
+        """For the cell's folder; written before anything of a student's runs in the cell."""
+        return pickle.dumps(self)
 
     @classmethod
-    def from_json(cls, text: str) -> CellOrder:
-        """Read what :meth:`to_json` wrote."""
-        data = json.loads(text)
-        data["commands"] = tuple(
-            ProcessCommand(item["name"], tuple(item["argv"])) for item in data["commands"]
-        )
-        data["topics"] = tuple(Topic(**item) for item in data["topics"])
-        data["stimuli"] = tuple(data["stimuli"])
-        data["until"] = Until.from_dict(data["until"])
-        if data["simulator"] is not None:
-            data["simulator"] = SimulatorOrder(**data["simulator"])
-        data["limits"] = RunLimits(**data["limits"])
-        data["prefixes"] = tuple(data["prefixes"])
-        data["type_support"] = tuple(data["type_support"])
-        if data["process_sandbox"] is not None:
-            data["process_sandbox"] = ProcessSandbox.from_dict(data["process_sandbox"])
-        return cls(**data)
+    def from_bytes(cls, data: bytes) -> CellOrder:
+        """Read what :meth:`to_bytes` wrote; never call it with what a student could write."""
+        order = pickle.loads(data)
+        assert isinstance(order, cls)
+        return order

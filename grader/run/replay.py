@@ -6,13 +6,12 @@ judged. The player is a process of its own, as a cell is.
 
 from __future__ import annotations
 
-import dataclasses
-import json
+import pickle
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from grader.errors import UsageError
 from grader.recording.mcap_reader import read_inputs
@@ -20,13 +19,13 @@ from grader.recording.model import NS, Kind, Owner, Qos, Recording
 from grader.ros import RosInstallation
 from grader.run.environment import cell_environment, student_environment
 from grader.run.order import ProcessCommand
-from grader.run.runner import Runner
+from grader.run.runner import process_command
 from grader.scratch import Scratch
 
 if TYPE_CHECKING:
     from grader.assignment.model import Assignment
 
-ORDER_FILE = "replay.json"
+ORDER_FILE = "replay.pickle"
 _ENDING_LIMIT_S = 20.0
 _DEFAULT = Qos("reliable", "volatile")
 
@@ -58,21 +57,6 @@ class ReplayOrder:
     discovery_s: float
     shutdown_s: float
 
-    def to_json(self) -> str:
-        """Write it for the player."""
-        return json.dumps(dataclasses.asdict(self))
-
-    @classmethod
-    def from_json(cls, text: str) -> ReplayOrder:
-        """Read what :meth:`to_json` wrote."""
-        data: dict[str, Any] = json.loads(text)
-        data["commands"] = tuple(
-            ProcessCommand(item["name"], tuple(item["argv"])) for item in data["commands"]
-        )
-        data["inputs"] = tuple(Input(**item) for item in data["inputs"])
-        data["type_support"] = tuple(data["type_support"])
-        return cls(**data)
-
 
 def make_order(
     file: Path,
@@ -83,11 +67,7 @@ def make_order(
     scratch: Path,
     type_support: Sequence[Path] = (),
 ) -> ReplayOrder:
-    """Say what to replay.
-
-    Raises:
-        UsageError: The assignment has no such scenario, or nothing was given to the node.
-    """
+    """What to replay."""
     scenario = next((s for s in assignment.scenarios if s.id == recording.scenario), None)
     if scenario is None:
         raise UsageError(
@@ -99,12 +79,11 @@ def make_order(
             f"{file}: nothing was published to the node in this run, so there is nothing to "
             "replay: run it with `ros2 run`"
         )
-    runner = Runner(ros)
     began_ns = recording.matched_ns or recording.launched_ns
     return ReplayOrder(
         recording=str(file.resolve()),
         commands=tuple(
-            runner.command(launch, assignment.packages[0].name, install, dict(recording.values))
+            process_command(ros, launch, assignment, install, dict(recording.values))
             for launch in scenario.launch
         ),
         environment=student_environment(ros, install, scratch),
@@ -131,11 +110,11 @@ def play(order: ReplayOrder, ros: RosInstallation) -> int:
         was interrupted; nothing of it runs any more.
     """
     with Scratch("replay") as folder:
-        (folder / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
+        (folder / ORDER_FILE).write_bytes(pickle.dumps(order))
         player = subprocess.Popen(
             [str(ros.python), "-m", "grader.run.replay_player", str(folder)],
             env=cell_environment(ros),
-            # Its end tells the player that nobody waits any more; so does Ctrl-C, in here.
+            # Its end tells the player to end; so does Ctrl-C, in here.
             stdin=subprocess.PIPE,
             start_new_session=True,
         )

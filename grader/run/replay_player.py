@@ -8,9 +8,9 @@ does.
 from __future__ import annotations
 
 import os
+import pickle
 import select
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import rclpy
 from rclpy.context import Context
@@ -27,11 +27,15 @@ from rclpy.node import Node
 
 from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.mcap_writer import RawMessage
-from grader.recording.model import NS
+from grader.recording.model import NS, LogLine
 from grader.run.cell.domain import lock_domain
 from grader.run.cell.probe import import_interface, qos_profile
 from grader.run.cell.type_support import add_type_support
-from grader.run.process.descendants import become_subreaper, kill_descendants
+from grader.run.host.disturbance import DisturbanceMeter
+from grader.run.order import RunLimits
+from grader.run.process.descendants import become_subreaper
+from grader.run.process.output import OutputReader
+from grader.run.process.student import StudentProcesses
 from grader.run.replay import ORDER_FILE, ReplayOrder
 from grader.run.stimuli.filling import plain
 from grader.safe_text import clean, one_line
@@ -41,42 +45,14 @@ _TICK_S = 0.01
 _DEPTH = 1000
 _MOST_SHOWN = 10
 """Messages of a topic within a second; a burst is worth reading, a stream is not."""
-_TERMINATE_S = 2.0
+_KEPT_BYTES = 4096
+_PIPES_LIMIT_S = 5.0
 # The observation may have ended with the very answer to the last input.
 _AFTERMATH_S = 0.5
 
 
 class Ended(Exception):
-    """Nobody waits any more, or every process has ended; ``status`` is the exit code."""
-
-    def __init__(self, status: int) -> None:
-        """Keep the exit code."""
-        super().__init__(status)
-        self.status = status
-
-
-class Printer:
-    """Lines with the time since the recording's clock started; safe to use from threads."""
-
-    def __init__(self) -> None:
-        """Before the clock starts, lines have no time."""
-        self._lock = threading.Lock()
-        self._began_s: float | None = None
-
-    def start(self) -> None:
-        """Start the clock."""
-        self._began_s = time.monotonic()
-
-    @property
-    def elapsed_s(self) -> float:
-        """Time since the start, in seconds; 0 before."""
-        return 0.0 if self._began_s is None else time.monotonic() - self._began_s
-
-    def say(self, who: str, text: str) -> None:
-        """Print a line."""
-        at = "" if self._began_s is None else f"{self.elapsed_s:.3f} s"
-        with self._lock:
-            print(f"{at:>10}  {who}  {text}", flush=True)
+    """The replay is interrupted, or every process has ended; its argument is the exit code."""
 
 
 @dataclass
@@ -93,23 +69,24 @@ class Player:
     """Gives the inputs and prints the rest."""
 
     def __init__(self, order: ReplayOrder, domain_id: int) -> None:
-        """Join the graph."""
         self._order = order
         self._domain_id = domain_id
-        self._printer = Printer()
-        self._context = Context()
-        rclpy.init(args=[], context=self._context, domain_id=domain_id)
+        self._printing = threading.Lock()
+        self._began_s: float | None = None
+        self._output = OutputReader(_KEPT_BYTES, self._say_line)
+        self._students = StudentProcesses(self._output)
+        context = Context()
+        rclpy.init(args=[], context=context, domain_id=domain_id)
         self._node = Node(
             NAME,
-            context=self._context,
+            context=context,
             start_parameter_services=False,
             enable_rosout=False,
             use_global_arguments=False,
         )
-        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self._node)
         self._heard: dict[str, Heard] = {}
-        self._processes: list[subprocess.Popen[bytes]] = []
         self._publishers = {
             one.topic: self._node.create_publisher(
                 import_interface(one.type),
@@ -124,141 +101,111 @@ class Player:
 
     def play(self, messages: tuple[RawMessage, ...]) -> int:
         """Launch, give everything, stop."""
-        early = [m for m in messages if self._is_early(m)]
+        # Published before the launch, for a subscription that comes later.
+        early = [
+            message
+            for message in messages
+            if message.topic in self._latched and message.stamp_ns < self._order.launched_ns
+        ]
         for message in early:
             self._publishers[message.topic].publish(message.cdr)
-        self._launch()
+        status = 0
         try:
+            self._launch()
             self._await_listener()
-            self._printer.start()
+            self._began_s = time.monotonic()
             for message in messages:
                 if message not in early:
                     self._wait_until((message.stamp_ns - self._order.matched_ns) / NS)
                     self._publishers[message.topic].publish(message.cdr)
             self._wait_until(self._order.duration_s + _AFTERMATH_S)
-            status = 0
         except Ended as end:
-            status = end.status
-        self._stop()
+            status = end.args[0]
+        limits = RunLimits(self._order.discovery_s, 0.0, self._order.shutdown_s)
+        self._students.stop(limits, DisturbanceMeter(tuple))
+        self._students.clean_up()
+        self._output.close(_PIPES_LIMIT_S)
+        for process in self._students.records():
+            if process.stopped_by in ("SIGTERM", "SIGKILL"):
+                self._say("rosgrade", f"{process.name} ended only after {process.stopped_by}")
         for topic, heard in sorted(self._heard.items()):
             if heard.shown < heard.count:
-                self._tell(topic, heard)
-            self._printer.say("rosgrade", f"{heard.count} messages on {topic}")
+                self._show(topic, heard)
+            self._say("rosgrade", f"{heard.count} messages on {topic}")
         return status
 
-    def _is_early(self, message: RawMessage) -> bool:
-        """Published before the launch, for whoever comes late."""
-        return message.topic in self._latched and message.stamp_ns < self._order.launched_ns
+    @property
+    def _elapsed_s(self) -> float:
+        return 0.0 if self._began_s is None else time.monotonic() - self._began_s
+
+    def _say(self, source: str, text: str) -> None:
+        """Print a line, with the time of the recording's clock once that runs."""
+        at = "" if self._began_s is None else f"{self._elapsed_s:.3f} s"
+        with self._printing:
+            print(f"{at:>10}  {source}  {text}", flush=True)
+
+    def _say_line(self, line: LogLine) -> None:
+        self._say(line.process.rpartition("/")[2], clean(line.text))
 
     def _listen(self, topic: str, interface: str) -> None:
-        self._heard[topic] = Heard()
+        heard = self._heard[topic] = Heard()
         try:
             kind = import_interface(interface)
         except ImportError:
-            self._printer.say("rosgrade", f"{topic} is not shown: no {interface} here")
+            self._say("rosgrade", f"{topic} is not shown: no {interface} here")
             return
 
-        def show(message: Any) -> None:
-            self._show(topic, message)
+        def take(message: Any) -> None:
+            heard.count += 1
+            heard.last = message
+            now = time.monotonic()
+            if len(heard.shown_s) < _MOST_SHOWN or now - heard.shown_s[0] > 1.0:
+                heard.shown_s.append(now)
+                self._show(topic, heard)
 
         # The weakest request, which every publisher meets.
-        self._node.create_subscription(
-            kind, topic, show, qos_profile("best_effort", "volatile", _DEPTH)
-        )
+        profile = qos_profile("best_effort", "volatile", _DEPTH)
+        self._node.create_subscription(kind, topic, take, profile)
 
-    def _show(self, topic: str, message: Any) -> None:
-        heard = self._heard[topic]
-        heard.count += 1
-        heard.last = message
-        now = time.monotonic()
-        if len(heard.shown_s) < _MOST_SHOWN or now - heard.shown_s[0] > 1.0:
-            heard.shown_s.append(now)
-            self._tell(topic, heard)
-
-    def _tell(self, topic: str, heard: Heard) -> None:
+    def _show(self, topic: str, heard: Heard) -> None:
         left_out = heard.count - heard.shown - 1
         more = f"   ({left_out} more before it)" if left_out else ""
         heard.shown = heard.count
-        self._printer.say(topic, f"{_written(plain(heard.last))}{more}")
+        self._say(topic, f"{_written(plain(heard.last))}{more}")
 
     def _launch(self) -> None:
-        environment = {**self._order.environment, "ROS_DOMAIN_ID": str(self._domain_id)}
-        for command in self._order.commands:
-            self._printer.say("rosgrade", f"starting {command.name} on domain {self._domain_id}")
-            process = subprocess.Popen(
-                command.argv,
-                cwd=self._order.scratch,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
-            self._processes.append(process)
-            assert process.stdout is not None
-            name = command.name.rpartition("/")[2]
-            threading.Thread(target=self._pump, args=(name, process.stdout), daemon=True).start()
-
-    def _pump(self, name: str, pipe: IO[bytes]) -> None:
-        for line in pipe:
-            self._printer.say(name, clean(line.decode(errors="replace").rstrip("\n")))
+        order = self._order
+        of_run = {"ROS_DOMAIN_ID": str(self._domain_id)}
+        for command in order.commands:
+            self._say("rosgrade", f"starting {command.name} on domain {self._domain_id}")
+            scratch = Path(order.scratch)
+            self._students.launch(command.name, command.argv, order.environment, of_run, scratch)
+        # A process that ends need not wait until the graph was seen.
+        self._students.let_exit()
 
     def _await_listener(self) -> None:
-        """Wait until the node listens to anything that is given.
-
-        Raises:
-            Ended: It does not within the discovery limit, or it has ended.
-        """
         deadline = time.monotonic() + self._order.discovery_s
         while not any(p.get_subscription_count() for p in self._publishers.values()):
             if time.monotonic() > deadline:
                 topics = ", ".join(self._publishers)
-                self._printer.say(
-                    "rosgrade",
-                    f"nothing subscribed to {topics} within {self._order.discovery_s:g} s",
-                )
+                within = f"within {self._order.discovery_s:g} s"
+                self._say("rosgrade", f"nothing subscribed to {topics} {within}")
                 raise Ended(1)
-            self._tick()
+            self._tick(_TICK_S)
 
     def _wait_until(self, time_s: float) -> None:
-        """Handle what comes until a time of the recording's clock.
-
-        Raises:
-            Ended: Nobody waits any more, or the node has ended.
-        """
-        while (left_s := time_s - self._printer.elapsed_s) > 0:
+        while (left_s := time_s - self._elapsed_s) > 0:
             self._tick(min(left_s, _TICK_S))
 
-    def _tick(self, limit_s: float = _TICK_S) -> None:
+    def _tick(self, limit_s: float) -> None:
         self._executor.spin_once(timeout_sec=limit_s)
         readable, _, _ = select.select([0], [], [], 0)
         if readable and not os.read(0, 1):
             raise Ended(130)
-        if all(process.poll() is not None for process in self._processes):
-            codes = ", ".join(str(process.returncode) for process in self._processes)
-            self._printer.say("rosgrade", f"the node has ended by itself (exit code {codes})")
+        if not self._students.poll():
+            codes = ", ".join(str(process.exit_code) for process in self._students.records())
+            self._say("rosgrade", f"the node has ended by itself (exit code {codes})")
             raise Ended(1)
-
-    def _stop(self) -> None:
-        """SIGINT, SIGTERM, SIGKILL, each with a bounded wait."""
-        for number, limit_s in (
-            (signal.SIGINT, self._order.shutdown_s),
-            (signal.SIGTERM, _TERMINATE_S),
-            (signal.SIGKILL, _TERMINATE_S),
-        ):
-            running = [process for process in self._processes if process.poll() is None]
-            if not running:
-                break
-            for process in running:
-                os.killpg(process.pid, number)
-            deadline = time.monotonic() + limit_s
-            for process in running:
-                try:
-                    process.wait(max(0.0, deadline - time.monotonic()))
-                except subprocess.TimeoutExpired:
-                    after = f"still runs {limit_s:g} s after {number.name}"
-                    self._printer.say("rosgrade", after)
-        kill_descendants(os.getpid())
 
 
 def _written(value: Any) -> str:
@@ -276,7 +223,7 @@ def main(folder: Path) -> int:
     # Ctrl-C reaches rosgrade, which tells us by the end of our standard input. Were it ignored
     # and not handled, the node would inherit that.
     signal.signal(signal.SIGINT, lambda _number, _frame: None)
-    order = ReplayOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
+    order: ReplayOrder = pickle.loads((folder / ORDER_FILE).read_bytes())
     add_type_support(Path(prefix) for prefix in order.type_support)
     file = Path(order.recording)
     messages = read_inputs(file, read_recording(file))

@@ -11,11 +11,11 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
 from grader.recording.fact import to_json
+from grader.recording.interface import definition_finder
 from grader.recording.mcap_writer import write_recording
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
@@ -26,7 +26,6 @@ from grader.run.environment import RMW, student_environment
 from grader.run.host.load import cpu_count
 from grader.run.order import CellOrder, ProcessCommand, RunLimits, SimulatorOrder, Topic, Until
 from grader.run.sandboxed_order import sandboxed
-from grader.run.stimulus_orders import stimulus_orders
 from grader.sandbox.python_tree import unlisted
 from grader.submission.record import SubmissionRecord
 
@@ -42,21 +41,24 @@ Progress = Callable[[str, Mapping[str, Any]], None]
 
 
 def scenario_seed(assignment: str, scenario: str, submission_sha256: str, base: int | None) -> int:
-    """Seed of a scenario: of the submission's own, so that nobody can write for known numbers.
+    """Seed of a scenario, in [0, 2**63): of the submission's own, so that no number is known.
 
     Args:
         base: A seed that the caller gave; replaces the submission.
-
-    Returns:
-        A number in [0, 2**63).
     """
     origin = submission_sha256 if base is None else str(base)
     digest = hashlib.sha256(f"{assignment}/{scenario}/{origin}".encode()).digest()
     return int.from_bytes(digest[:8], "big") >> 1
 
 
-def ros_arguments(launch: Launch, values: dict[str, float]) -> tuple[str, ...]:
-    """Command line arguments of a launch, as ``ros2 run`` passes them on."""
+def ros_arguments(
+    launch: Launch, values: dict[str, float], topics: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Command line arguments of a launch, as ``ros2 run`` passes them on.
+
+    Args:
+        topics: Rules that put wrong names of topics right, besides those of the launch.
+    """
     from grader.assignment.random_values import fill_in
 
     rules: list[str] = []
@@ -64,7 +66,7 @@ def ros_arguments(launch: Launch, values: dict[str, float]) -> tuple[str, ...]:
         rules += ["-r", f"__node:={launch.name}"]
     if launch.namespace:
         rules += ["-r", f"__ns:={launch.namespace}"]
-    for old, new in launch.remap.items():
+    for old, new in {**launch.remap, **topics}.items():
         rules += ["-r", f"{old}:={new}"]
     for name, value in launch.parameters.items():
         # The value is YAML to rcl, and JSON is YAML.
@@ -74,11 +76,7 @@ def ros_arguments(launch: Launch, values: dict[str, float]) -> tuple[str, ...]:
 
 
 def launch_file_program(ros: RosInstallation, package: str, file: str) -> tuple[str, ...]:
-    """What starts a launch file, as `ros2 launch` does.
-
-    Raises:
-        GraderFault: This ROS has no `ros2 launch`.
-    """
+    """What starts a launch file, as `ros2 launch` does."""
     for prefix in ros.prefixes:
         ros2 = prefix / "bin" / "ros2"
         if ros2.is_file() and "ros2launch" in ros.packages:
@@ -89,29 +87,64 @@ def launch_file_program(ros: RosInstallation, package: str, file: str) -> tuple[
     )
 
 
+def process_command(
+    ros: RosInstallation,
+    launch: Launch,
+    assignment: Assignment,
+    install: Path,
+    values: dict[str, float],
+    remaps: Sequence[str] = (),
+) -> ProcessCommand:
+    """What to execute for a launch.
+
+    Args:
+        remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right; of a file of
+            the install space, without a slash in front.
+    """
+    rules = [rule.split(":=") for rule in remaps]
+    topics = {old: new for old, new in rules if old.startswith("/")}
+    files = {new: old for old, new in rules if not old.startswith("/")}
+    package = launch.package or assignment.packages[0].name
+    if launch.executable is None:
+        program = launch_file_program(ros, package, launch.program)
+    else:
+        place = f"lib/{package}/{launch.executable}"
+        program = _program(ros, install / files.get(place, place))
+    arguments = ros_arguments(launch, values, topics)
+    return ProcessCommand(name=f"{package}/{launch.program}", argv=(*program, *arguments))
+
+
+def _program(ros: RosInstallation, file: Path) -> tuple[str, ...]:
+    """What `ros2 run` would execute.
+
+    A Python script is given to the interpreter by name, because its first line cannot hold a path
+    with a space in it.
+    """
+    try:
+        with file.open("rb") as stream:
+            first = stream.readline(256)
+    except OSError:
+        first = b""
+    is_python = first.startswith(b"#!") and b"python" in first
+    return (str(ros.python), str(file)) if is_python else (str(file),)
+
+
 def _topics(scenario: Scenario) -> tuple[Topic, ...]:
     """What is recorded: the author's topics, and those of the simulated robot."""
     found = {
-        topic.topic: Topic(
-            topic.topic, topic.type, topic.reliability, topic.durability, topic.depth
-        )
-        for topic in scenario.record
+        one.topic: Topic(one.topic, one.type, one.reliability, one.durability, one.depth)
+        for one in scenario.record
     }
-    if scenario.world is not None:
-        command = scenario.topics.command
-        found.setdefault(
-            command.topic, Topic(command.topic, command.type, "reliable", "volatile", 100)
-        )
-        for options in (scenario.topics.odometry, scenario.topics.scan):
-            if options.topic in scenario.recorded_types:
-                found[options.topic] = Topic(
-                    options.topic,
-                    scenario.recorded_types[options.topic],
-                    options.reliability,
-                    options.durability,
-                    100,
-                    ours=True,
-                )
+    if scenario.world is None:
+        return tuple(found.values())
+    command = scenario.topics.command
+    found.setdefault(command.topic, Topic(command.topic, command.type, "reliable", "volatile", 100))
+    for options in (scenario.topics.odometry, scenario.topics.scan):
+        name = options.topic
+        if name in scenario.recorded_types:
+            type = scenario.recorded_types[name]
+            qos = (options.reliability, options.durability, 100)
+            found[name] = Topic(name, type, *qos, ours=True)
     return tuple(found.values())
 
 
@@ -149,10 +182,30 @@ def _simulator(
     )
 
 
-def _imports(scenario: Scenario) -> list[str]:
-    """What the cell of a scenario imports: interfaces and modules."""
-    simulator = {SIMULATOR_MODULE} if scenario.world is not None else set()
-    return sorted({*scenario.recorded_types.values(), *simulator})
+def _stimuli(
+    scenario: Scenario,
+    commands: Sequence[ProcessCommand],
+    folder: Path,
+    prefixes: Sequence[str],
+    seed: int,
+    drawn: Mapping[str, float],
+) -> tuple[dict[str, Any], ...]:
+    """Make the orders."""
+    from grader.assignment.stimuli.message import StimulusError
+    from grader.assignment.stimuli.stimulus_model import Making
+
+    find = definition_finder(Path(prefix) for prefix in prefixes)
+    making = Making(folder, find, seed, drawn, [command.name for command in commands])
+    found = []
+    for item in scenario.stimuli:
+        what = f"the stimulus {item.key!r}" + (f" on {item.exchanged[0]}" if item.exchanged else "")
+        try:
+            found.append(item.order(making))
+        except StimulusError as error:
+            raise GraderFault(f"{what}: {error}") from error
+        except KeyError as error:
+            raise GraderFault(f"{what}: no definition of {error.args[0]} was found") from error
+    return tuple(found)
 
 
 @dataclass
@@ -161,6 +214,8 @@ class Runner:
 
     Attributes:
         sandbox: What cells and students run in, or None.
+        verbose: Tell what the student's processes print, as progress.
+        cpu_s: CPU time of all cells so far.
     """
 
     ros: RosInstallation
@@ -205,21 +260,21 @@ class Runner:
         Args:
             install: The submission's install space (merged layout).
             worlds: Folder that world files are relative to.
-            remaps: Rules such as ``/cmdvel:=/cmd_vel`` that put wrong names right; of a file of
-                the install space, without a slash in front.
+            remaps: As of :func:`process_command`.
 
         Raises:
             GraderFault: The cell failed, through no fault of the student's.
         """
+        ros = replace(self.ros, underlays=underlays or self.ros.underlays)
         with self.admission.cell(alone=alone) as ticket:
             cell = self._take_cell(scenario)
             try:
                 order = self._order(
+                    ros,
                     assignment,
                     scenario,
                     submission,
                     install,
-                    underlays,
                     type_support,
                     cell.folder,
                     seed,
@@ -234,19 +289,20 @@ class Runner:
                             ticket.started()
                         self.progress(scenario.id, event)
                 except MiddlewareHung:
-                    stalled = hung_recording(order, submission, launched_ns)
-                    write_recording(recording, stalled, (), {})
+                    hung = hung_recording(order, submission, launched_ns)
+                    write_recording(recording, hung, (), {})
                 else:
                     shutil.move(cell.recording, recording)
             finally:
-                self._give_back(cell)
+                cell.close()
+                with self._lock:
+                    self._cells.discard(cell)
+                    self.cpu_s += cell.cpu_s
 
     def __enter__(self) -> Runner:
-        """For ``with``."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave nothing running."""
         self.close()
 
     def close(self) -> None:
@@ -258,8 +314,8 @@ class Runner:
                 cell.abandon()
         for cell in ready:
             cell.close()
-        for prefork_server in (*self._retired, *filter(None, (self._server,))):
-            prefork_server.close()
+        for server in (*self._retired, *filter(None, (self._server,))):
+            server.close()
 
     def successor(self) -> Runner:
         """End every cell, and hand what is warm on to a runner that begins anew.
@@ -268,48 +324,45 @@ class Runner:
         """
         with self._lock:
             self._aborted = True
-            prefork_server, self._server = self._server, None
+            server, self._server = self._server, None
         self.close()
         return replace(
             self,
             _ready=[],
             _cells=set(),
             _lock=threading.Lock(),
-            _server=prefork_server,
+            _server=server,
             _retired=[],
             _aborted=False,
         )
 
     def _take_cell(self, scenario: Scenario) -> CellProcess:
+        imports = {*scenario.recorded_types.values()}
+        if scenario.world is not None:
+            imports.add(SIMULATOR_MODULE)
         with self._lock:
             if self._aborted:
                 raise GraderFault("interrupted")
-            cell = self._ready.pop() if self._ready else self._new_cell(_imports(scenario))
+            cell = self._ready.pop() if self._ready else self._new_cell(sorted(imports))
             self._cells.add(cell)
         return cell
 
     def _new_cell(self, imports: Sequence[str]) -> CellProcess:
         if self._server is not None and not self._server.is_alive:
-            # Its cells may still run and need their folders, and nobody may wait for them here.
+            # Its cells may still run and need their folders; to wait for them here would take long.
             self._retired.append(self._server)
             self._server = None
         if self._server is None:
             self._server = PreforkServer(self.ros, self.sandbox)
         return CellProcess(self._server, imports)
 
-    def _give_back(self, cell: CellProcess) -> None:
-        cell.close()
-        with self._lock:
-            self._cells.discard(cell)
-            self.cpu_s += cell.cpu_s
-
     def _order(
         self,
+        ros: RosInstallation,
         assignment: Assignment,
         scenario: Scenario,
         submission: SubmissionRecord,
         install: Path,
-        underlays: tuple[Path, ...],
         type_support: tuple[Path, ...],
         folder: Path,
         seed: int,
@@ -321,18 +374,8 @@ class Runner:
         scratch = folder / SCRATCH
         scratch.mkdir()
         values = draw_values(scenario, seed)
-        ros = replace(self.ros, underlays=underlays or self.ros.underlays)
-        rules = [rule.split(":=") for rule in remaps]
-        topics = {old: new for old, new in rules if old.startswith("/")}
-        files = {new: install / old for old, new in rules if not old.startswith("/")}
         commands = tuple(
-            self.command(
-                launch.model_copy(update={"remap": {**launch.remap, **topics}}),
-                assignment.packages[0].name,
-                install,
-                values,
-                files,
-            )
+            process_command(self.ros, launch, assignment, install, values, remaps)
             for launch in scenario.launch
         )
         imported = {item.module for package in submission.packages for item in package.ros_imports}
@@ -345,13 +388,9 @@ class Runner:
             environment=student_environment(ros, install, scratch),
             prefixes=tuple(map(str, (*type_support, install, *ros.underlays, *ros.prefixes))),
             topics=_topics(scenario),
-            stimuli=stimulus_orders(scenario, commands, worlds, definitions, seed, values),
+            stimuli=_stimuli(scenario, commands, worlds, definitions, seed, values),
             until=_until(scenario.until),
-            limits=RunLimits(
-                discovery_s=scenario.discovery,
-                timeout_s=scenario.timeout,
-                shutdown_s=scenario.shutdown,
-            ),
+            limits=RunLimits(scenario.discovery, scenario.timeout, scenario.shutdown),
             scratch=str(scratch),
             submission=to_json(submission).decode(),
             simulator=_simulator(scenario, worlds, values, seed),
@@ -375,43 +414,5 @@ class Runner:
             modules = unlisted(submission.foreign_imports, assignment.libraries)
             return replace(order, facts={**order.facts, "unlisted": " ".join(modules)})
         limits = (scenario.limits or assignment.limits).limits()
-        limits.check_allowed()
         sandbox = self.sandbox.allowing(assignment.libraries)
         return sandboxed(order, folder, sandbox, ros, install, limits)
-
-    def command(
-        self,
-        launch: Launch,
-        default_package: str,
-        install: Path,
-        values: dict[str, float],
-        files: Mapping[str, Path] = MappingProxyType({}),
-    ) -> ProcessCommand:
-        """What to execute for a launch.
-
-        Args:
-            default_package: Its package, where it names none.
-        """
-        package = launch.package or default_package
-        if launch.executable is None:
-            program = launch_file_program(self.ros, package, launch.program)
-        else:
-            place = f"lib/{package}/{launch.executable}"
-            program = self._program(files.get(place, install / place))
-        return ProcessCommand(
-            name=f"{package}/{launch.program}", argv=(*program, *ros_arguments(launch, values))
-        )
-
-    def _program(self, file: Path) -> tuple[str, ...]:
-        """What `ros2 run` would execute.
-
-        A Python script is given to the interpreter by name, because its first line cannot
-        hold a path with a space in it.
-        """
-        try:
-            with file.open("rb") as stream:
-                first = stream.readline(256)
-        except OSError:
-            first = b""
-        is_python = first.startswith(b"#!") and b"python" in first
-        return (str(self.ros.python), str(file)) if is_python else (str(file),)

@@ -21,6 +21,7 @@ from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.limits import SandboxLimits
 from grader.sandbox.namespaces import CELL, STUDENT
 from grader.sandbox.sandbox import TREES, Sandbox, hide
+from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
 
 _UID = 1000
 _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
@@ -38,31 +39,32 @@ def sandboxed(
     limits: SandboxLimits,
 ) -> CellOrder:
     """Make an order for a sandbox, and copy into the cell's folder what it needs."""
-    support = [Path(path) for path in order.type_support]
-    copies = _copy([install, *ros.underlays, *support], folder)
-    for_student = {
-        path: place for path, place in copies.items() if path == install or path in ros.underlays
-    }
-    shutil.copyfile(sandbox.filter_file, folder / _FILTER)
-    shutil.copyfile(sandbox.guard_file, folder / _GUARD)
-    shutil.copyfile(sandbox.unheard_file, folder / _UNHEARD)
+    shown = [install, *ros.underlays]
+    in_cell: dict[str, str] = {}
+    seen: dict[str, str] = {}
+    for number, path in enumerate(dict.fromkeys([*shown, *map(Path, order.type_support)])):
+        place = f"install{number or ''}"
+        shutil.copytree(path, folder / place, symlinks=True)
+        in_cell[str(path)] = str(CELL / place)
+        if path in shown:
+            seen[str(path)] = f"{WORKSPACE}/{place}"
+    for program, name in (
+        (student_filter(guarded=True), _FILTER),
+        (guard_filter(), _GUARD),
+        (guard_filter(heard=False), _UNHEARD),
+    ):
+        shutil.copyfile(sandbox.filter_file(program), folder / name)
     (folder / _PASSWD_FILE).write_text(_PASSWD, encoding="utf-8")
     bubblewrap.copy_system_files(folder / _SYSTEM)
-    in_cell = {str(path): str(CELL / place) for path, place in copies.items()}
-    seen = {str(path): f"{WORKSPACE}/{place}" for path, place in for_student.items()}
-    binds = [
-        *(Bind(CELL / place, Path(WORKSPACE, place)) for place in for_student.values()),
-        Bind.same(TRACER_IN_SANDBOX),
-    ]
+    binds = [Bind(Path(in_cell[outside]), Path(inside)) for outside, inside in seen.items()]
+    binds.append(Bind.same(TRACER_IN_SANDBOX))
     simulator = order.simulator
     if simulator is not None:
         shutil.copyfile(simulator.world, folder / _WORLD)
         simulator = replace(simulator, world=str(CELL / _WORLD))
     return replace(
         order,
-        commands=tuple(
-            replace(command, argv=_moved(command.argv, seen)) for command in order.commands
-        ),
+        commands=tuple(replace(one, argv=_moved(one.argv, seen)) for one in order.commands),
         environment=sandboxed_environment(
             order.environment, {**seen, str(TRACER): str(TRACER_IN_SANDBOX)}
         ),
@@ -75,7 +77,7 @@ def sandboxed(
             filter=str(CELL / _FILTER),
             guard=str(CELL / _GUARD),
             unheard=str(CELL / _UNHEARD),
-            calls=sandbox.guarded_calls,
+            calls=guarded_calls(),
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},
         ),
@@ -108,23 +110,11 @@ def _arguments(sandbox: Sandbox, ros: RosInstallation, binds: Sequence[Bind]) ->
     ]
 
 
-def _copy(folders: Iterable[Path], into: Path) -> dict[Path, str]:
-    """Copy folders; where each one is, relative to the cell's folder."""
-    places: dict[Path, str] = {}
-    for path in folders:
-        if path not in places:
-            places[path] = f"install{len(places) or ''}"
-            shutil.copytree(path, into / places[path], symlinks=True)
-    return places
-
-
 def _moved(paths: Iterable[str], places: dict[str, str]) -> tuple[str, ...]:
-    """Replace the beginnings of paths."""
-    return tuple(_moved_path(path, places) for path in paths)
-
-
-def _moved_path(path: str, places: dict[str, str]) -> str:
-    for outside, inside in places.items():
-        if path == outside or path.startswith(f"{outside}/"):
-            return inside + path[len(outside) :]
-    return path
+    moved = list(paths)
+    for number, path in enumerate(moved):
+        for outside, inside in places.items():
+            if path == outside or path.startswith(f"{outside}/"):
+                moved[number] = inside + path[len(outside) :]
+                break
+    return tuple(moved)

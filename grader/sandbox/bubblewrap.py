@@ -1,9 +1,9 @@
 """Command lines of bubblewrap: what a process sees, and how little.
 
-Nothing runs bubblewrap as root: it could not mount /proc below itself, the limit of processes
+bubblewrap never runs as root: it could not mount /proc below itself, the limit of processes
 would not hold, and files that only root may read would be readable. As root the folders to show
-are bound to a place that everybody can reach, in a mount namespace of the command's own, and
-the command goes on as a user that has nothing.
+are bound to a place that every user can reach, in a mount namespace of the command's own, and
+the command goes on as a user that owns nothing.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 UID = 61_000
-"""The user that sandboxes run as where rosgrade runs as root: nobody's (systemd, UIDs-GIDs)."""
+"""The user that sandboxes run as where rosgrade runs as root; a free one (systemd, UIDs-GIDs)."""
 _BUILD_UIDS = 100
 _BUILDS = itertools.count()
 """What the kernel counts for a user (see :mod:`grader.sandbox.limits`) is each build's own."""
 PLAIN_ENVIRONMENT = {"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}
-"""Of bubblewrap itself: the sandbox's first process shows it to everybody inside."""
+"""Of bubblewrap itself: every process inside can read that of the sandbox's first process."""
 
 _STAGE = "/run/rosgrade"
 _FILTER_FD = 9
@@ -97,8 +97,8 @@ def system(copies: Path | None = None) -> list[str]:
 def copy_system_files(folder: Path) -> None:
     """Copy the files that :func:`system` shows, for a sandbox within a sandbox.
 
-    Whoever installs a package while a class is graded replaces them, and what was replaced can
-    no longer be bound from within a sandbox that has stood before.
+    A file that was replaced meanwhile, as the installation of a package does, can no longer be
+    bound from within a sandbox.
     """
     for file in _system_files():
         copy = folder / file.relative_to("/")
@@ -138,7 +138,7 @@ def launch(
     """The whole command line that starts a sandbox from outside of any.
 
     Args:
-        arguments: Of bubblewrap; what is bound by them everybody may read.
+        arguments: Of bubblewrap; what they bind every user may read.
         filter_file: Filter of system calls, or None.
     """
     program = [str(shutil.which("bwrap"))]
@@ -186,6 +186,6 @@ def take_back(path: Path) -> None:
 def _chown(path: Path, uid: int) -> None:
     for parent, folders, names in os.walk(path):
         for name in ("", *folders, *names):
-            # Somebody may empty the cache meanwhile; that is found where it matters.
+            # The cache may be emptied meanwhile; that is found where it matters.
             with contextlib.suppress(FileNotFoundError):
                 os.chown(os.path.join(parent, name), uid, uid, follow_symlinks=False)  # noqa: PTH118

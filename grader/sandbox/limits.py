@@ -5,29 +5,16 @@ from __future__ import annotations
 import resource
 from dataclasses import dataclass
 
-from grader.errors import GraderFault
-
 MIB = 2**20
 OPEN_FILES = 1024
 _OWN_SHARE = 4
 """What is on its way between processes (SCM_RIGHTS, unix(7)) counts for all that a user runs, and
-who may have more open may send more: a submission must not use up what the grader needs."""
+a process that may have more open may send more: a submission must not use up what the grader
+needs."""
+_WANTED_FILES = 8 * OPEN_FILES
 _SIGNALS = 1024
 _CPU_GRACE_S = 10
-"""Whoever counts all processes together comes first, and can say what happened."""
-
-
-_OPTIONS = {
-    "as": resource.RLIMIT_AS,
-    "data": resource.RLIMIT_DATA,
-    "nproc": resource.RLIMIT_NPROC,
-    "nofile": resource.RLIMIT_NOFILE,
-    "fsize": resource.RLIMIT_FSIZE,
-    "cpu": resource.RLIMIT_CPU,
-    "sigpending": resource.RLIMIT_SIGPENDING,
-    "core": resource.RLIMIT_CORE,
-}
-"""Of prlimit(1)."""
+"""The watchdog counts all processes together: it comes first, and says what happened."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +24,8 @@ class SandboxLimits:
     Attributes:
         open_files: Of all processes together, sockets and the like among them; the kernel holds
             each process to it, or to a quarter of what we may have open.
-        address_bytes: Address space of one process. Reserving takes nothing from anybody, and
-            every thread reserves some, so this is far more than the memory.
+        address_bytes: Address space of one process. Reserving takes no memory, and every thread
+            reserves some, so this is far more than the memory.
     """
 
     memory_bytes: int = 1024 * MIB
@@ -52,68 +39,33 @@ class SandboxLimits:
     address_bytes: int = 4096 * MIB
     output_bytes: int = 2048 * MIB
 
-    def check_allowed(self) -> None:
-        """See that the shell that started us leaves so much to untrusted code.
-
-        Raises:
-            GraderFault: It leaves less, and nothing at all could be started.
-        """
-        for what, option, unit, wanted in (
-            (resource.RLIMIT_AS, "v", 1024, self.address_bytes),
-            (resource.RLIMIT_DATA, "d", 1024, self.memory_bytes),
-            (resource.RLIMIT_NPROC, "u", 1, self.processes),
-            (resource.RLIMIT_NOFILE, "n", 1, self.open_files),
-            (resource.RLIMIT_FSIZE, "f", 1024, self.file_bytes),
-            (resource.RLIMIT_CPU, "t", 1, self.cpu_s + _CPU_GRACE_S),
-        ):
-            _, allowed = resource.getrlimit(what)
-            if allowed != resource.RLIM_INFINITY and allowed < wanted:
-                raise GraderFault(
-                    f"`ulimit -H{option}` is {allowed // unit} in the shell that grades, and in "
-                    f"the sandbox a submission may use {wanted // unit}: allow as much, or grade "
-                    "with --sandbox none"
-                )
-
-    def rlimits(self) -> dict[int, int]:
-        """What :meth:`prlimit` sets: resource -> bound, soft and hard."""
-        own_files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-        return {
-            resource.RLIMIT_AS: self.address_bytes,
-            resource.RLIMIT_DATA: self.memory_bytes,
-            resource.RLIMIT_NPROC: self.processes,
-            resource.RLIMIT_NOFILE: min(self.open_files, _share(own_files)),
-            resource.RLIMIT_FSIZE: self.file_bytes,
-            resource.RLIMIT_CPU: self.cpu_s + _CPU_GRACE_S,
-            resource.RLIMIT_SIGPENDING: _SIGNALS,
-            resource.RLIMIT_CORE: 0,
-        }
-
     def prlimit(self, more_processes: int = 0) -> list[str]:
-        """The command in front of what is to be bounded.
+        """The command in front of what is to be bounded; limits are soft and hard.
 
-        The number of processes counts per user and user namespace where it is set inside, and
-        over everything of the user where it is set outside.
+        The number of processes counts per user namespace where it is set inside, and over all that
+        the user runs where it is set outside.
         """
-        bounds = self.rlimits()
-        bounds[resource.RLIMIT_NPROC] += more_processes
-        return ["prlimit", *(f"--{name}={bounds[what]}" for name, what in _OPTIONS.items())]
+        own_files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+        share = OPEN_FILES if own_files == resource.RLIM_INFINITY else own_files // _OWN_SHARE
+        bounds = {
+            "as": self.address_bytes,
+            "data": self.memory_bytes,
+            "nproc": self.processes + more_processes,
+            "nofile": min(self.open_files, share),
+            "fsize": self.file_bytes,
+            "cpu": self.cpu_s + _CPU_GRACE_S,
+            "sigpending": _SIGNALS,
+            "core": 0,
+        }
+        return ["prlimit", *(f"--{name}={bound}" for name, bound in bounds.items())]
 
 
-def _share(own_files: int) -> int:
-    return OPEN_FILES if own_files == resource.RLIM_INFINITY else own_files // _OWN_SHARE
-
-
-def raise_open_files(wanted: int = _OWN_SHARE * OPEN_FILES) -> int:
-    """Get so many open files for this process and those that it starts; how many there are.
-
-    Most shells allow 1024, and up to some larger number whoever asks: see getrlimit(2).
-    """
+def raise_open_files() -> None:
+    """Get as many open files for this process, and those that it starts, as a class may need."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = max(wanted, _OWN_SHARE * OPEN_FILES)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
-        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    if soft != resource.RLIM_INFINITY and soft < _WANTED_FILES:
+        soft = _WANTED_FILES if hard == resource.RLIM_INFINITY else min(_WANTED_FILES, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-    return soft
 
 
 BUILD_OUTPUT_BYTES = 64 * MIB

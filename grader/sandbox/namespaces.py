@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.sandbox.packet_monitor import Wire
+from grader.sandbox.packet_monitor import PacketMonitor
 
 CELL = Path("/cell")
 """Where a cell sees its folder."""
@@ -53,13 +53,9 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 
 class Mounter:
-    """A process that keeps the right to mount until it is known what to mount.
-
-    The cell itself has no rights from the beginning, and neither has any of its threads.
-    """
+    """A process that keeps the right to mount, which the cell has not, until all is known."""
 
     def __init__(self) -> None:
-        """Fork it."""
         self._end, theirs = socket.socketpair()
         self._pid = os.fork()
         if self._pid == 0:
@@ -69,11 +65,7 @@ class Mounter:
         theirs.close()
 
     def mount(self, disk_bytes: int, files: int, shared_bytes: int) -> None:
-        """Mount what students can write to, and end.
-
-        Raises:
-            OSError: The system refuses it.
-        """
+        """Mount what students can write to, and end."""
         self._end.sendall(_SIZES.pack(disk_bytes, files, shared_bytes))
         number = int.from_bytes(self._end.recv(4), "little")
         self._end.close()
@@ -106,14 +98,10 @@ class Mounter:
 
 @dataclass(frozen=True)
 class Rights:
-    """What a cell got hold of before it gave up its rights.
-
-    Attributes:
-        wire: Hears the cell's network; None where the kernel has no packet sockets.
-    """
+    """What a cell got hold of before it gave up its rights; packets where the kernel can."""
 
     mounter: Mounter
-    wire: Wire | None
+    packets: PacketMonitor | None
 
 
 def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
@@ -124,11 +112,8 @@ def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
 
     Args:
         folder: The cell's own; its parent holds those of all cells.
-        sentence: Asked now and then by the one that waits: None to let the new process go on,
+        sentence: Called now and then by the one that waits: None to let the new process go on,
             or the signal that it shall seem to have been ended by.
-
-    Raises:
-        OSError: The system refuses it.
     """
     uid, gid = os.getuid(), os.getgid()
     _call(
@@ -150,15 +135,14 @@ def enter(folder: Path, sentence: Callable[[], int | None]) -> Rights:
     _mount_own(folder)
     _bring_up_loopback()
     mounter = Mounter()
-    wire = None
+    packets = None
     with contextlib.suppress(OSError):
-        wire = Wire()
+        packets = PacketMonitor()
     _drop_capabilities()
-    return Rights(mounter, wire)
+    return Rights(mounter, packets)
 
 
 def _wait_for(child: int, sentence: Callable[[], int | None]) -> None:
-    """End as the child does."""
     os.closerange(0, 256)
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGCHLD,))
     ended, status = os.waitpid(child, os.WNOHANG)
@@ -196,7 +180,6 @@ def _mount_own(folder: Path) -> None:
 
 
 def _mounted_below(folder: Path) -> list[Path]:
-    """Folders on which something is mounted below a folder, but not below one another."""
     lines = Path("/proc/self/mountinfo").read_text(encoding="utf-8").splitlines()
     # The fifth field, with octal escapes for blanks and the like; source: proc(5).
     points = {Path(_ESCAPE.sub(lambda m: chr(int(m[1], 8)), line.split(" ")[4])) for line in lines}

@@ -1,8 +1,7 @@
-"""CPU time that processes take along when they end, since nobody waits for them.
+"""CPU time of processes that end without their parent waiting for them.
 
-What a process took is added to its parent's when the parent has waited for it, and to nobody's if
-the parent ignores SIGCHLD (wait(2), "ERRORS"): one that starts others without end would take
-nothing, however busy they keep the CPUs. So what each of them had when it was seen last is kept.
+What a process took is added to its parent's when the parent has waited for it, and to none if the
+parent ignores SIGCHLD (wait(2), "ERRORS"). So what each of them had when it was seen last is kept.
 """
 
 from __future__ import annotations
@@ -27,29 +26,20 @@ class Process(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """CPU time of a process in ticks, as proc(5) tells it.
-
-    Attributes:
-        waited: Of the children that it has waited for, and of those that they have.
-    """
+    """CPU time of a process in ticks, and that of the children that it has waited for: proc(5)."""
 
     own: int
     waited: int
 
 
 class OrphanCpu:
-    """Keeps an account of processes that are looked at again and again.
-
-    All of it is a lower bound: what a process took since it was seen last is not known, nor
-    anything of one that was never seen.
+    """Keeps an account of processes that are looked at again and again; a lower bound.
 
     Attributes:
-        ended: How many processes have ended since the look before, if any of them was not waited
-            for; else 0.
+        ended: How many processes have ended since the look before, if any was not waited for.
     """
 
     def __init__(self) -> None:
-        """Nothing was seen yet."""
         self.ticks = 0
         self.ended = 0
         self._there: dict[Process, Taken] = {}
@@ -60,8 +50,7 @@ class OrphanCpu:
         """Note what is there now.
 
         Args:
-            complete: That none ended between the moment when all were listed and when it was
-                to be read itself. Whoever is missing has ended for certain then.
+            complete: None ended while they were read: one that is missing has ended for certain.
         """
         before = {**self._missing, **self._there}
         self._gained.append(

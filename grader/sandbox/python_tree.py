@@ -3,8 +3,8 @@
 rosgrade, its libraries and ROS's wheels share one environment. In a sandbox another one is
 mounted in its place, of the same files (hard links, or copies where links are not possible),
 that holds only what a machine with ROS and colcon has, and the libraries that the assignment
-allows. It is made once and kept in the cache, ``python/<key>/``. Whoever uses one holds a shared
-lock on ``<key>.lock``; what nobody uses is thrown away when it is old, or one of too many.
+allows. It is made once and kept in the cache, ``python/<key>/``. A process that uses one holds a
+shared lock on ``<key>.lock``; of those that are not used only the newest stay.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -29,16 +29,13 @@ from grader.tree import listing
 
 VERSION = 2
 KEPT = 4
-"""Trees that nobody uses at the moment; each holds up to 0.3 GB where ROS was updated since."""
-AGE_S = 30 * 24 * 3600.0
-"""A tree goes when it was not used for so long."""
+"""Trees that are not used at the moment; each holds up to 0.3 GB where ROS was updated since."""
 
 _ROOTS = re.compile(r"ros-.*|colcon-.*|setuptools|numpy|pyyaml|lark|empy")
 _NAME = re.compile(r"[A-Za-z0-9._-]+")
 _LOCK = ".lock"
 _UNFINISHED = ".unfinished-"
 _STALE_S = 3600.0
-_READABLE = 0o555
 _FOR_OTHERS = 0o444
 
 
@@ -59,11 +56,9 @@ class PythonTree:
     def discard(self) -> None:
         """Let another one be made in its place; what uses it keeps what is left."""
         with contextlib.suppress(OSError):
-            gone = tempfile.mkdtemp(prefix=_UNFINISHED, dir=self.path.parent)
-            self.path.rename(gone)
+            self.path.rename(tempfile.mkdtemp(prefix=_UNFINISHED, dir=self.path.parent))
 
     def __del__(self) -> None:
-        """Let it go."""
         os.close(self.lock)
 
 
@@ -71,8 +66,8 @@ def trees_folder(cache: Path) -> Path:
     """Where all environments are; made if it is not there."""
     folder = cache / "python"
     folder.mkdir(parents=True, exist_ok=True)
-    # Whoever runs in a sandbox is another user, where rosgrade runs as root.
-    if folder.stat().st_mode & _READABLE != _READABLE:
+    # A sandbox runs as another user, where rosgrade runs as root.
+    if folder.stat().st_mode & 0o555 != 0o555:
         folder.chmod(0o755)
     return folder
 
@@ -80,11 +75,7 @@ def trees_folder(cache: Path) -> Path:
 def student_prefix(
     cache: Path, libraries: Collection[str] = (), prefix: Path = Path(sys.prefix)
 ) -> PythonTree:
-    """The environment, made if it is not there.
-
-    Raises:
-        GraderFault: A library is not installed here.
-    """
+    """The environment, made if it is not there."""
     check_installed(libraries)
     wanted = frozenset(map(_normal, libraries))
     parts = [str(VERSION), str(prefix), sys.executable, sys.version, *sorted(wanted)]
@@ -92,7 +83,10 @@ def student_prefix(
     parts += sorted(path.name for path in prefix.glob("lib/python3*/site-packages/*-info"))
     key = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
     target = trees_folder(cache) / key
-    tree = PythonTree(target, _hold(target))
+    lock = _open_lock(target)
+    # Waits only while it is being thrown away.
+    fcntl.flock(lock, fcntl.LOCK_SH)
+    tree = PythonTree(target, lock)
     if target.is_dir() and not tree.is_whole():
         tree.discard()
     if not target.is_dir():
@@ -104,30 +98,24 @@ def student_prefix(
 
 
 def check_installed(libraries: Collection[str]) -> None:
-    """See that what an assignment allows is there to be imported.
-
-    Raises:
-        GraderFault: It is not.
-    """
+    """See that what an assignment allows is there to be imported."""
     for lack in not_installed(libraries):
         raise GraderFault(lack)
 
 
 def not_installed(libraries: Collection[str]) -> list[str]:
     """Say of each library that is not there what it is, and how it gets there."""
-    if not libraries:
-        return []
-    installed = set(_installed())
-    return [_lack(name, installed) for name in libraries if _normal(name) not in installed]
-
-
-def _lack(name: str, installed: Collection[str]) -> str:
-    near = did_you_mean(name, installed)
-    return (
-        f"the assignment allows the library {name!r}, which is not installed here.{near} "
-        f"{'Otherwise install it' if near else 'To install it'}: "
-        f"{sys.executable} -m pip install {name}"
-    )
+    installed = set(_installed()) if libraries else set()
+    found = []
+    for name in libraries:
+        if _normal(name) not in installed:
+            near = did_you_mean(name, installed)
+            found.append(
+                f"the assignment allows the library {name!r}, which is not installed here.{near} "
+                f"{'Otherwise install it' if near else 'To install it'}: "
+                f"{sys.executable} -m pip install {name}"
+            )
+    return found
 
 
 def unlisted(modules: Collection[str], libraries: Collection[str]) -> tuple[str, ...]:
@@ -144,51 +132,31 @@ def unlisted(modules: Collection[str], libraries: Collection[str]) -> tuple[str,
     )
 
 
-def prune(folder: Path, kept: int = KEPT, age_s: float = AGE_S) -> None:
-    """Throw away environments that nobody uses."""
-    now_s = time.time()
+def prune(folder: Path, kept: int = KEPT) -> None:
+    """Throw away environments that are not used, but for the newest."""
+    stale_s = time.time() - _STALE_S
     trees: list[tuple[float, Path]] = []
     for path in folder.iterdir():
         with contextlib.suppress(OSError):
             used_s = path.lstat().st_mtime
-            if path.name.startswith(_UNFINISHED):
-                if now_s - used_s > _STALE_S:
-                    shutil.rmtree(path, ignore_errors=True)
-            elif path.is_dir():
-                trees.append((used_s, path))
-    for number, (used_s, path) in enumerate(sorted(trees, reverse=True)):
-        if number >= kept or now_s - used_s > age_s:
-            with _unused(path) as unused:
-                if unused:
-                    # Renamed first: nobody finds a part of it.
-                    gone = path.with_name(f"{_UNFINISHED}{path.name}")
-                    with contextlib.suppress(OSError):
-                        path.rename(gone)
-                        _list_file(path).unlink(missing_ok=True)
-                    shutil.rmtree(gone, ignore_errors=True)
-
-
-def _hold(target: Path) -> int:
-    lock = os.open(target.with_name(target.name + _LOCK), os.O_RDWR | os.O_CREAT, 0o600)
-    # Waits only while somebody throws it away.
-    fcntl.flock(lock, fcntl.LOCK_SH)
-    return lock
-
-
-@contextlib.contextmanager
-def _unused(path: Path) -> Iterator[bool]:
-    """Whether nobody holds an environment; nobody gets it meanwhile."""
-    # The file stays: who waits for its lock would else hold one that nobody looks at any more.
-    lock = os.open(path.with_name(path.name + _LOCK), os.O_RDWR | os.O_CREAT, 0o600)
-    try:
-        try:
+            if not path.name.startswith(_UNFINISHED):
+                trees += [(used_s, path)] if path.is_dir() else []
+            elif used_s < stale_s:
+                shutil.rmtree(path, ignore_errors=True)
+    for _, path in sorted(trees, reverse=True)[kept:]:
+        # The file stays: a process that waits for its lock would hold one that is gone.
+        lock = _open_lock(path)
+        with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            yield False
-        else:
-            yield True
-    finally:
+            # Renamed first: a part of it is never found.
+            gone = path.rename(path.with_name(f"{_UNFINISHED}{path.name}"))
+            _list_file(path).unlink(missing_ok=True)
+            shutil.rmtree(gone, ignore_errors=True)
         os.close(lock)
+
+
+def _open_lock(tree: Path) -> int:
+    return os.open(tree.with_name(tree.name + _LOCK), os.O_RDWR | os.O_CREAT, 0o600)
 
 
 def _normal(name: str) -> str:
@@ -200,7 +168,6 @@ def _installed() -> dict[str, metadata.Distribution]:
 
 
 def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:
-    """Installed distributions by name: the roots, and all that they need."""
     installed = _installed()
     queue = [name for name in installed if _ROOTS.fullmatch(name) or name in libraries]
     found: dict[str, metadata.Distribution] = {}
@@ -218,15 +185,22 @@ def _closure(libraries: Collection[str]) -> dict[str, metadata.Distribution]:
 
 def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribution]) -> None:
     unfinished = Path(tempfile.mkdtemp(prefix=_UNFINISHED, dir=target.parent))
+    files = {Path("pyvenv.cfg"), Path("lib64")}
+    files |= {path.relative_to(prefix) for path in prefix.glob("bin/python*")}
+    for distribution in distributions:
+        for file in distribution.files or ():
+            path = Path(os.path.normpath(str(distribution.locate_file(file))))
+            if path.is_relative_to(prefix):
+                files.add(path.relative_to(prefix))
     try:
-        for file in sorted(_contents(prefix, distributions)):
-            _link(prefix / file, unfinished / file)
+        for name in sorted(files):
+            _link(prefix / name, unfinished / name)
         for folder, _, _ in os.walk(unfinished):
             Path(folder).chmod(0o755)
         with tempfile.NamedTemporaryFile("w", dir=target.parent, delete=False) as list_file:
             list_file.write(_listed(unfinished))
         Path(list_file.name).replace(_list_file(target))
-        # Somebody else was quicker, perhaps.
+        # Another process was quicker, perhaps.
         with contextlib.suppress(OSError):
             unfinished.rename(target)
     finally:
@@ -234,28 +208,12 @@ def _make(target: Path, prefix: Path, distributions: Iterable[metadata.Distribut
 
 
 def _list_file(tree: Path) -> Path:
-    """The file beside an environment that says what is in it."""
     return tree.with_name(f"{tree.name}.files")
 
 
 def _listed(tree: Path) -> str:
     text = "\n".join(sorted(listing(tree)))
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
-
-
-def _contents(prefix: Path, distributions: Iterable[metadata.Distribution]) -> set[Path]:
-    """What is in an environment with these distributions, relative to it."""
-    files = {file for item in distributions for file in _files(item, prefix)}
-    files |= {Path("pyvenv.cfg"), Path("lib64")}
-    return files | {path.relative_to(prefix) for path in prefix.glob("bin/python*")}
-
-
-def _files(distribution: metadata.Distribution, prefix: Path) -> Iterable[Path]:
-    """What a distribution has installed in the environment, relative to it."""
-    for file in distribution.files or ():
-        path = Path(os.path.normpath(str(distribution.locate_file(file))))
-        if path.is_relative_to(prefix):
-            yield path.relative_to(prefix)
 
 
 def _link(source: Path, target: Path) -> None:

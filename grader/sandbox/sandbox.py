@@ -11,7 +11,6 @@ import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 
 import grader
@@ -23,7 +22,7 @@ from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.limits import BUILD, SandboxLimits, size_words
 from grader.sandbox.namespaces import MOUNT_POINTS
 from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
-from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
+from grader.sandbox.seccomp import student_filter
 from grader.sandbox.usage import (
     CpuAccount,
     folder_usage,
@@ -53,11 +52,7 @@ _SITE = "lib/python3*/site-packages"
 
 @dataclass
 class Sandbox:
-    """Starts things in it.
-
-    Attributes:
-        cache: rosgrade's cache folder; the Python environments of students are kept in it.
-    """
+    """Starts things in it; the Python environments of students are kept in rosgrade's cache."""
 
     cache: Path
     libraries: tuple[str, ...] = ()
@@ -77,33 +72,8 @@ class Sandbox:
         with self._lock:
             return self._others.setdefault(libraries, Sandbox(self.cache, libraries))
 
-    @property
-    def filter_file(self) -> Path:
-        """A file with the filter of system calls for a run, which a guard watches over."""
-        return self._filter_file(student_filter(guarded=True))
-
-    @property
-    def guard_file(self) -> Path:
-        """A file with the filter that asks the guard of a run."""
-        return self._filter_file(guard_filter())
-
-    @property
-    def unheard_file(self) -> Path:
-        """A file with the filter in its place where nobody can listen."""
-        return self._filter_file(guard_filter(heard=False))
-
-    @cached_property
-    def guarded_calls(self) -> dict[str, int]:
-        """Numbers of the calls that the guard is asked about."""
-        return guarded_calls()
-
-    @property
-    def build_filter_file(self) -> Path:
-        """A file with the filter of system calls for a build."""
-        return self._filter_file(student_filter(one_session=True))
-
-    def _filter_file(self, program: bytes) -> Path:
-        # Read at every use: the cache may be emptied while rosgrade watches, or a disk damage it.
+    def filter_file(self, program: bytes) -> Path:
+        """A file with a filter of system calls; read at every use, as caches may be emptied."""
         file = self.cache / "sandbox" / f"{hashlib.sha256(program).hexdigest()[:32]}.bpf"
         if not file.is_file() or file.read_bytes() != program:
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -114,11 +84,7 @@ class Sandbox:
 
     @property
     def python_tree(self) -> Path:
-        """The Python environment of students; it is not thrown away while this sandbox is used.
-
-        Raises:
-            GraderFault: A library is not installed here.
-        """
+        """The Python environment of students; it is not thrown away while this sandbox is used."""
         return self._held_tree().path
 
     def _held_tree(self) -> PythonTree:
@@ -134,12 +100,7 @@ class Sandbox:
         return (trees_folder(self.cache), *own)
 
     def watched(self) -> Callable[[], None]:
-        """See that untrusted code does not fail because something of ours was deleted.
-
-        Returns:
-            What raises :class:`GraderFault` if anything of :attr:`python_tree` is gone, or was
-            gone at any time since.
-        """
+        """What raises :class:`GraderFault` if the Python of students is damaged, or was since."""
         tree = self._held_tree() if _in_environment() else None
 
         def check() -> None:
@@ -195,12 +156,7 @@ class Sandbox:
     def build(
         self, ros: RosInstallation, folders: Sequence[Path], limits: SandboxLimits = BUILD
     ) -> Iterator[BuildRoom]:
-        """Let a part of a build write to folders.
-
-        Args:
-            folders: What it may write to; the first is its working directory. They are ours
-                again afterwards.
-        """
+        """Let a part of a build write to folders; the first is its working directory."""
         uid = bubblewrap.build_uid()
         for folder in folders:
             bubblewrap.give(folder, uid)
@@ -231,19 +187,13 @@ class BuildRoom:
         hidden = hide(binds)
         binds += [Bind.same(folder, writable=True) for folder in self.folders]
         arguments = [*bubblewrap.namespaces(_BUILD_UID), "--disable-userns", "--die-with-parent"]
-        arguments += [
-            *bubblewrap.system(),
-            "--size",
-            str(self.limits.disk_bytes),
-            "--tmpfs",
-            "/tmp",
-        ]
+        disk = str(self.limits.disk_bytes)
+        arguments += [*bubblewrap.system(), "--size", disk, "--tmpfs", "/tmp"]
         last = [*hidden, *bubblewrap.HIDDEN_INIT, "--remount-ro", "/", "--remount-ro", "/dev"]
         last += ["--chdir", str(self.folders[0]), *bubblewrap.variables(environment)]
         inner = [*self.limits.prlimit(), "--", *command]
-        return bubblewrap.launch(
-            arguments, binds, last, inner, self.sandbox.build_filter_file, self.uid
-        )
+        filter_file = self.sandbox.filter_file(student_filter(one_session=True))
+        return bubblewrap.launch(arguments, binds, last, inner, filter_file, self.uid)
 
     def excess(self, pid: int) -> str | None:
         """Say which limit a build has passed, or None."""
@@ -253,7 +203,7 @@ class BuildRoom:
         taken = memory_bytes(usages, limits.memory_bytes, hidden_bytes(usages, room))
         if taken > limits.memory_bytes:
             return f"it took more than {size_words(limits.memory_bytes)} of memory"
-        if self._cpu.stolen_s(usages) > limits.cpu_s:
+        if self._cpu.used_s(usages) > limits.cpu_s:
             return f"it took more than {limits.cpu_s} s of CPU time"
         if sum(usage.threads for usage in usages) >= _NEARLY_ALL * limits.processes:
             return f"it started {limits.processes} processes"
@@ -266,12 +216,9 @@ class BuildRoom:
 
 
 def hide(binds: Sequence[Bind]) -> list[str]:
-    """Arguments that cover what is not to be seen where what is shown would hold it.
+    """Arguments that cover rosgrade's own code, and the libraries beside our environment.
 
-    With what nobody can write to: it is memory that no limit counts.
-
-    That is rosgrade's own code, and the libraries of the Python that our environment was made of
-    and takes none from.
+    With folders that cannot be written to: they are memory that no limit counts.
     """
     return [
         argument

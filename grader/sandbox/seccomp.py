@@ -29,7 +29,7 @@ _UNHEARD_OF = (
     *("init_module", "finit_module", "delete_module", "kexec_load", "kexec_file_load"),
 )
 """Calls that no node and no library of one has a use for."""
-_COUNTED = ("inotify_init", "inotify_init1")
+COUNTED = ("inotify_init", "inotify_init1")
 """Calls that make something of which all that a user runs has a certain number together."""
 MOST_COUNTED = 8
 _ENDING = (signal.SIGKILL, signal.SIGSTOP, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
@@ -102,16 +102,12 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
     Args:
         one_session: For a build: also keep all processes in one session, as the kernel shares
             the CPU between sessions, and let none of them send a signal to what started them.
-            A daemon then gets the signals that are meant for its parent.
-
-    Raises:
-        RuntimeError: libseccomp is not there.
     """
     import pyseccomp as seccomp
 
     rules = seccomp.SyscallFilter(seccomp.ALLOW)
     refuse = seccomp.ERRNO(errno.EPERM)
-    for name in (*_REFUSED, *([] if guarded else [*_AIMED, *_UNHEARD_OF, *_COUNTED])):
+    for name in (*_REFUSED, *([] if guarded else [*_AIMED, *_UNHEARD_OF, *COUNTED])):
         _add(rules, refuse, name)
     for name in (*_PRETENDED, *(["setsid"] if one_session else [])):
         _add(rules, seccomp.ERRNO(0), name)
@@ -150,14 +146,11 @@ def guard_filter(*, heard: bool = True) -> bytes:
 
     It is in force while bubblewrap makes the sandbox, so it holds only calls that bubblewrap
     itself does not need, or that the guard lets go on.
-
-    Raises:
-        RuntimeError: libseccomp is not there.
     """
     import pyseccomp as seccomp
 
     rules = seccomp.SyscallFilter(seccomp.ALLOW)
-    for name in (*_AIMED, *_UNHEARD_OF, *_COUNTED):
+    for name in (*_AIMED, *_UNHEARD_OF, *COUNTED):
         _add(rules, seccomp.NOTIFY, name)
     at_init = seccomp.Arg(0, seccomp.MASKED_EQ, _INT, INIT)
     for name, place in _SIGNALLING.items():
@@ -172,11 +165,12 @@ def guard_filter(*, heard: bool = True) -> bytes:
     return _program(rules)
 
 
+@cache
 def guarded_calls() -> dict[str, int]:
     """The numbers of the calls that :func:`guard_filter` tells of, and of ``seccomp`` itself."""
     from pyseccomp import resolve_syscall, system_arch
 
-    names = (*_AIMED, *_UNHEARD_OF, *_COUNTED, *(name for name, *_ in _WAYS))
+    names = (*_AIMED, *_UNHEARD_OF, *COUNTED, *(name for name, *_ in _WAYS))
     return {
         name: resolve_syscall(system_arch(), name) for name in (*names, "pidfd_open", "seccomp")
     }
@@ -189,16 +183,11 @@ def can_end(name: str, arguments: Sequence[int]) -> bool:
     )
 
 
-def is_counted(name: str) -> bool:
-    """Whether a call is allowed :data:`MOST_COUNTED` times."""
-    return name in _COUNTED
-
-
-def told_of(name: str, arguments: Sequence[int]) -> str | None:
+def violation_of(name: str, arguments: Sequence[int]) -> str | None:
     """What a process did by a system call that the guard saw; None if it does no harm."""
     if name in _UNHEARD_OF:
         return f"called `{name}`"
-    if name in _COUNTED:
+    if name in COUNTED:
         return f"called `{name}` more than {MOST_COUNTED} times"
     place = {**dict.fromkeys((*_SIGNALLING, "pidfd_open"), 0), **_AIMED}.get(name)
     if place is None or arguments[place] & _INT != INIT:

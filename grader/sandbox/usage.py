@@ -19,11 +19,7 @@ _SHARED = b"/dev/zero (deleted)"
 
 
 class Usage(NamedTuple):
-    """What a process takes; all of it stands in one file, which is read often.
-
-    Attributes:
-        taken: CPU time of it, and of its children that have ended and were waited for.
-    """
+    """What a process takes, from a file that is read often: ``/proc/PID/stat``."""
 
     pid: int
     parent: int
@@ -38,10 +34,9 @@ class CpuAccount:
     """CPU time of processes that are looked at again and again, of those that have ended too."""
 
     def __init__(self) -> None:
-        """Nothing was seen yet."""
         self._orphan_cpu = OrphanCpu()
 
-    def stolen_s(self, usages: Iterable[Usage]) -> float:
+    def used_s(self, usages: Iterable[Usage]) -> float:
         """What was taken so far, at least."""
         there = {Process(one.pid, one.started): one.taken for one in usages}
         self._orphan_cpu.look(there)
@@ -71,8 +66,7 @@ def memory_bytes(usages: Sequence[Usage], enough: int, hidden: int = 0) -> int:
     """Memory of processes, pages that they share counted once.
 
     Args:
-        enough: Below this a quick upper bound is returned (see proc(5): the sum of resident sets
-            counts shared pages several times, the proportional ones of smaps_rollup do not).
+        enough: Below this a quick upper bound is returned, that counts shared pages several times.
     """
     upper = sum(usage.resident_bytes for usage in usages) + hidden
     return upper if upper <= enough else hidden + sum(_proportional_bytes(one) for one in usages)
@@ -87,13 +81,11 @@ def own_bytes() -> int:
 def hidden_bytes(usages: Iterable[Usage], room: int = 0) -> int:
     """Shared memory that processes hold and that is in the resident set of none of them.
 
-    A page of it stays when a process lets go of its place (madvise(2), MADV_DONTNEED), or ends,
-    as long as anybody has mapped that memory. Nobody but the kernel knows how much of it there
-    is, so all that is mapped counts as taken.
+    A page of it stays when a process lets go of its place (madvise(2)), or ends. Only the kernel
+    knows how much there is, so all that is mapped counts as taken.
 
     Args:
-        room: Where all shared memory of this machine is no more than this, it is not looked for:
-            to read what processes have mapped takes longer than all else that is read of them.
+        room: Where all shared memory of this machine is no more than this, it is not looked for.
     """
     if _shared_bytes() <= room:
         return 0
@@ -111,8 +103,7 @@ def hidden_bytes(usages: Iterable[Usage], room: int = 0) -> int:
 def open_files(usages: Iterable[Usage]) -> int:
     """How many descriptors processes have open together.
 
-    What is behind one may hold memory of the kernel's that is counted nowhere: the buffers of a
-    socket, or what an epoll watches, of which a user has so many and no more.
+    What is behind one may hold memory of the kernel's that is counted nowhere.
     """
     return sum(_open_files(usage.pid) for usage in usages)
 
@@ -196,9 +187,13 @@ def _open_files(pid: int) -> int:
         # Since Linux 6.2 this is their number (proc(5)); before, it was 0.
         return os.stat(folder).st_size or len(os.listdir(folder))  # noqa: PTH116, PTH208  often
     except PermissionError:
-        return _table_size(pid)
+        # For how many it has room, which no process can hide.
+        with contextlib.suppress(OSError), open(f"{_PROC}/{pid}/status", "rb") as file:  # noqa: PTH123
+            found = re.search(rb"^FDSize:\s*(\d+)$", file.read(), re.MULTILINE)
+            return int(found[1]) if found else 0
     except OSError:
-        return 0
+        pass
+    return 0
 
 
 def _in_flight(pid: int) -> int:
@@ -210,19 +205,9 @@ def _in_flight(pid: int) -> int:
             with contextlib.suppress(FileNotFoundError):
                 if os.readlink(f"{folder}/{name}").startswith("socket:"):  # noqa: PTH115  often
                     with open(f"{folder}info/{name}", "rb") as file:  # noqa: PTH123  often
-                        told = re.search(rb"^scm_fds:\s*(\d+)$", file.read(), re.MULTILINE)
-                    found += int(told[1]) if told else 0
+                        number = re.search(rb"^scm_fds:\s*(\d+)$", file.read(), re.MULTILINE)
+                    found += int(number[1]) if number else 0
     return found
-
-
-def _table_size(pid: int) -> int:
-    """For how many descriptors a process has room, which nobody can keep to himself."""
-    try:
-        with open(f"{_PROC}/{pid}/status", "rb") as file:  # noqa: PTH123  often
-            found = re.search(rb"^FDSize:\s*(\d+)$", file.read(), re.MULTILINE)
-    except OSError:
-        return 0
-    return int(found[1]) if found else 0
 
 
 def _proportional_bytes(usage: Usage, what: bytes = b"Pss:") -> int:

@@ -8,10 +8,12 @@ from typing import Literal
 
 import pytest
 
+from grader.assignment.load import load_assignment
+from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, NoParameters, Parameters, Subject
 from grader.checks.finding import Finding
 from grader.checks.need import Recorded, Submitted
-from grader.errors import GraderFault
+from grader.errors import AssignmentError, GraderFault
 from grader.ros import RosInstallation
 from grader.spec.name import InterfaceName, TopicName
 from grader.spec.quantity import Duration
@@ -92,6 +94,22 @@ def write(tmp_path: Path) -> Callable[..., Path]:
         return folder
 
     return _write
+
+
+@pytest.fixture
+def mistakes(write: Callable[..., Path]) -> Callable[..., list[str]]:
+    """Load an assignment; each mistake as ``line: place: text``."""
+
+    def _mistakes(yaml: str, catalogue: Mapping[str, Check] = CATALOGUE) -> list[str]:
+        folder = write(yaml)
+        try:
+            load_assignment(folder, catalogue)
+        except AssignmentError as error:
+            place = f"{folder / 'assignment.yaml'}:"
+            return [line.removeprefix(place) for line in str(error).splitlines()]
+        return []
+
+    return _mistakes
 
 
 @pytest.fixture

@@ -7,9 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.load import load_assignment
-from grader.errors import AssignmentError
-
 LESSON = """\
 rosgrade: 1
 id: lesson
@@ -51,23 +48,14 @@ DEFINITIONS = {
 ADD, COUNT = "/add (std_srvs/srv/Add): ", "/count (std_srvs/action/Count): "
 TWIST, PATH = "/twist (geometry_msgs/msg/Twist): ", "/path (geometry_msgs/msg/Path): "
 
-Mistakes = Callable[[str, str], list[str]]
+Found = Callable[[str, str], list[str]]
 
 
 @pytest.fixture
-def mistakes(write: Callable[..., Path], ros_with: Callable[..., None]) -> Mistakes:
-    """Load the lesson with a check; each mistake as ``line: place: text``."""
+def found(mistakes: Callable[[str], list[str]], ros_with: Callable[..., None]) -> Found:
+    """Load the lesson with a check."""
     ros_with(DEFINITIONS)
-
-    def load(uses: str, parameters: str) -> list[str]:
-        folder = write(LESSON.replace("USES", uses).replace("WITH", parameters))
-        try:
-            load_assignment(folder)
-        except AssignmentError as error:
-            return [f"{one.line}: {one.where}: {one.message}" for one in error.problems]
-        return []
-
-    return load
+    return lambda uses, given: mistakes(LESSON.replace("USES", uses).replace("WITH", given))
 
 
 @pytest.mark.parametrize(
@@ -86,23 +74,8 @@ def mistakes(write: Callable[..., Path], ros_with: Callable[..., None]) -> Mista
         ),
         (
             "messages.equal",
-            "topic: /twist, value: {linear: 1.0}",
-            f"value: {TWIST}linear is a message: name its fields (x, y, z)",
-        ),
-        (
-            "messages.equal",
-            "topic: /twist, value: {linear.x: 1 m}",
-            f"value: {TWIST}linear.x is a number, but a text is expected of it",
-        ),
-        (
-            "messages.equal",
             "topic: /twist, value: {linear: {x: }}",
             f"value: {TWIST}linear.x is a number, but nothing is expected of it",
-        ),
-        (
-            "messages.equal",
-            "topic: /path, value: {KIND: 1}",
-            f"value: {PATH}the message has no field 'KIND'; it has points, sizes.",
         ),
         (
             "messages.follows",
@@ -116,20 +89,9 @@ def mistakes(write: Callable[..., Path], ros_with: Callable[..., None]) -> Mista
             "Did you mean 'data'?",
         ),
         (
-            "messages.follows",
-            "topic: /twist, source: /path, tolerance: 1, fields: {linear.x: 'size[0]'}",
-            f"fields.linear.x: {PATH}the message has no field 'size'; it has points, sizes. Did "
-            "you mean 'sizes'?",
-        ),
-        (
             "messages.equal",
             "topic: /twist, value: {linear.x: 1}, tolerance: {linear.z: 1, x: 1}",
             f"tolerance.x: {TWIST}the message has no field 'x'; it has angular, linear.",
-        ),
-        (
-            "messages.equal",
-            "topic: /number, value: {data: 1.5}",
-            "value: /number (std_msgs/msg/Int8): data is a whole number, but 1.5 is expected of it",
         ),
         (
             "messages.sequence",
@@ -144,31 +106,14 @@ def mistakes(write: Callable[..., Path], ros_with: Callable[..., None]) -> Mista
             "of it: write true or false",
         ),
         (
-            "messages.sequence",
-            "topic: /flag, field: data, values: [true, 1.5]",
-            "values[1]: /flag (std_msgs/msg/Bool): data is true or false, but 1.5 is expected of "
-            "it",
-        ),
-        (
             "service.responds",
             "service: /add, request: {c: 1}",
             f"request: {ADD}the message has no field 'c'; it has a.",
         ),
         (
             "service.responds",
-            "service: /add, response: {total: 3}",
-            f"response: {ADD}the message has no field 'total'; it has sum, words.",
-        ),
-        (
-            "service.responds",
             "service: /add, contains: {sum: three}",
             f"contains.sum: {ADD}sum is a number, but a text is expected of it",
-        ),
-        (
-            "action.result",
-            "action: /count, within: 1 s, result: {number: 3}",
-            f"result: {COUNT}the message has no field 'number'; it has numbers. Did you mean "
-            "'numbers'?",
         ),
         (
             "action.result",
@@ -180,17 +125,12 @@ def mistakes(write: Callable[..., Path], ros_with: Callable[..., None]) -> Mista
             "action: /count, last: {later: 3}",
             f"last: {COUNT}the message has no field 'later'; it has now.",
         ),
-        (
-            "parameter.takes_effect",
-            "node: bot, name: size, value: 2, topic: /twist, fields: {linear.w: 2.0}",
-            f"fields: {TWIST}linear has no field 'w'; it has x, y, z.",
-        ),
     ],
 )
 def test_a_field_that_a_message_does_not_have_is_told_with_its_line(
-    mistakes: Mistakes, uses: str, parameters: str, said: str
+    found: Found, uses: str, parameters: str, said: str
 ) -> None:
-    assert mistakes(uses, parameters) == [f"25: checks[0].with.{said}"]
+    assert found(uses, parameters) == [f"25: checks[0].with.{said}"]
 
 
 @pytest.mark.parametrize(
@@ -211,14 +151,14 @@ def test_a_field_that_a_message_does_not_have_is_told_with_its_line(
     ],
 )
 def test_what_a_message_has_or_may_have_is_accepted(
-    mistakes: Mistakes, uses: str, parameters: str
+    found: Found, uses: str, parameters: str
 ) -> None:
-    assert mistakes(uses, parameters) == []
+    assert found(uses, parameters) == []
 
 
 def test_of_a_message_that_holds_itself_no_field_is_looked_for(
-    mistakes: Mistakes, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    found: Found, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     holder = tmp_path / "ros/share/geometry_msgs/msg/Vector3.msg"
     holder.write_text("Twist[] inner\n", encoding="utf-8")
-    assert mistakes("messages.equal", "topic: /twist, value: {a: 1}") == []
+    assert found("messages.equal", "topic: /twist, value: {a: 1}") == []

@@ -7,9 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.assignment.load import load_assignment
-from grader.errors import AssignmentError
-
 LESSON = """\
 rosgrade: 1
 id: lesson
@@ -40,30 +37,22 @@ DEFINITIONS = {
 }
 STRING = "std_msgs/msg/String"
 
-Mistakes = Callable[..., list[str]]
+Found = Callable[..., list[str]]
 
 
 @pytest.fixture
-def mistakes(write: Callable[..., Path]) -> Mistakes:
-    """Load the lesson with some interfaces and files; each mistake as ``line: text``."""
+def found(tmp_path: Path, mistakes: Found) -> Found:
+    """Load the lesson with some interfaces and files."""
 
     def load(
         recorded: str = STRING, sent: str = STRING, judged: str = STRING, **files: str
     ) -> list[str]:
-        named = {"RECORDED": recorded, "SENT": sent, "JUDGED": judged}
-        text = LESSON
-        for word, interface in named.items():
-            text = text.replace(word, interface)
-        folder = write(text)
         for name, content in files.items():
-            file = folder / "interfaces" / name
+            file = tmp_path / "lesson/interfaces" / name
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(content, encoding="utf-8")
-        try:
-            load_assignment(folder)
-        except AssignmentError as error:
-            return [f"{one.line}: {one.message}" for one in error.problems]
-        return []
+        text = LESSON.replace("RECORDED", recorded).replace("SENT", sent)
+        return mistakes(text.replace("JUDGED", judged))
 
     return load
 
@@ -72,36 +61,38 @@ OWN = {"bot_msgs/package.xml": "<package/>", "bot_msgs/msg/BotStatus.msg": "uint
 MISTAKES = [
     (
         {"recorded": "std_msgs/msg/Strin"},
-        ["10: std_msgs has no msg 'Strin'. Did you mean 'String'?"],
+        ["10: scenarios[0].record[0].type: std_msgs has no msg 'Strin'. Did you mean 'String'?"],
     ),
     (
         {"sent": "std_msgs/msg/Zzz"},
-        ["14: std_msgs has no msg 'Zzz'. It has: Int64, String."],
+        ["14: scenarios[0].stimuli[0].type: std_msgs has no msg 'Zzz'. It has: Int64, String."],
     ),
     (
         {"judged": "geometry_msg/msg/Twist"},
-        ["19: there is no package 'geometry_msg': not in ROS, not in interfaces/ beside the "
-         "assignment, not among 'packages' nor what they have in 'depends'. Did you mean "
-         "'geometry_msgs'?"],
+        ["19: checks[0].with.type: there is no package 'geometry_msg': not in ROS, not in "
+         "interfaces/ beside the assignment, not among 'packages' nor what they have in 'depends'. "
+         "Did you mean 'geometry_msgs'?"],
     ),
     (
         {"recorded": "bot_msgs/msg/BotStatus"},
-        ["10: 'bot_msgs' is handed in, and the probe never imports what a student wrote: our own "
-         "copy of it must be in interfaces/bot_msgs beside the assignment"],
+        ["10: scenarios[0].record[0].type: 'bot_msgs' is handed in, and the probe never imports "
+         "what a student wrote: our own copy of it must be in interfaces/bot_msgs beside the "
+         "assignment"],
     ),
     (
         {"recorded": "bot_msgs/msg/BotState", **OWN},
-        ["10: interfaces/bot_msgs has no msg 'BotState'. Did you mean 'BotStatus'?"],
+        ["10: scenarios[0].record[0].type: interfaces/bot_msgs has no msg "
+         "'BotState'. Did you mean 'BotStatus'?"],
     ),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("named", "expected"), MISTAKES)
 def test_an_interface_that_does_not_exist_is_told_with_its_line(
-    mistakes: Mistakes, ros_with: Callable[..., None], named: dict[str, str], expected: list[str]
+    found: Found, ros_with: Callable[..., None], named: dict[str, str], expected: list[str]
 ) -> None:
     ros_with(DEFINITIONS)
-    assert mistakes(**named) == expected
+    assert found(**named) == expected
 
 
 @pytest.mark.parametrize(
@@ -117,25 +108,25 @@ def test_an_interface_that_does_not_exist_is_told_with_its_line(
     ids=["ROS", "our copy", "handed in, only judged", "carried", "named in depends", "of Jazzy"],
 )
 def test_what_exists_or_may_exist_elsewhere_is_accepted(
-    mistakes: Mistakes, ros_with: Callable[..., None], named: dict[str, str]
+    found: Found, ros_with: Callable[..., None], named: dict[str, str]
 ) -> None:
     ros_with(DEFINITIONS)
-    assert mistakes(**named) == []
+    assert found(**named) == []
 
 
 def test_without_ros_only_what_is_beside_the_assignment_is_known(
-    mistakes: Mistakes, ros_with: Callable[..., None]
+    found: Found, ros_with: Callable[..., None]
 ) -> None:
     ros_with(None)
-    assert mistakes(recorded="std_msgs/msg/Strin", sent="geometry_msg/msg/Twist") == []
-    assert mistakes(recorded="bot_msgs/msg/BotState", **OWN) == MISTAKES[4][1]
+    assert found(recorded="std_msgs/msg/Strin", sent="geometry_msg/msg/Twist") == []
+    assert found(recorded="bot_msgs/msg/BotState", **OWN) == MISTAKES[4][1]
 
 
 def test_fields_of_our_copy_are_checked(
-    mistakes: Mistakes, ros_with: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+    found: Found, ros_with: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ros_with(DEFINITIONS)
     monkeypatch.setitem(globals(), "LESSON", LESSON.replace("message: {}", "message: {modle: 1}"))
-    (mistake,) = mistakes(sent="bot_msgs/msg/BotStatus", **OWN)
+    (mistake,) = found(sent="bot_msgs/msg/BotStatus", **OWN)
     assert mistake.startswith("15: ")
     assert "has no field 'modle'. Did you mean 'model'?" in mistake

@@ -96,8 +96,6 @@ def test_loading_leaves_nothing_behind_in_the_folder(write: Write) -> None:
     ("python", "said"),
     [
         ("checks.quick", "'checks.quick' does not name a function: write 'file.py:function'"),
-        ("../checks.py:quick", "does not name a function"),
-        ("checks.py", "does not name a function"),
         ("check.py:quick", "cannot read check.py: No such file or directory. Did you mean 'checks"),
         ("checks.py:quik", "checks.py has no function 'quik'. Did you mean 'quick'?"),
         (
@@ -105,7 +103,6 @@ def test_loading_leaves_nothing_behind_in_the_folder(write: Write) -> None:
             "checks.py has no function 'zzz'. Its functions: anything, nothing, positional, ",
         ),
         ("checks.py:SETTING", "checks.py has no function 'SETTING'"),
-        ("checks.py:Limit", "checks.py has no function 'Limit'"),
         ("checks.py:nothing", "must take the recording as its first argument"),
         ("checks.py:anything", "the argument '**keys' cannot be given as a key of with"),
         ("checks.py:positional", "the argument 'a' cannot be given as a key of with"),
@@ -125,7 +122,6 @@ def test_what_cannot_be_loaded_is_told_at_its_line(write: Write, python: str, sa
     [
         ("def quick(recording:\n", "checks.py:1: '(' was never closed"),
         ("import math\n\nmath.nothing\n", "checks.py:3: AttributeError: module 'math' has no"),
-        ("import no_such_module\n", "checks.py:1: ModuleNotFoundError: No module named"),
         ("\nraise SystemExit(3)\n", "checks.py:2: SystemExit: 3"),
     ],
 )
@@ -140,7 +136,6 @@ def test_a_file_that_fails_names_its_own_line(write: Write, code: str, said: str
     [
         ("{}", "16: checks[0].with: the key 'within' is missing"),
         ("{within: 3}", "16: checks[0].with.within: 3 has no unit: write for example '3 s'"),
-        ("{within: 3 s, time: 1}", "16: checks[0].with.time: unknown key 'time'. Did you mean "),
         ("{within: 3 s, times: x}", "16: checks[0].with.times: expected a whole number, not 'x'"),
     ],
 )

@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 from mcap_ros2.writer import Writer
 
-from grader.assignment.load import load_assignment
 from grader.assignment.stimuli.kinds.publish import Publish
+from grader.assignment.stimuli.kinds.request import CallService, SetParameters
 from grader.assignment.stimuli.stimulus_model import Making
-from grader.errors import AssignmentError
 
 HEAD = """\
 rosgrade: 1
@@ -25,7 +24,7 @@ scenarios:
   - id: run
     launch: [{executable: echo}]
     record: [{topic: /echo, type: std_msgs/msg/String}]
-    random: {goal: [1 m, 2 m]}
+    random: {goal: [1 m, 2 m], speed: [1 m/s, 2 m/s]}
     timeout: 5 s
     stimuli:
 """
@@ -40,6 +39,9 @@ DEFINITIONS = {
     "geometry_msgs/msg/Twist": "Vector3 linear\nVector3 angular\n",
     "std_msgs/msg/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
     "builtin_interfaces/msg/Time": "int32 sec\nuint32 nanosec\n",
+    "std_srvs/srv/SetBool": "bool data # switch\n---\nbool success\nstring message\n",
+    "x/action/Fibonacci": "int32 order\n---\nint32[] sequence\n---\nint32[] sequence\n",
+    "x/srv/Go": "geometry_msgs/Vector3 to\n---\n",
     "bot_msgs/msg/Three": "uint8 ONE=1\nfloat64[3] values\nint8[<=2] few\nstring<=4 name\n",
 }
 
@@ -51,21 +53,15 @@ def folder(tmp_path: Path) -> Path:
     return found
 
 
+MAKING = Making(Path(), DEFINITIONS.__getitem__, 0, {"speed": 1.5}, [])
+Found = Callable[[str], list[str]]
+
+
 @pytest.fixture
-def mistakes(folder: Path, ros_with: Callable[..., None]) -> Callable[[str], list[str]]:
-    """Load an assignment with these stimuli; each mistake as ``line: text``."""
+def found(mistakes: Found, ros_with: Callable[..., None]) -> Found:
+    """Load an assignment with these stimuli."""
     ros_with(DEFINITIONS)
-
-    def load(stimuli: str) -> list[str]:
-        file = folder / "assignment.yaml"
-        file.write_text(HEAD + stimuli + TAIL, encoding="utf-8")
-        try:
-            load_assignment(folder)
-        except AssignmentError as error:
-            return [line.removeprefix(f"{file}:") for line in str(error).splitlines()]
-        return []
-
-    return load
+    return lambda stimuli: mistakes(HEAD + stimuli + TAIL)
 
 
 def publish(rest: str, type: str = "std_msgs/msg/String") -> str:
@@ -92,8 +88,8 @@ GOOD = [
 
 
 @pytest.mark.parametrize("stimuli", GOOD)
-def test_good_ones_are_read(mistakes: Callable[[str], list[str]], stimuli: str) -> None:
-    assert mistakes(stimuli) == []
+def test_good_ones_are_read(found: Found, stimuli: str) -> None:
+    assert found(stimuli) == []
 
 
 ONE_WAY = "give the messages in one way of message, messages, from, python"
@@ -124,7 +120,10 @@ FIT = [
         + "      - {join: /chatter, type: std_msgs/msg/String, name: late, after: 1 s}\n",
         "17: .*a late joiner would hear that",
     ),
-    ("      - {kill: ecko, after: 1 s}\n", "14: .*does not launch 'ecko'. Did you mean 'echo'?"),
+    (
+        "      - {kill: ecko, after: 1 s}\n",
+        "14: .*launches 'ecko' 0 times.* Did you mean 'echo'?",
+    ),
     (
         publish("messages: [{}]\nbefore_launch: 3\ndurability: transient_local"),
         "17: .*there are only 1 messages",
@@ -172,23 +171,18 @@ VALUES = [
 
 
 @pytest.mark.parametrize(("stimuli", "words"), FORM + FIT)
-def test_a_mistake_is_named_with_its_line(
-    mistakes: Callable[[str], list[str]], stimuli: str, words: str
-) -> None:
-
-    found = mistakes(stimuli)
-    assert len(found) == 1, found
-    assert re.search(words, found[0]), found
+def test_a_mistake_is_named_with_its_line(found: Found, stimuli: str, words: str) -> None:
+    (told,) = found(stimuli)
+    assert re.search(words, told), told
 
 
 @pytest.mark.parametrize(("message", "type", "words"), VALUES)
 def test_a_value_that_does_not_fit_is_named_with_its_line(
-    mistakes: Callable[[str], list[str]], message: str, type: str, words: str
+    found: Found, message: str, type: str, words: str
 ) -> None:
-
-    (found,) = mistakes(publish(message, type))
-    assert found.startswith("16: scenarios[0].stimuli[0].message")
-    assert re.search(words, found), found
+    (told,) = found(publish(message, type))
+    assert told.startswith("16: scenarios[0].stimuli[0].message")
+    assert re.search(words, told), told
 
 
 def read(folder: Path, **keys: object) -> list[tuple[dict[str, object], float]]:
@@ -249,10 +243,7 @@ def bag(file: Path, topic: str, type: str, definition: str, data: object) -> byt
 
 
 @pytest.mark.parametrize(("rest", "words"), FILES)
-def test_a_file_that_is_wrong_is_named(
-    mistakes: Callable[[str], list[str]], folder: Path, rest: str, words: str
-) -> None:
-
+def test_a_file_that_is_wrong_is_named(found: Found, folder: Path, rest: str, words: str) -> None:
     (folder / "empty.csv").write_text("data\n", encoding="utf-8")
     (folder / "wrong.csv").write_text("data,q\na,1\n", encoding="utf-8")
     (folder / "long.csv").write_text("data\na,1\n", encoding="utf-8")
@@ -265,8 +256,8 @@ def test_a_file_that_is_wrong_is_named(
     (folder / "cases.py").write_text(
         "def raises(seed):\n    return 1 / 0\ndef text(seed):\n    return 'a'\n", encoding="utf-8"
     )
-    (found,) = mistakes(publish(rest))
-    assert re.search(words, found), found
+    (told,) = found(publish(rest))
+    assert re.search(words, told), told
 
 
 @pytest.mark.parametrize(
@@ -279,19 +270,19 @@ def test_a_file_that_is_wrong_is_named(
     ],
 )  # fmt: skip
 def test_a_cell_of_a_csv_file_that_does_not_fit_is_named_with_its_line(
-    mistakes: Callable[[str], list[str]], folder: Path, type: str, rows: str, words: str
+    found: Found, folder: Path, type: str, rows: str, words: str
 ) -> None:
     (folder / "n.csv").write_text(rows, encoding="utf-8")
-    (found,) = mistakes(publish("from: n.csv\nevery: 1 s", type))
-    assert found.startswith("16: scenarios[0].stimuli[0].from: n.csv:")
-    assert re.search(words, found), found
+    (told,) = found(publish("from: n.csv\nevery: 1 s", type))
+    assert told.startswith("16: scenarios[0].stimuli[0].from: n.csv:")
+    assert re.search(words, told), told
 
 
-def test_until_done_needs_a_stimulus_with_an_end(mistakes: Callable[[str], list[str]]) -> None:
+def test_until_done_needs_a_stimulus_with_an_end(found: Found) -> None:
     until = "    until: {stimuli: done}\n"
-    assert mistakes(publish("message: {}") + until) == []
-    (found,) = mistakes(publish("message: {}\nevery: 1 s") + until)
-    assert "until.stimuli: no stimulus of the scenario has an end" in found
+    assert found(publish("message: {}") + until) == []
+    (told,) = found(publish("message: {}\nevery: 1 s") + until)
+    assert "until.stimuli: no stimulus of the scenario has an end" in told
 
 
 @pytest.mark.parametrize(
@@ -307,10 +298,84 @@ def test_until_done_needs_a_stimulus_with_an_end(mistakes: Callable[[str], list[
         ),
     ],
 )
-def test_a_check_of_a_stimulus_needs_it(
-    mistakes: Callable[[str], list[str]], check: str, words: str
-) -> None:
+def test_a_check_of_a_stimulus_needs_it(found: Found, check: str, words: str) -> None:
     stimuli = publish("message: {}") + GOOD[10]
     checks = f"checks:\n  - {{id: one, points: 1, {check}}}\n#"
-    (found,) = mistakes(stimuli + checks)
-    assert words in found
+    (told,) = found(stimuli + checks)
+    assert words in told
+
+
+@pytest.mark.parametrize(
+    "stimulus",
+    [
+        "- {call: /enable, type: std_srvs/srv/SetBool, request: {data: true}, at_once: 2}",
+        "- {call: /enable, type: std_srvs/srv/SetBool, requests: [{}, {data: false}], every: 1 s}",
+        "- {call: list_parameters, every: 500 ms}",
+        "- {call: /go, type: x/srv/Go, request: {to.x: $speed, to.y: 30 deg}}",
+        "- {call: /other, type: nav2_msgs/srv/Other, request: {any: thing}}",
+        "- {read_parameters: bot, after: 1 s}",
+        "- {set_parameters: {speed: $speed, names: [a, b]}, node: /robot/bot}",
+        "- {send_goal: /fib, type: x/action/Fibonacci, goal: {order: 5}, cancel_after: 1 s}",
+        "- {send_goal: /fib, type: x/action/Fibonacci, goal: {order: 5}, preempt: true}",
+    ],
+)
+def test_requests_that_fit_are_read(found: Found, stimulus: str) -> None:
+    assert found(f"      {stimulus}\n") == []
+
+
+@pytest.mark.parametrize(
+    ("stimulus", "expected"),
+    [
+        (
+            "- call: /enable\n        type: std_srvs/srv/SetBool\n        request: {dat: true}",
+            r"16: .*has no field 'dat'. Did you mean 'data'\?",
+        ),
+        ("- {call: /enable, type: std_srvs/srv/SetBool, request: {data: 3}}", "expected true or"),
+        ("- {call: /enable, type: std_msgs/msg/Bool}", "expected an interface in srv"),
+        (
+            "- {call: /e, type: std_srvs/srv/SetBool, request: {}, requests: [{}]}",
+            "either 'request' or 'requests'",
+        ),
+        ("- {call: /e, type: std_srvs/srv/SetBool, requests: [{}], count: 2}", "'count' says how"),
+        ("- {call: enable, every: 1 s}", "expected 'list_parameters'"),
+        ("- {call: /enable}", "the key 'type' is missing"),
+        ("- {call: /e, type: std_srvs/srv/SetBool, after: 9 s}", "is not before the timeout of 5"),
+        ("- {set_parameters: {}, node: bot}", "at least 1"),
+        ("- {set_parameters: {a: []}, node: bot}", "an empty list has no type"),
+        ("- {set_parameters: {a: [1, x]}, node: bot}", "a list of one kind"),
+        ("- {set_parameters: {a: {b: 1}}, node: bot}", "expected a truth, a number, a text"),
+        ("- {set_parameters: {a: $sped}, node: bot}", "Did you mean 'speed'"),
+        ("- {set_parameters: {a: 1}, node: b-t}", "is not a node name"),
+        ("- {set_parameters: {a: 1}}", "the key 'node' is missing"),
+        (
+            "- {send_goal: /fib, type: x/action/Fibonacci, goal: {ordre: 5}}",
+            "Did you mean 'order'",
+        ),
+        ("- {send_goal: /fib, type: x/srv/Go}", "expected an interface in action"),
+        ("- {send_gaol: /fib, type: x/action/Fibonacci}", "Did you mean 'send_goal'"),
+    ],
+)
+def test_a_request_that_does_not_fit_is_named(found: Found, stimulus: str, expected: str) -> None:
+    told = found(f"      {stimulus}\n")
+    assert any(re.search(expected, one) for one in told), told
+
+
+def test_requests_have_values_in_si_units_and_drawn_ones() -> None:
+    call = CallService.model_validate(
+        {
+            "call": "/go",
+            "type": "x/srv/Go",
+            "request": {"to.x": "$speed", "to.y": "180 deg"},
+            "count": 2,
+        }
+    )
+    first, second = call.order(MAKING)["requests"]
+    assert first == second == {"to": {"x": 1.5, "y": pytest.approx(3.14159265)}}
+
+
+def test_the_type_of_a_parameter_is_that_of_the_yaml() -> None:
+    given = {"a": 1, "b": 1.0, "c": "2 m", "d": True, "e": "text", "f": [1, 2.5], "g": "$speed"}
+    item = SetParameters.model_validate({"set_parameters": given, "node": "bot"})
+    found = item.order(MAKING)["values"]
+    assert found == {"a": 1, "b": 1.0, "c": 2.0, "d": True, "e": "text", "f": [1, 2.5], "g": 1.5}
+    assert [type(found[name]) for name in "abcd"] == [int, float, float, bool]

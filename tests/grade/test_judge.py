@@ -5,10 +5,9 @@ from dataclasses import replace
 import pytest
 
 from grader.assignment.model import Launch
-from grader.checks.check import NoParameters, Subject
+from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Status
 from grader.checks.motion.robot_check import RobotParameters
-from grader.errors import GraderFault
 from grader.grade import grade
 from grader.recording.event import Disturbance
 from grader.recording.model import NS, Ending
@@ -44,12 +43,6 @@ def statuses(result):
 
 
 class TestRequirements:
-    def test_everything_passes(self):
-        result = judge(Told("node", points=1.5), Told("topic", requires=("node",), points=2))
-        assert (result.score, result.max_score, result.graded) == (3.5, 3.5, True)
-        assert result.full_points
-        assert result.first_to_fix() is None
-
     def test_a_check_whose_requirement_failed_is_skipped_and_not_a_second_mistake(self):
         topic = Told("topic", requires=("node",), title="It publishes on /cmd_vel")
         result = judge(Told("node", FAIL, title="The node is there"), topic)
@@ -58,15 +51,6 @@ class TestRequirements:
         finding = result.result("topic").decisive.finding
         assert finding.observed == "“The node is there” did not pass, so this could not be judged"
         assert finding.hint == "Fix “The node is there” first: this is not a second mistake."
-
-    def test_a_chain_of_skips_names_the_mistake_at_its_bottom(self):
-        result = judge(
-            Told("values", requires=("topic",)),
-            Told("topic", requires=("node",)),
-            Told("node", FAIL, title="The node is there"),
-        )
-        assert result.result("values").waits_for == ("node",)
-        assert "“The node is there”" in result.result("values").decisive.finding.expected
 
     def test_results_stay_in_the_authors_order(self):
         result = judge(Told("topic", requires=("node",)), Told("node"), Told("alone"))
@@ -92,10 +76,6 @@ class TestFirstToFix:
         assert result.first_to_fix() is result.result("node")
         assert [item.id for item in result.waiting_for("node")] == ["topic", "values"]
 
-    def test_of_equals_it_is_the_one_that_the_author_wrote_first(self):
-        result = judge(Told("a"), Told("b", FAIL), Told("c", FAIL))
-        assert result.first_to_fix() is result.result("b")
-
     def test_a_crash_that_fails_several_checks_comes_before_what_only_misses_its_topic(self):
         place = SourceError("bot.py", 8, "NameError: name 'coutn' is not defined")
         crashed, again = (
@@ -117,10 +97,6 @@ class TestFirstToFix:
         result = judge(Told("node", PASS, points=1), Told("silence", FAIL, points=0))
         assert result.first_to_fix() is None
         assert result.full_points
-
-    def test_what_has_points_comes_before_what_is_shown_without(self):
-        result = judge(Told("silence", FAIL, points=0), Told("node", FAIL, points=1))
-        assert result.first_to_fix() is result.result("node")
 
     def test_a_check_without_points_comes_first_if_others_wait_for_it(self):
         result = judge(Told("starts", FAIL, points=0), Told("node", requires=("starts",)))
@@ -169,10 +145,6 @@ class TestScenarios:
         assert result.score == 1.0
         assert result.result("reaches").decisive.scenario == "far"
 
-    def test_partial_credit_in_one_scenario_does_not_outweigh_a_plain_failure_in_another(self):
-        says = {"near": Finding.failed("", "", credit=0.9), "far": FAIL}
-        assert judge(Told("reaches", says), scenarios=("near", "far")).score == 0.0
-
     def test_a_check_judges_only_the_scenarios_that_it_names(self):
         told = Told("node", scenarios=("renamed",))
         result = judge(told, scenarios=("listen", "renamed"))
@@ -210,9 +182,6 @@ class TestOurFaults:
     def test_points_that_wait_for_an_error_without_points_are_not_graded(self):
         shown = Told("shown", Finding.error("", ""), points=0)
         assert not judge(shown, Told("node", requires=("shown",), points=2)).graded
-
-    def test_even_our_own_exceptions_are_not_let_through(self):
-        assert not judge(Told("node", GraderFault("no memory"))).graded
 
     @pytest.mark.parametrize(
         ("says", "observed"),
@@ -282,26 +251,12 @@ class TestOurFaults:
         assert result.disturbed_scenarios(Status.ERROR) == ("a", "c")
         assert result.disturbed_scenarios(Status.FAILED) == ()
 
-    @pytest.mark.parametrize(
-        ("judged", "waited_s", "every_s", "again"),
-        [
-            pytest.param(RobotParameters(), 0.3, 9.0, True, id="held up once for long"),
-            pytest.param(RobotParameters(), 0.01, 0.2, False, id="many short waits"),
-            pytest.param(RobotParameters(), 0.0, 9.0, False, id="left alone"),
-            pytest.param(NoParameters(), 0.3, 9.0, False, id="not about a control loop"),
-        ],
-    )
-    def test_where_a_held_up_robot_went_is_worth_a_second_run(
-        self, judged, waited_s, every_s, again
-    ):
-        waits = [
-            Disturbance(LAUNCHED_NS + round(k * every_s * NS), 0, round(waited_s * NS))
-            for k in range(1, round(20 / every_s))
-        ]
-        run = make_recording("a", truth=drive(20), disturbance=tuple(waits))
-        result = judge(
-            Told("goal", FAIL, parameters=judged), scenarios=("a",), recordings={"a": run}
-        )
+    @pytest.mark.parametrize(("waited_s", "again"), [(0.3, True), (0.0, False)])
+    def test_where_a_held_up_robot_went_is_worth_a_second_run(self, waited_s, again):
+        waits = (Disturbance(LAUNCHED_NS + 9 * NS, 0, round(waited_s * NS)),)
+        run = make_recording("a", truth=drive(20), disturbance=waits)
+        goal = Told("goal", FAIL, parameters=RobotParameters())
+        result = judge(goal, scenarios=("a",), recordings={"a": run})
         assert result.result("goal").status is Status.FAILED
         assert result.disturbed_scenarios(Status.FAILED) == (("a",) if again else ())
 
@@ -314,16 +269,6 @@ class TestNotRun:
         culprit=SourceError("src/bot_publisher/setup.py", 24, "SyntaxError: '(' was never closed"),
     )
 
-    def test_behind_the_check_of_the_build_everything_is_skipped(self):
-        result = judge(
-            Told("builds", FAIL, subject=Subject.SUBMISSION),
-            Told("node", requires=("builds",)),
-            submission=make_submission(build=self.BROKEN),
-            recordings={},
-        )
-        assert statuses(result) == {"builds": "failed", "node": "skipped"}
-        assert result.graded
-
     def test_without_that_requirement_the_check_fails_and_shows_the_file_and_line(self):
         result = judge(Told("node"), submission=make_submission(build=self.BROKEN), recordings={})
         finding = result.result("node").decisive.finding
@@ -333,13 +278,6 @@ class TestNotRun:
             "src/bot_publisher/setup.py:24: SyntaxError: '(' was never closed" in finding.observed
         )
         assert finding.evidence.places == (self.BROKEN.culprit,)
-
-    def test_a_submission_that_cannot_be_read_fails_with_its_problem(self):
-        submission = make_submission(problem="the archive is empty", packages=(), build=None)
-        result = judge(Told("node"), submission=submission, recordings={})
-        finding = result.result("node").decisive.finding
-        assert finding.status is Status.FAILED
-        assert finding.observed.endswith(": the archive is empty")
 
     def test_a_package_that_was_never_built_is_our_fault(self):
         submission = make_submission(build=None)

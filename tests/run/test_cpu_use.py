@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterable
+from functools import partial
 from itertools import count
 
 import pytest
@@ -15,9 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.run.host.cpu_use import CpuMeter, CpuTimes, Interval, idle_ticks, interval, others_share
-from grader.run.host.disturbance import DisturbanceMeter
-from grader.run.host.run_delay import RunDelays
-from grader.run.process.descendants import Family, descendants
+from grader.run.host.disturbance import DisturbanceMeter, run_delays
+from grader.run.process.descendants import descendant_pids
 
 MS = 1_000_000
 
@@ -30,35 +30,22 @@ def samples(*others_ms: float, length_ms: int = 100) -> list[Interval]:
     ]
 
 
-def test_what_the_student_s_own_processes_burn_is_no_disturbance() -> None:
-    # Eight busy processes on two CPUs: each waits three quarters of the time.
-    before, after = CpuTimes(0, 0, 0), CpuTimes(100 * MS, 200 * MS, 0)
-    own = interval(before, after, cpus=2)
-    assert others_share(75 * MS, [own, own]) == 0
-
-
-def test_what_the_host_takes_is_a_disturbance_in_full() -> None:
-    # Somebody else keeps both CPUs busy; the student gets 10 ms of 200.
-    taken = interval(CpuTimes(0, 0, 0), CpuTimes(100 * MS, 10 * MS, 0), cpus=2)
-    assert others_share(90 * MS, [taken]) == 90 * MS
-
-
-def test_a_busy_student_is_disturbed_by_what_others_take_and_not_by_the_rest() -> None:
-    # Two busy threads, two CPUs, and the probe with 5 ms: at most that was taken.
-    mixed = interval(CpuTimes(0, 0, 0), CpuTimes(100 * MS, 195 * MS, 0), cpus=2)
-    assert others_share(60 * MS, [mixed]) == 5 * MS
-
-
-def test_cpus_that_have_nothing_to_do_take_nothing_from_anybody() -> None:
-    # Four threads that are busy four tenths of the time and meet on one CPU.
-    idle = interval(CpuTimes(0, 0, 0), CpuTimes(100 * MS, 160 * MS, 40 * MS), cpus=2)
-    assert others_share(25 * MS, [idle]) == 0
-
-
-def test_a_machine_that_stood_still_took_the_time() -> None:
-    # A virtual machine was stopped for a second: neither used nor idle.
-    frozen = interval(CpuTimes(0, 0, 0), CpuTimes(1000 * MS, 20 * MS, 180 * MS), cpus=2)
-    assert others_share(900 * MS, [frozen]) == 900 * MS
+@pytest.mark.parametrize(
+    ("waited_ms", "wall_ms", "student_ms", "idle_ms", "others_ms"),
+    [
+        pytest.param(75, 100, 200, 0, 0, id="eight busy processes of the student's on two CPUs"),
+        pytest.param(90, 100, 10, 0, 90, id="others keep both CPUs busy"),
+        pytest.param(60, 100, 195, 0, 5, id="two busy threads of the student's, and the probe"),
+        pytest.param(25, 100, 160, 40, 0, id="four threads that meet on one CPU"),
+        pytest.param(900, 1000, 20, 180, 900, id="a virtual machine that stood still"),
+    ],
+)
+def test_only_what_others_had_of_the_cpus_is_a_disturbance(
+    waited_ms: int, wall_ms: int, student_ms: int, idle_ms: int, others_ms: int
+) -> None:
+    after = CpuTimes(wall_ms * MS, student_ms * MS, idle_ms * MS)
+    measured = interval(CpuTimes(0, 0, 0), after, cpus=2)
+    assert others_share(waited_ms * MS, [measured]) == others_ms * MS
 
 
 def test_a_long_wait_is_booked_at_its_end_and_explained_by_all_of_its_time() -> None:
@@ -89,12 +76,9 @@ class PretendedCpus(CpuMeter):
 
     def __init__(self, student: float) -> None:
         super().__init__()
+        self.cpus = 2
         self._student = student
         self._now_ns = 0
-
-    @property
-    def cpus(self) -> int:
-        return 2
 
     def read(self, pids: Iterable[int]) -> CpuTimes:
         self._now_ns += 100 * MS
@@ -107,14 +91,13 @@ def test_a_wait_is_a_disturbance_only_as_far_as_others_had_the_cpus(
 ) -> None:
     waits, enough = count(step=75 * MS), threading.Event()
 
-    class PretendedDelays(RunDelays):
-        def read(self, pid: int) -> dict[int, int]:
-            waited_ns = next(waits)
-            if waited_ns > 5 * 75 * MS:
-                enough.set()
-            return {pid: waited_ns}
+    def delays(pid: int) -> dict[int, int]:
+        waited_ns = next(waits)
+        if waited_ns > 5 * 75 * MS:
+            enough.set()
+        return {pid: waited_ns}
 
-    meter = DisturbanceMeter(lambda: (1,), PretendedCpus(student), PretendedDelays())
+    meter = DisturbanceMeter(lambda: (1,), PretendedCpus(student), delays)
     meter.start()
     assert enough.wait(30)
     third = meter.stop()[3]
@@ -158,19 +141,19 @@ while True:
     except ChildProcessError:
         pass
 """
-    meter, family = CpuMeter(), Family(os.getpid())
+    meter, look = CpuMeter(), partial(descendant_pids, os.getpid(), zombies=True)
     with subprocess.Popen([sys.executable, "-S", "-c", script]) as relay:
         try:
-            first, hidden = meter.read(family.look()), 0
+            first, hidden = meter.read(look()), 0
             until_s = time.monotonic() + 30
             while hidden < 10 and time.monotonic() < until_s:
                 time.sleep(0.1)
-                hidden += meter.read(family.look()).orphans
+                hidden += meter.read(look()).orphans
         finally:
             relay.kill()
     # Some of what each took is known, and that each has ended.
     assert hidden >= 10
-    assert meter.read(family.look()).student_ns - first.student_ns > 100 * MS
+    assert meter.read(look()).student_ns - first.student_ns > 100 * MS
 
 
 def test_idle_time_is_read_of_the_cpus_that_may_be_used() -> None:
@@ -204,27 +187,25 @@ def test_a_process_s_time_counts_when_it_has_ended_as_well() -> None:
     assert meter.cpus == len(os.sched_getaffinity(0))
 
 
-def test_the_family_of_a_process_holds_the_children_of_its_children() -> None:
-    script = (
-        "import subprocess\nprint(subprocess.Popen(['sleep', '60']).pid, flush=True)\ninput()\n"
-    )
-    command = [sys.executable, "-S", "-c", script]
-    with subprocess.Popen(
-        command, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as child:
-        assert child.stdout is not None
-        ours = Family(os.getpid())
-        assert child.pid in ours.look()
-        try:
-            grandchild = int(child.stdout.readline())
-            assert {child.pid, grandchild} <= ours.look()
-            assert Family(child.pid).look() == {grandchild} == set(descendants(child.pid))
-            assert child.stdin is not None
-            child.stdin.close()
-            child.wait()
-            assert child.pid not in ours.look()
-            # Its parent has gone; whoever is known stays known.
-            assert grandchild in ours.look()
-        finally:
-            os.kill(grandchild, 9)
-            child.kill()
+BURN = """\
+import os, sys, time
+os.sched_setaffinity(0, {int(sys.argv[1])})
+while time.process_time() < 0.2: pass
+print(flush=True)
+input()
+"""
+
+
+def test_threads_that_share_one_cpu_wait_for_it() -> None:
+    command = [sys.executable, "-S", "-c", BURN, str(min(os.sched_getaffinity(0)))]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    both = [subprocess.Popen(command, **pipes) for _ in range(2)]
+    try:
+        for process in both:
+            assert process.stdout is not None and process.stdout.readline()
+        # Each had 0.2 s of the same CPU: one of them waited for most of the other's.
+        assert max(run_delays(process.pid)[process.pid] for process in both) > 50 * MS
+    finally:
+        for process in both:
+            process.communicate()
+    assert run_delays(both[0].pid) == {}

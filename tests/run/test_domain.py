@@ -17,30 +17,15 @@ def test_two_holders_never_have_the_same_domain() -> None:
     assert set(held) <= set(range(1, 102))
 
 
-def test_a_released_domain_can_be_locked_again() -> None:
-    others = set(DOMAINS) - {lock_and_release()}
-    with lock_domain(others) as lock:
-        assert lock.domain_id not in others
-
-
-def lock_and_release() -> int:
-    with lock_domain() as lock:
-        return lock.domain_id
-
-
-def test_avoided_domains_are_not_used() -> None:
-    with lock_domain(set(DOMAINS) - {17, 18}) as lock:
-        assert lock.domain_id in (17, 18)
+def test_avoided_domains_are_not_used_and_a_released_one_is_again() -> None:
+    for _ in range(2):
+        with lock_domain(set(DOMAINS) - {17}) as lock:
+            assert lock.domain_id == 17
 
 
 def test_no_domain_left_is_our_fault() -> None:
     with pytest.raises(GraderFault, match="all ROS domains from 1 to 101 are in use"):
         lock_domain(DOMAINS)
-
-
-def table(*ports: int) -> str:
-    rows = [f" {n}: 0100007F:{port:04X} 00000000:0000 07 0 0 0" for n, port in enumerate(ports)]
-    return "\n".join(("  sl  local_address rem_address   st", *rows))
 
 
 @pytest.mark.parametrize(
@@ -59,4 +44,4 @@ def table(*ports: int) -> str:
 def test_a_domain_is_joined_by_a_participant_and_not_by_any_socket(
     ports: tuple[int, ...], domains: tuple[int, ...]
 ) -> None:
-    assert domains_of_ports(table(*ports)) == domains
+    assert domains_of_ports(ports) == domains

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from grader.run.process.guard import Guard
-from grader.sandbox.seccomp import can_end, guard_filter, guarded_calls, told_of
+from grader.sandbox.seccomp import can_end, guard_filter, guarded_calls, violation_of
 
 pytest.importorskip("pyseccomp")
 CALLS = guarded_calls()
@@ -48,7 +48,7 @@ def run(guard: Guard, source: str) -> str:
     ],
 )
 def test_a_call_is_put_into_words(name: str, arguments: tuple[int, ...], said: str | None) -> None:
-    told = told_of(name, (*arguments, *(0,) * (6 - len(arguments))))
+    told = violation_of(name, (*arguments, *(0,) * (6 - len(arguments))))
     assert told == said if said is None else told is not None and told.startswith(said)
 
 
@@ -59,7 +59,7 @@ def test_a_process_that_may_stop_another_may_have_ended_it(number: int) -> None:
 
 
 def test_a_process_id_counts_by_the_bits_that_the_kernel_looks_at() -> None:
-    assert told_of("kill", ((1 << 32) + INIT, 9, 0, 0, 0, 0)) is not None
+    assert violation_of("kill", ((1 << 32) + INIT, 9, 0, 0, 0, 0)) is not None
 
 
 def test_what_a_process_asks_for_is_refused_and_told(guard: Guard) -> None:

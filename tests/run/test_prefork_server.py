@@ -64,7 +64,7 @@ def test_a_cell_that_hangs_keeps_nobody_waiting_for_the_end(boxed: bool, tmp_pat
         pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
     prefork_server = PreforkServer(ros.find(), Sandbox(tmp_path / "cache") if boxed else None)
     cell = CellProcess(prefork_server)
-    cell._forked._await_fork(timeout=None)
+    cell.await_fork()
     usages = usage_of([prefork_server._popen.pid])
     (hung,) = {usage.pid for usage in usages} - {usage.parent for usage in usages}
     its_end = os.pidfd_open(hung)
@@ -80,7 +80,7 @@ def test_a_cell_that_hangs_keeps_nobody_waiting_for_the_end(boxed: bool, tmp_pat
 def test_a_cell_that_hangs_does_not_outlive_long_whoever_could_kill_it() -> None:
     prefork_server = PreforkServer(ros.find())
     cell = CellProcess(prefork_server)
-    cell._forked._await_fork(timeout=None)
+    cell.await_fork()
     (hung,) = {usage.pid for usage in usage_of([prefork_server._popen.pid])} - {
         prefork_server._popen.pid
     }

@@ -15,7 +15,7 @@ from grader import ros
 from grader.errors import UsageError
 from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.model import NS
-from grader.run.replay import ReplayOrder, make_order
+from grader.run.replay import make_order
 from grader.run.runner import Runner
 from grader.scratch import PREFIX
 from tests.recording.written import write_robot_run
@@ -138,15 +138,6 @@ def test_a_scenario_that_is_no_longer_there_is_named(tmp_path: Path) -> None:
     recording = write_robot_run(tmp_path / "run.mcap", scenario="walk")
     with pytest.raises(UsageError, match="the assignment 'test' has no scenario 'walk'"):
         make_order(tmp_path / "run.mcap", recording, assignment(), ros.find(), tmp_path, tmp_path)
-
-
-@pytest.mark.ros
-def test_an_order_reaches_the_player_as_it_is(run: tuple[Path, Path], tmp_path: Path) -> None:
-    file, place = run
-    order = make_order(file, read_recording(file), assignment(), ros.find(), place, tmp_path)
-    assert ReplayOrder.from_json(order.to_json()) == order
-    assert [one.topic for one in order.inputs] == ["/chatter"]
-    assert order.outputs["/echo"] == "std_msgs/msg/String"
 
 
 def _running(fragment: str) -> list[bytes]:

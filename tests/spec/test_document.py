@@ -27,32 +27,23 @@ def error(text: str) -> str:
     ("written", "meant"),
     [
         ("on", "on"),
-        ("off", "off"),
-        ("yes", "yes"),
         ("No", "No"),
-        ("y", "y"),
         ("12:30", "12:30"),
-        ("1:30:00", "1:30:00"),
         ("2026-11-21", "2026-11-21"),
         ("1_000", "1_000"),
         ("010", 10),
         ("0o17", 15),
         ("0x1F", 31),
         ("1e-3", 0.001),
-        ("1E3", 1000.0),
         (".5", 0.5),
         ("1.", 1.0),
         ("-.inf", float("-inf")),
-        ("+3", 3),
         ("true", True),
         ("False", False),
         ("~", None),
-        ("null", None),
         ("", None),
         ("300 ms", "300 ms"),
-        ("5 %", "5 %"),
         ("'true'", "true"),
-        ("!!str 5", "5"),
         ("!!float 5", 5.0),
     ],
 )
@@ -131,7 +122,6 @@ def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path: Path) -> N
     [
         ("a: 1\nb:\n\tc: 1", 3, "indent with spaces, not with tabs"),
         ("a: b: c", 1, "a text with ': ' in it needs quotes"),
-        ("a: 1\n b: 2", 2, "mapping values are not allowed here"),
         ("a:\n  - id: x\n   points: 1", 3, "is a line indented further than those around it?"),
         ("a: 1\nb: 'x\nc: 1\n", 2, "unexpected end of stream (its closing quote is missing)"),
         ('a: 1\nb: "x\nc: 1\nd: "y z"\ne: 2\n', 4, "and is every quote before it closed?"),
@@ -146,20 +136,14 @@ def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path: Path) -> N
         ('a: "\\ud800"', 1, "cannot be read as !!str"),
         ('"\\ud800": 1', 1, "cannot be read as !!str"),
         ("a: 1\n\nb: 2\na: 3", 4, "the key 'a' stands twice (first in line 1)"),
-        ("a:\n  b: 1\n  b: 2", 3, "a: the key 'b' stands twice (first in line 2)"),
         ("a: 1\n? [x, y]\n: 2", 2, "a key must be a plain word"),
         ("a: &x {b: 1}\nc:\n  <<: *x", 3, "c: merging (<<) is not part of YAML 1.2"),
         ("a: !!python/object:os.system x", 1, "tag !!python/object:os.system is not allowed"),
-        ("a: !!python/name:os.system", 1, "a: the tag !!python/name:os.system is not allowed"),
         ("a: !!binary aGk=", 1, "a: the tag !!binary is not allowed here"),
-        ("a: !!set {b}", 1, "a: the tag !!set is not allowed here"),
         ("a: !mine 1", 1, "a: the tag !mine is not allowed here"),
         ("a: !!int x", 1, "'x' cannot be read as !!int"),
-        ("a: !!bool on", 1, "'on' cannot be read as !!bool"),
-        ("- 1", 1, "expected keys and values at the top"),
         ("word", 1, "expected keys and values at the top"),
         ("", 1, "the file is empty"),
-        ("# nothing\n", 1, "the file is empty"),
     ],
 )
 def test_what_cannot_be_read_says_where_and_why(text: str, line: int, said: str) -> None:
@@ -175,10 +159,6 @@ def test_an_integer_of_thousands_of_digits_says_where_and_why() -> None:
     message = error("a: " + "9" * 5000)
     assert message.startswith("assignment.yaml:1: ")
     assert "9999…' cannot be read as !!int" in message
-
-
-def test_all_double_keys_are_told_at_once() -> None:
-    assert len(error("a: 1\na: 2\nb: 1\nb: 2").splitlines()) == 2
 
 
 @pytest.mark.parametrize("text", ["a: &a\n  - 1\n  - [*a]\n", "a: " + "[" * 3_000 + "]" * 3_000])

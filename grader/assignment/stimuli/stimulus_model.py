@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from grader.assignment.stimuli.message import Find, StimulusError
 from grader.spec.document import Place
-from grader.spec.nearest_name import did_you_mean
+from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Model
 
 if TYPE_CHECKING:
@@ -37,21 +37,13 @@ class Making:
 
     def process(self, key: str, executable: str, package: str | None) -> str:
         """The launched process of an executable, of any package by default."""
-        launched = [process.partition("/") for process in self.processes]
-        fitting = [
-            f"{its_package}/{name}"
-            for its_package, _, name in launched
-            if name == executable and package in (None, its_package)
-        ]
-        if len(fitting) > 1:
-            text = f"{executable!r} is launched {len(fitting)} times: only one can be meant"
-            raise StimulusError(text, (key,))
-        if not fitting:
-            names = [name for _, _, name in launched]
-            advice = did_you_mean(executable, names) or f" It has: {', '.join(names)}."
-            text = f"the scenario does not launch {executable!r}.{advice}"
-            raise StimulusError(text, (key,))
-        return fitting[0]
+        ending = f"/{executable}" if package is None else f"/{package}/{executable}"
+        fitting = [process for process in self.processes if f"/{process}".endswith(ending)]
+        if len(fitting) == 1:
+            return fitting[0]
+        advice = nearest_or_all(executable, [one.partition("/")[2] for one in self.processes])
+        text = f"the scenario launches {executable!r} {len(fitting)} times, not once.{advice}"
+        raise StimulusError(text, (key,))
 
 
 class StimulusModel(Model):

@@ -110,7 +110,6 @@ def why_never_spun(
     seen: str,
     nodes: Iterable[str] = (),
     processes: Iterable[Process] | None = None,
-    moments: tuple[Moment, ...] = (),
 ) -> Cause | None:
     """The cause if nothing spins a node, as its process declares.
 
@@ -122,22 +121,20 @@ def why_never_spun(
         (item for item in candidates if declarations.never_spun(recording, item.name)), None
     )
     if process is None:
-        return why_not_given(recording, seen, nodes, moments)
+        return why_not_given(recording, seen, nodes)
     place = interrupted_place(recording, process.name)
     where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
     return Cause(
         f"{seen}: rclpy.spin() was never called, so no callback runs{where}",
         "Call rclpy.spin(node) in main(), and let nothing before it wait or loop for ever.",
         Evidence(
-            moments or (until_the_end(recording, "rclpy.spin() was still not called"),),
-            (place,) if place else (),
+            moments=(until_the_end(recording, "rclpy.spin() was still not called"),),
+            places=(place,) if place else (),
         ),
     )
 
 
-def why_not_given(
-    recording: Recording, seen: str, nodes: Iterable[str], moments: tuple[Moment, ...] = ()
-) -> Cause | None:
+def why_not_given(recording: Recording, seen: str, nodes: Iterable[str]) -> Cause | None:
     """The cause if nodes were given to no executor, though their process has one that spins."""
     names = sorted(set(nodes))
     if not names or not all(declarations.in_no_executor(recording, name) for name in names):
@@ -147,7 +144,7 @@ def why_not_given(
         "callbacks runs",
         "Give the node to the executor that spins, executor.add_node(node), or call "
         "rclpy.spin(node).",
-        Evidence(moments or (until_the_end(recording, "no executor had the node"),)),
+        Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from grader.checks.wording import code, codes
+from grader.diagnosis.process.raised import Failure
 from grader.recording.model import Recording
 from grader.spec.nearest_name import nearest
 from grader.submission.read.rosdistro import PACKAGES, PYTHON_MODULES
@@ -15,13 +16,13 @@ _MISSING_ROOT = re.compile(r"No module named '([A-Za-z_]\w*)'$")
 _WITHOUT_PYTHON = re.compile(r"rcl|rcl_.+|rclc.*|rcutils|rcpputils|rmw.*|ament_cmake.*|rosidl_.+")
 
 
-def lacking_package(message: str, recording: Recording) -> str | None:
+def lacking_package(failure: Failure, recording: Recording) -> str | None:
     """The ROS package of Jazzy that an import wants and the installation lacks, or None.
 
     Right code runs where the package is installed, so its absence is not the student's fault.
     """
-    found = _MISSING_ROOT.match(message)
-    if found is None or found[1] not in PACKAGES:
+    found = _MISSING_ROOT.match(failure.message)
+    if failure.type != "ModuleNotFoundError" or found is None or found[1] not in PACKAGES:
         return None
     if found[1] not in PYTHON_MODULES and _WITHOUT_PYTHON.fullmatch(found[1]):
         return None

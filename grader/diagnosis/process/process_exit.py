@@ -22,18 +22,11 @@ from grader.submission.record import SourceError
 _LOG_LINES = 15
 
 
-class SignalRow(Model):
-    """A signal that ends a process, in words, and what to look for."""
-
-    words: str
-    hint: str = ""
-
-
 class Table(Model):
-    """The whole of ``process_exit.yaml``: signals by name, and hints by what a breach is of."""
+    """The whole of ``process_exit.yaml``: signals in words, and hints by signal and by breach."""
 
-    signals: dict[str, SignalRow]
-    breaches: dict[str, str]
+    signals: dict[str, str]
+    hints: dict[str, str]
 
 
 TABLE = read_source(Path(__file__).with_suffix(".yaml")).read(Table)
@@ -72,8 +65,7 @@ def exit_words(exit_code: int | None) -> str:
     number = signal_of(exit_code)
     if number is None:
         return f"exit code {exit_code}"
-    row = TABLE.signals.get(number.name)
-    words = f" ({row.words})" if row else ""
+    words = f" ({TABLE.signals[number.name]})" if number.name in TABLE.signals else ""
     through_shell = f", reported as exit code {exit_code}" if exit_code > 0 else ""
     return f"{number.name}{words}{through_shell}"
 
@@ -161,44 +153,21 @@ def why_it_exited(recording: Recording, process: Process) -> Cause:
 
 
 @explanation(ProcessExit)
-def returned_without_node(symptom: ProcessExit) -> Cause | None:
-    """main() returns before it creates a node."""
-    recording, process = symptom.recording, symptom.process.name
-    traced = declarations.traced(recording, process)
-    if not symptom.returned or not traced or declarations.said(recording, "node", process):
-        return None
-    return Cause(
-        f"{symptom.seen} with exit code 0: main() returned before a node was created",
-        "The function that setup.py names in console_scripts must call rclpy.init(), create "
-        "the node and call rclpy.spin(node).",
-        symptom.evidence,
-    )
-
-
-@explanation(ProcessExit)
-def returned_without_spin(symptom: ProcessExit) -> Cause | None:
-    """main() returns without rclpy.spin()."""
-    never_spun = declarations.never_spun(symptom.recording, symptom.process.name)
-    if not symptom.returned or not never_spun:
-        return None
-    return Cause(
-        f"{symptom.seen} with exit code 0: main() returned without rclpy.spin()",
-        "rclpy.spin(node) keeps a node alive and runs its callbacks until Ctrl-C: call it in "
-        "main() after the node was created.",
-        symptom.evidence,
-    )
-
-
-@explanation(ProcessExit)
-def returned_early(symptom: ProcessExit) -> Cause | None:
-    """main() returns early: spin_once(), a daemon thread, rclpy.shutdown() or sys.exit()."""
+def main_returned(symptom: ProcessExit) -> Cause | None:
+    """main() returns: there is no node or no rclpy.spin(), or spin_once() or sys.exit() ends it."""
+    recording, name = symptom.recording, symptom.process.name
     if not symptom.returned:
         return None
+    how = ", or something ended the program"
+    if declarations.traced(recording, name) and not declarations.said(recording, "node", name):
+        how = " before a node was created"
+    elif declarations.never_spun(recording, name):
+        how = " without rclpy.spin()"
     return Cause(
-        f"{symptom.seen} with exit code 0: main() returned, or something ended the program",
-        "rclpy.spin(node) keeps a node alive until Ctrl-C. Look for what ends it: spin_once() "
-        "handles one round only, a daemon thread ends with main(), rclpy.shutdown(), sys.exit() "
-        "and os._exit() end everything.",
+        f"{symptom.seen} with exit code 0: main() returned{how}",
+        "main() must call rclpy.init() and create the node. rclpy.spin(node) keeps a node alive "
+        "until Ctrl-C. Look for what ends it: spin_once() handles one round only, a daemon thread "
+        "ends with main(), rclpy.shutdown(), sys.exit() and os._exit() end everything.",
         symptom.evidence,
     )
 
@@ -209,7 +178,7 @@ def limit_exceeded(symptom: ProcessExit) -> Cause | None:
     breach = next((item for item in symptom.recording.breaches if item.ended), None)
     if symptom.killed is not signal.SIGKILL or breach is None:
         return None
-    return Cause(f"{symptom.seen}: {breach}", TABLE.breaches[breach.what], symptom.evidence)
+    return Cause(f"{symptom.seen}: {breach}", TABLE.hints[breach.what], symptom.evidence)
 
 
 @explanation(ProcessExit)
@@ -218,11 +187,12 @@ def ended_by_signal(symptom: ProcessExit) -> Cause | None:
     if symptom.failure is not None:
         return None
     killed, evidence = symptom.killed, symptom.evidence
-    row = TABLE.signals.get(killed.name) if killed else None
     failed = [line for line in evidence.log if killed is signal.SIGABRT and "Assertion" in line]
     hints = [explain(Raised(Failure("Assertion", line, ()), symptom.recording)) for line in failed]
-    hint = next(filter(None, hints), None) or (row.hint if row else "")
-    hint = hint or "Run it by hand with `ros2 run` and look at its last lines of output."
+    hint = next(filter(None, hints), None) or TABLE.hints.get(
+        killed.name if killed else "",
+        "Run it by hand with `ros2 run` and look at its last lines of output.",
+    )
     return Cause(f"{symptom.seen} with {exit_words(symptom.process.exit_code)}", hint, evidence)
 
 
@@ -241,35 +211,21 @@ def service_without_response(symptom: ProcessExit) -> Cause | None:
 
 
 @explanation(ProcessExit)
-def package_not_installed(symptom: ProcessExit) -> Cause | None:
-    """It imports a ROS 2 package that the machine lacks; an error, and never a lost point."""
-    failure = symptom.failure
-    if not failure or failure.type != "ModuleNotFoundError":
-        return None
-    lacking = lacking_package(failure.message, symptom.recording)
-    if lacking is None:
-        return None
-    apt_name = f"ros-jazzy-{lacking.replace('_', '-')}"
-    return Cause(
-        f"{symptom.seen}: it imports {code(lacking)}{in_brackets(symptom.place)}, a ROS 2 package "
-        "that is not installed where this is graded",
-        f"No point is lost by it. Tell your instructor: `sudo apt install {apt_name}`.",
-        symptom.evidence,
-        ours=True,
-    )
-
-
-@explanation(ProcessExit)
-def newer_python(symptom: ProcessExit) -> Cause | None:
-    """It uses a name of a newer Python than the machine has; an error, and never a lost point."""
-    newer = symptom.failure and newer_name(symptom.failure, symptom.recording)
-    if not newer:
+def machine_lacks_it(symptom: ProcessExit) -> Cause | None:
+    """It needs a ROS 2 package or a newer Python that the machine lacks; it costs no point."""
+    failure, recording = symptom.failure, symptom.recording
+    newer = failure and newer_name(failure, recording)
+    lacking = failure and lacking_package(failure, recording)
+    if newer:
+        name, needs = newer.name, newer.home
+    elif lacking:
+        name, needs = lacking, f"`sudo apt install ros-jazzy-{lacking.replace('_', '-')}`"
+    else:
         return None
     return Cause(
-        f"{symptom.seen}: it uses {code(newer.name)}{in_brackets(symptom.place)}, which is not "
-        "there where this is graded",
-        f"It is right in ROS 2 Jazzy, which has {newer.home}, and no point is lost by it. Tell "
-        f"your instructor: it needs {newer.home}. Or do without this name.",
+        f"{symptom.seen}: it uses {code(name)}{in_brackets(symptom.place)}, which ROS 2 Jazzy has, "
+        "but which is not installed where this is graded",
+        f"No point is lost by it. Tell your instructor: it needs {needs}.",
         symptom.evidence,
         ours=True,
     )
@@ -293,7 +249,7 @@ def offence(recording: Recording) -> Cause | None:
     for breach in recording.breaches:
         if not breach.allowed:
             moment = Moment(breach.what, recording.since_launch_s(breach.time_ns))
-            return Cause(str(breach), TABLE.breaches[breach.what], Evidence(moments=(moment,)))
+            return Cause(str(breach), TABLE.hints[breach.what], Evidence(moments=(moment,)))
     return None
 
 

@@ -5,32 +5,29 @@ from __future__ import annotations
 import os
 import select
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.recording.event import Wait
-from grader.recording.model import Call, Ending, Endpoint, Kind, Owner, Recording
+from grader.recording.model import Ending, Endpoint, Kind, Owner, Recording
 from grader.run.cell.domain import joined_domains
-from grader.run.cell.ending import EndingConditions
-from grader.run.cell.exit_barrier import ExitBarrier
+from grader.run.cell.ending import EndingConditions, ExitBarrier
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
-from grader.run.cell.progress_events import tell, tell_line
-from grader.run.cell.violations import ViolationWatch
-from grader.run.host.disturbance import DisturbanceMeter
-from grader.run.host.memory_shortage import Shortage
-from grader.run.host.stopwatch import Stopwatch
-from grader.run.host.wall_clock import WallClock
+from grader.run.cell.progress_events import LineTeller, tell
+from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
+from grader.run.host.machine_faults import MachineFaults
 from grader.run.host.watchdog import Watchdog
 from grader.run.order import CellOrder, ProcessCommand
-from grader.run.process.descendants import Family
+from grader.run.process.descendants import descendant_pids
 from grader.run.process.output import OutputReader
 from grader.run.process.student import StudentProcesses
 from grader.run.stimuli.context import StimulusContext
 from grader.run.stimuli.player import Player
-from grader.sandbox.packet_monitor import Wire
+from grader.sandbox.packet_monitor import PacketMonitor, bound_ports
 from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
@@ -39,13 +36,18 @@ if TYPE_CHECKING:
 _TICK_S = 0.05
 _CALM_TICK_S = 0.1
 _GRAPH_PERIOD_S = 0.1
-# Who comes and goes later than the first match matters to no wait.
+# What comes and goes later than the first match matters to no wait.
 _SETTLED_GRAPH_PERIOD_S = 0.25
 _PIPES_LIMIT_S = 5.0
+_MOST_MALFORMED = 10
+"""Packets; no library sends a single one."""
+_FORGERY = "wrote into the channel through which rosgrade reports from inside a process"
+_NAMES = "made a node or a topic with a name that ROS does not allow, past the checks of rclpy"
+_GARBAGE = "sent garbage to the UDP ports of the node that watches the run"
 
 
 class Abandoned(Exception):
-    """Whoever ordered the run is gone."""
+    """The runner that ordered the run is gone."""
 
 
 class Cell:
@@ -56,14 +58,15 @@ class Cell:
         order: CellOrder,
         domain_id: int,
         probe: Probe,
-        wire: Wire | None = None,
+        packets: PacketMonitor | None = None,
     ) -> None:
-        """Set the cell up; nothing of the student's runs yet."""
         self._order = order
         self._domain_id = domain_id
         self._probe = probe
-        self._wire = wire
-        on_line = tell_line if order.tells_output else None
+        self._packets = packets
+        # Of our own participant: no other is here yet.
+        self._ports = bound_ports() if packets is not None else frozenset()
+        on_line = LineTeller() if order.tells_output else None
         self._output = OutputReader(order.limits.output_bytes, on_line)
         self._students = StudentProcesses(self._output, order.process_sandbox)
         self._other_domains: tuple[int, ...] = ()
@@ -79,9 +82,9 @@ class Cell:
                 order.process_sandbox.limits,
                 lambda: self._students.inits,
                 lambda: self._output.written_bytes,
-                ViolationWatch(self._students, self._output, self._graph, wire).violations,
+                self._violations,
             )
-        self._meter = DisturbanceMeter(Family(os.getpid()).look)
+        self._meter = DisturbanceMeter(partial(descendant_pids, os.getpid(), zombies=True))
         self._exit_barrier = ExitBarrier(self._output, self._graph, self._students)
         self._waits: list[Wait] = []
         self._robot: SimulatedRobot | None = None
@@ -105,16 +108,11 @@ class Cell:
         self._matched_ns: int | None = None
 
     def run(self) -> Recording:
-        """Launch, observe, stop.
-
-        Raises:
-            Abandoned: Nobody waits for the recording any more.
-        """
+        """Launch, observe, stop."""
         self._meter.start()
         if self._watchdog is not None:
             self._watchdog.start()
-        clock = WallClock()
-        shortage = Shortage()
+        machine_faults = MachineFaults()
         launched_ns = time.time_ns()
         try:
             ending = self._observe()
@@ -133,10 +131,12 @@ class Cell:
         log = sorted((*written, *self._probe.rosout.lines), key=lambda line: line.time_ns)
         disturbance = self._meter.stop()
         processes = self._students.records()
-        starved = shortage.fault(processes, breaches)
-        found = (clock.fault, starved or self._students.ended_from_outside(breaches))
+        out_of_memory = machine_faults.out_of_memory(processes, breaches)
+        ended = out_of_memory or self._students.ended_from_outside(breaches)
+        found = (machine_faults.clock_was_set(), ended)
         self._faults += [fault for fault in found if fault is not None]
         others = ", ".join(map(str, self._other_domains))
+        calls = (*self._probe.calls, *self._context.calls.calls)
         return Recording(
             scenario=self._order.scenario,
             seed=self._order.seed,
@@ -151,9 +151,9 @@ class Cell:
             processes=processes,
             log=tuple(log),
             declarations=self._output.declarations,
-            calls=_by_time((*self._probe.calls, *self._context.asker.calls)),
+            calls=tuple(sorted(calls, key=lambda call: call.requested_ns)),
             services=self._graph.services,
-            goals=tuple(sent.record for sent in self._context.goals),
+            goals=tuple(self._context.goals),
             waits=tuple(self._waits),
             joins=tuple(self._context.joins.values()),
             interventions=tuple(self._context.interventions),
@@ -162,8 +162,8 @@ class Cell:
             answers=self._player.answers,
             disturbance=disturbance,
             faults=tuple(self._faults),
-            truth=self._robot.truth if self._robot else (),
-            incidents=self._robot.incidents if self._robot else (),
+            truth=tuple(self._robot.truth) if self._robot else (),
+            incidents=tuple(self._robot.incidents) if self._robot else (),
             scene=self._robot.scene() if self._robot else None,
             values=self._order.values,
             environment={
@@ -174,9 +174,21 @@ class Cell:
         )
 
     def _with_heartbeats(self, endpoint: Endpoint) -> Endpoint:
-        heard = self._wire.heartbeats if self._wire is not None else {}
+        heard = self._packets.heartbeats if self._packets is not None else {}
         kept, number = heard.get(endpoint.gid, (None, 0))
         return replace(endpoint, kept=kept, heartbeats=number)
+
+    def _violations(self) -> Iterator[tuple[str, str]]:
+        """What the student's processes did so far that is never allowed: kind, and in words."""
+        for violation in self._students.violations:
+            yield "forbidden call", violation
+        if self._output.forgers:
+            yield "forged report", _FORGERY
+        if self._graph.forbidden_names:
+            yield "forbidden name", _NAMES
+        packets = self._packets
+        if packets is not None and packets.malformed(self._ports) > _MOST_MALFORMED:
+            yield "forbidden packets", _GARBAGE
 
     def _observe(self) -> Ending:
         ending = self._launch()
@@ -211,11 +223,6 @@ class Cell:
         self._start(next(item for item in self._order.commands if item.name == name))
 
     def _start(self, command: ProcessCommand) -> None:
-        """Start a process of the student.
-
-        Raises:
-            OSError: It cannot be executed.
-        """
         of_run = {
             "ROS_DOMAIN_ID": str(self._domain_id),
             "ROSGRADE_HOLD": ":".join(topic.name for topic in self._order.topics),
@@ -244,11 +251,9 @@ class Cell:
 
     def _last_look(self, seen: Any) -> Ending | None:
         """What an ended process announced may still be on its way: look for a moment more."""
-        for watch in self._ticks():
+        for _ in self._ticks_for(2 * _GRAPH_PERIOD_S):
             if seen():
                 return None
-            if watch.elapsed_s > 2 * _GRAPH_PERIOD_S:
-                break
         return Ending.EXITED
 
     def _await_match(self) -> Ending | None:
@@ -275,7 +280,7 @@ class Cell:
             if since_change.elapsed_s > settle_s:
                 if not self._player.asks:
                     return Ending.NO_MATCH
-                # What it should publish is not there; what it is asked, it may still answer.
+                # What it should publish is not there; it may still answer requests.
                 self._matched_ns = time.time_ns()
                 return None
         return None
@@ -284,13 +289,11 @@ class Cell:
         matching = [e for e in self._graph.endpoints if self._probe.matches(e)]
         for endpoint in matching:
             self._probe.subscribe_leniently(endpoint)
-        matching += [e for topic in self._player.topics for e in self._listeners(topic)]
+        for topic in self._player.topics:
+            matching += self._context.endpoints(Kind.SUBSCRIPTION, topic)
         if matching and self._matched_ns is None:
             self._matched_ns = time.time_ns()
         return bool(matching)
-
-    def _listeners(self, topic: str) -> list[Endpoint]:
-        return self._context.endpoints(Kind.SUBSCRIPTION, topic)
 
     def _await_until(self) -> Ending:
         timeout_s = self._order.limits.timeout_s
@@ -302,7 +305,11 @@ class Cell:
             if self._ending.met(self._order.until, watch) or self._ending.is_over():
                 return Ending.UNTIL
             if not self._students.poll() and not self._player.keeps_run:
-                return self._last_messages(watch)
+                # What a process published before it ended may still be on its way.
+                for _ in self._ticks_for(2 * _GRAPH_PERIOD_S):
+                    pass
+                met = self._ending.met(self._order.until, watch)
+                return Ending.UNTIL if met else Ending.EXITED
             if watch.elapsed_s > timeout_s:
                 return Ending.TIMEOUT
             count = sum(self._probe.counts.values())
@@ -310,14 +317,6 @@ class Cell:
                 tell("recording", messages=count, elapsed_s=watch.elapsed_s, limit_s=timeout_s)
                 reported = count
         return Ending.TIMEOUT
-
-    def _last_messages(self, watch: Stopwatch) -> Ending:
-        """Take in what a process published before it ended."""
-        for late in self._ticks():
-            if late.elapsed_s > 2 * _GRAPH_PERIOD_S:
-                break
-        met = self._ending.met(self._order.until, watch)
-        return Ending.UNTIL if met else Ending.EXITED
 
     def _wait(self, what: str, limit_s: float) -> Iterator[Stopwatch]:
         """Tick until the caller leaves the loop; the wait is recorded either way."""
@@ -331,6 +330,12 @@ class Cell:
             if watch is None or watch.elapsed_s <= limit_s:
                 met_ns = time.time_ns()
             self._waits.append(Wait(what, limit_s, began_ns, met_ns))
+
+    def _ticks_for(self, limit_s: float) -> Iterator[Stopwatch]:
+        for watch in self._ticks():
+            yield watch
+            if watch.elapsed_s > limit_s:
+                return
 
     def _ticks(self) -> Iterator[Stopwatch]:
         """Handle events; yields the time since the first tick, first for what is known already."""
@@ -359,10 +364,6 @@ class Cell:
                 f"not alone on ROS domain {self._domain_id}: the node "
                 f"{', '.join(names)} belongs neither to rosgrade nor to the submission"
             )
-
-
-def _by_time(calls: Iterable[Call]) -> tuple[Call, ...]:
-    return tuple(sorted(calls, key=lambda call: call.requested_ns))
 
 
 def _raise_if_abandoned() -> None:

@@ -1,4 +1,4 @@
-"""The process of a cell, as whoever orders a run sees it."""
+"""The process of a cell, as the runner sees it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 
 from grader.errors import GraderFault
 from grader.run.cell.middleware_hang import ENDED_BY, MiddlewareHung
-from grader.run.cell.prefork_server import PreforkServer
+from grader.run.cell.prefork_server import STATUS, PreforkServer, readable
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 from grader.run.process.descendants import kill_by_variable
 
@@ -30,100 +30,132 @@ SCRATCH = "scratch"
 class CellProcess:
     """A cell that is getting ready, and then runs one order.
 
+    Args:
+        imports: Modules and interfaces, ours or ROS's only, besides what every cell imports.
+
     Attributes:
         folder: Its own; gone after :meth:`close`.
+        pid: As the prefork server counts processes; None before the fork.
+        returncode: As in :mod:`subprocess`, or None while it runs.
+        cpu_s: CPU time of the cell, of the student in it and of the prefork server for it; known at
+            its end.
     """
 
     def __init__(self, prefork_server: PreforkServer, imports: Sequence[str] = ()) -> None:
-        """Start it; it joins the graph while the order is still being made.
-
-        Raises:
-            GraderFault: The prefork server has ended.
-        """
         self._server = prefork_server
-        self._closing = threading.Lock()
+        self._closing, self._waiting = threading.Lock(), threading.Lock()
+        self.pid: int | None = None
+        self.returncode: int | None = None
+        self.cpu_s = 0.0
         self._temporary = tempfile.TemporaryDirectory(prefix="cell-", dir=prefork_server.cells)
         self.folder = Path(self._temporary.name)
         self._errors = self.folder / "stderr.txt"
         own_domain = os.environ.get("ROS_DOMAIN_ID", "")
-        with self._errors.open("wb") as errors:
-            self._forked = prefork_server.start_cell(
-                self.folder, errors, [own_domain] if own_domain.isdigit() else [], imports
-            )
-
-    def run(self, order: CellOrder) -> Iterator[Mapping[str, Any]]:
-        """Run an order.
-
-        Raises:
-            MiddlewareHung: The student's processes kept its middleware busy.
-            GraderFault: The cell failed, through no fault of the student's.
-        """
-        (self.folder / ORDER_FILE).write_text(order.to_json(), encoding="utf-8")
-        self._server.give(self.folder)
-        watchdog = threading.Timer(_HANGING_S, self._forked.kill)
-        watchdog.daemon = True
-        watchdog.start()
+        avoid = [own_domain] if own_domain.isdigit() else []
+        request = {"arguments": [str(self.folder), *avoid], "imports": list(imports)}
+        in_read, in_write = os.pipe()
+        out_read, out_write = os.pipe()
+        self._status, status_write = os.pipe()
+        theirs = (in_read, out_write, status_write)
         try:
-            self._say_go()
-            for line in self._forked.stdout:
-                yield json.loads(line)
+            with self._errors.open("wb") as errors:
+                self._server.give(self.folder)
+                descriptors = [in_read, out_write, errors.fileno(), status_write]
+                self._server.request(request, descriptors)
+        except OSError as error:
+            for descriptor in (in_write, out_read, self._status):
+                os.close(descriptor)
+            raise GraderFault(f"the prefork server of cells has ended: {error.strerror}") from error
         finally:
-            watchdog.cancel()
-            self._end()
-            if self._forked.returncode:
-                # Killed, perhaps by the student's process: nobody has cleaned up.
-                kill_by_variable("HOME", str(self.folder / SCRATCH))
-        if self._forked.returncode == -ENDED_BY:
-            raise MiddlewareHung
-        if self._forked.returncode or not self._is_recorded():
-            told = self._errors.read_text(encoding="utf-8", errors="replace")
-            ended = f"the cell of scenario {order.scenario!r} ended with status "
-            ended += str(self._forked.returncode)
-            if self._forked.returncode == -signal.SIGKILL:
-                ended += " (it was killed, or stopped by a signal such as SIGSTOP)"
-            # Whoever is killed, perhaps because memory ran out, has no last words.
-            last_words = told[-_SHOWN_ERROR:].strip()
-            raise GraderFault(f"{ended}:\n{last_words}" if last_words else ended)
-
-    def _is_recorded(self) -> bool:
-        # Whoever takes over a cell must not make us read what it points to.
-        return self.recording.is_file() and not self.recording.is_symlink()
+            for descriptor in theirs:
+                os.close(descriptor)
+        self._stdin, self._stdout = os.fdopen(in_write, "wb"), os.fdopen(out_read)
 
     @property
     def recording(self) -> Path:
         """The file that it leaves."""
         return self.folder / RECORDING_FILE
 
-    @property
-    def cpu_s(self) -> float:
-        """CPU time of the cell and of the student in it, known when it has ended."""
-        return self._forked.cpu_s
+    def run(self, order: CellOrder) -> Iterator[Mapping[str, Any]]:
+        """Run an order; the events of its progress.
+
+        Raises:
+            MiddlewareHung: The student's processes kept its middleware busy.
+            GraderFault: The cell failed, through no fault of the student's.
+        """
+        (self.folder / ORDER_FILE).write_bytes(order.to_bytes())
+        self._server.give(self.folder)
+        watchdog = threading.Timer(_HANGING_S, self._kill)
+        watchdog.daemon = True
+        watchdog.start()
+        try:
+            # It may have died or been abandoned: its status and last words tell more.
+            with contextlib.suppress(BrokenPipeError, ValueError):
+                self._stdin.write(GO)
+                self._stdin.flush()
+            for line in self._stdout:
+                yield json.loads(line)
+        finally:
+            watchdog.cancel()
+            self._end()
+            if self.returncode:
+                # Killed, perhaps by the student's process, before it could clean up.
+                kill_by_variable("HOME", str(self.folder / SCRATCH))
+        if self.returncode == -ENDED_BY:
+            raise MiddlewareHung
+        # A cell that was taken over must not make us read what it points to.
+        if self.returncode or not self.recording.is_file() or self.recording.is_symlink():
+            ended = f"the cell of scenario {order.scenario!r} ended with status {self.returncode}"
+            if self.returncode == -signal.SIGKILL:
+                ended += " (it was killed, or stopped by a signal such as SIGSTOP)"
+            last_words = self._errors.read_text(encoding="utf-8", errors="replace").strip()
+            raise GraderFault(f"{ended}:\n{last_words[-_SHOWN_ERROR:]}" if last_words else ended)
 
     def abandon(self) -> None:
         """Let it kill what it started and end; returns at once."""
-        # Called by whoever interrupts and by the thread that waits, perhaps at the same time.
+        # Called by the thread that interrupts and by the one that waits, perhaps at the same time.
         with self._closing, contextlib.suppress(OSError):
-            if not self._forked.stdin.closed:
-                self._forked.stdin.close()
+            if not self._stdin.closed:
+                self._stdin.close()
 
     def close(self) -> None:
         """End it and remove its folder."""
         self._end()
         self._temporary.cleanup()
 
-    def _say_go(self) -> None:
-        try:
-            self._forked.stdin.write(GO.decode())
-            self._forked.stdin.flush()
-        except (BrokenPipeError, ValueError):
-            # It has died or was abandoned; its status and last words tell more than this.
-            return
-
     def _end(self) -> None:
         self.abandon()
         try:
-            self._forked.wait(_ENDING_LIMIT_S)
+            self._wait(_ENDING_LIMIT_S)
         except subprocess.TimeoutExpired:
-            self._forked.kill()
-            self._forked.wait()
-        self._forked.stdout.close()
+            self._kill()
+            self._wait(None)
+        self._stdout.close()
+
+    def _wait(self, limit_s: float | None) -> None:
+        with self._waiting:
+            if self.returncode is None:
+                self.await_fork(limit_s)
+                # There is no status when the prefork server itself was killed.
+                status = self._read_status(limit_s)
+                self.returncode, self.cpu_s = status or (-signal.SIGKILL, 0.0)
+                os.close(self._status)
+
+    def _kill(self) -> None:
+        with self._waiting:
+            if self.returncode is None:
+                self.await_fork(_ENDING_LIMIT_S)
+                if self.pid is not None:
+                    self._server.kill(self.pid)
+
+    def await_fork(self, limit_s: float | None = None) -> None:
+        """Wait until :attr:`pid` is known, or the prefork server has ended."""
+        if self.pid is None:
+            status = self._read_status(limit_s)
+            self.pid = status and status[0]
+
+    def _read_status(self, limit_s: float | None) -> tuple[int, float] | None:
+        if not readable((self._status,), limit_s):
+            raise subprocess.TimeoutExpired("cell", limit_s or 0.0)
+        data = os.read(self._status, STATUS.size)
+        return STATUS.unpack(data) if data else None

@@ -1,21 +1,20 @@
 """A ROS domain of one's own on this machine, locked for the life of the holder.
 
 Domains 1 to 101 are used: the ports of higher ones collide with the system's ephemeral
-ports (https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html), and 0 is
-everybody's default. The lock is the one of ROS's own ``domain_coordinator``: a TCP socket
-bound to port 32768 + domain, which the kernel releases with the process.
+ports (https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html), and 0 is the
+default. The lock is the one of ROS's own ``domain_coordinator``: a TCP socket bound to port
+32768 + domain, which the kernel releases with the process.
 """
 
 from __future__ import annotations
 
-import os
 import random
 import socket
 from collections.abc import Collection
-from pathlib import Path
-from types import TracebackType
+from contextlib import AbstractContextManager
 
 from grader.errors import GraderFault
+from grader.sandbox.packet_monitor import bound_ports
 
 DOMAINS = range(1, 102)
 _BASE_PORT = 32768
@@ -23,11 +22,10 @@ _FIRST_PORT, _PORTS = 7400, 250
 _OWN_PORTS = range(10, _PORTS, 2)
 
 
-class DomainLock:
-    """Holds one domain until it is closed."""
+class DomainLock(AbstractContextManager["DomainLock"]):
+    """Holds one domain until it is closed; in a network of one's own without a lock."""
 
     def __init__(self, domain_id: int, lock: socket.socket | None = None) -> None:
-        """Keep the bound socket; none is needed in a network of one's own."""
         self.domain_id = domain_id
         self._socket = lock
 
@@ -36,31 +34,14 @@ class DomainLock:
         if self._socket is not None:
             self._socket.close()
 
-    def __enter__(self) -> DomainLock:
-        """Use the lock as a context."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Release the domain."""
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
 def lock_domain(avoid: Collection[int] = ()) -> DomainLock:
-    """Lock any free domain.
-
-    The order is shuffled, so that a domain whose nodes were just killed is not the next.
-
-    Raises:
-        GraderFault: All are in use.
-    """
-    order = [domain for domain in DOMAINS if domain not in avoid]
-    random.Random(os.urandom(8)).shuffle(order)
-    for domain in order:
+    """Lock any free domain; in no order, as nodes on the last one may just have been killed."""
+    free = [domain for domain in DOMAINS if domain not in avoid]
+    for domain in random.SystemRandom().sample(free, len(free)):
         lock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             lock.bind(("", _BASE_PORT + domain))
@@ -72,14 +53,11 @@ def lock_domain(avoid: Collection[int] = ()) -> DomainLock:
 
 
 def joined_domains() -> tuple[int, ...]:
-    """Domains that somebody in this network takes part in, by the UDP ports that are bound.
-
-    It tells only in a network of one's own.
-    """
-    return domains_of_ports(Path("/proc/net/udp").read_text(encoding="ascii"))
+    """Domains with participants in a network of one's own, by the UDP ports that are bound."""
+    return domains_of_ports(bound_ports())
 
 
-def domains_of_ports(table: str) -> tuple[int, ...]:
+def domains_of_ports(bound: Collection[int]) -> tuple[int, ...]:
     """Domains of which the ports of a participant are bound.
 
     A participant binds 7400 + 250 * domain for discovery by multicast, and two of its own,
@@ -87,8 +65,7 @@ def domains_of_ports(table: str) -> tuple[int, ...]:
     standard; see About-Domain-ID). One of these alone may be any socket's, whose port the system
     chose.
     """
-    lines = table.splitlines()[1:]
-    ports = {int(line.split()[1].rpartition(":")[2], 16) - _FIRST_PORT for line in lines}
+    ports = {port - _FIRST_PORT for port in bound}
     domains = (port for port in sorted(ports) if port >= 0 and port % _PORTS == 0)
     return tuple(
         first // _PORTS

@@ -1,14 +1,16 @@
-"""When an observation may end early: the ``until`` of a scenario, as things stand."""
+"""When a run may end: the ``until`` of a scenario, and processes that wait to exit."""
 
 from __future__ import annotations
 
 import time
 from typing import TYPE_CHECKING
 
-from grader.recording.model import NS
-from grader.run.host.stopwatch import Stopwatch
+from grader.recording.model import NS, Owner
+from grader.run.cell.graph import GraphObserver
+from grader.run.host.disturbance import Stopwatch
 from grader.run.order import Until
 from grader.run.process.output import OutputReader
+from grader.run.process.student import StudentProcesses
 
 if TYPE_CHECKING:
     from grader.run.cell.probe import Probe
@@ -22,17 +24,8 @@ class EndingConditions:
     """Looks at what has been observed so far."""
 
     def __init__(
-        self,
-        probe: Probe,
-        output: OutputReader,
-        robot: SimulatedRobot | None,
-        player: Player,
+        self, probe: Probe, output: OutputReader, robot: SimulatedRobot | None, player: Player
     ) -> None:
-        """Keep what to look at.
-
-        Args:
-            robot: The simulated robot, or None.
-        """
         self._player = player
         self._probe = probe
         self._output = output
@@ -43,16 +36,12 @@ class EndingConditions:
         return self._robot is not None and self._robot.in_contact_s > _AFTER_CONTACT_S
 
     def met(self, until: Until, watch: Stopwatch) -> bool:
-        """Whether everything that an ``until`` names holds.
-
-        Args:
-            until: What is asked for; nothing asked for is never met.
-        """
+        """Whether everything that an ``until`` names holds; one without conditions is never met."""
         conditions = []
         if until.messages is not None:
             conditions.append(all(n >= until.messages for n in self._probe.counts.values()))
         if until.quiet_s is not None:
-            conditions.append(self._quiet_s(watch) >= self._longest_silence_s(until.quiet_s))
+            conditions.append(self._quiet_s(watch) >= self._longest_quiet_s(until.quiet_s))
         if until.elapsed_s is not None:
             conditions.append(watch.elapsed_s >= until.elapsed_s)
         if until.at_rest_s is not None and self._robot is not None:
@@ -70,11 +59,53 @@ class EndingConditions:
         last_ns = max(self._probe.last_message_ns or 0, self._player.last_ns or 0)
         return min(watch.elapsed_s, (time.time_ns() - last_ns) / NS)
 
-    def _longest_silence_s(self, quiet_s: float) -> float:
-        """How long silence must last: a timer that has not fired yet may still publish."""
+    def _longest_quiet_s(self, quiet_s: float) -> float:
+        """A timer that has not fired yet may still publish."""
         periods = [
             float(item.data["period_s"])
             for item in self._output.declarations
             if item.kind == "timer" and isinstance(item.data.get("period_s"), int | float)
         ]
         return max([quiet_s, *(1.2 * period + 0.2 for period in periods)])
+
+
+class ExitBarrier:
+    """Keeps processes that wait to exit, by their tracers' word, until the graph has them."""
+
+    def __init__(
+        self, output: OutputReader, graph: GraphObserver, students: StudentProcesses
+    ) -> None:
+        self._output = output
+        self._graph = graph
+        self._students = students
+        self._given = 0
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether a process waits that was not let go yet."""
+        return len(self._waiting()) > self._given
+
+    def give(self) -> None:
+        """Let processes go, if all that was declared stands in the graph."""
+        if self.is_asked and self._all_seen():
+            waiting = self._waiting()
+            for name in waiting[self._given :]:
+                self._students.let_exit(name)
+            self._given = len(waiting)
+
+    def _waiting(self) -> list[str]:
+        return [item.process for item in self._output.declarations if item.kind == "leaving"]
+
+    def _all_seen(self) -> bool:
+        seen = {("node", node.name) for node in self._graph.nodes}
+        seen |= {
+            (endpoint.kind.value, endpoint.topic)
+            for endpoint in self._graph.endpoints
+            if endpoint.owner is not Owner.PROBE
+        }
+        names = {"node": "node", "publisher": "topic", "subscription": "topic"}
+        return all(
+            (item.kind, str(item.data.get(names[item.kind]))) in seen
+            for item in self._output.declarations
+            if item.kind in names
+        )

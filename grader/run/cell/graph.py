@@ -61,13 +61,23 @@ def _seconds(duration: Any) -> float | None:
     return None if nanoseconds <= 0 or nanoseconds >= _INFINITE_NS else nanoseconds / NS
 
 
+def _note_vanished(known: dict[Any, Any], there: Collection[Any], now_ns: int) -> None:
+    for key, one in known.items():
+        if one.vanished_ns is None and key not in there:
+            known[key] = dataclasses.replace(one, vanished_ns=now_ns)
+
+
 class GraphObserver:
     """Polls the graph and dates every appearance and disappearance.
 
+    Args:
+        private: In a network of their own are only ours and the student's: what is here now is
+            ours, and what comes later is the student's. Process ids say nothing there.
+
     Attributes:
         forbidden_names: Whether a node or a topic has had a name that ROS does not allow. Every
-            client library refuses such a name, so whoever made it went round them; and so do
-            those that are asked about it.
+            client library refuses such a name, also when it is asked about it.
+        changed_ns: When something came up for the last time.
     """
 
     def __init__(
@@ -78,13 +88,6 @@ class GraphObserver:
         *,
         private: bool = False,
     ) -> None:
-        """Prepare the observer.
-
-        Args:
-            private: Nobody but us and the student can reach this network: who is here now is
-                ours, and who comes later is the student's. Process ids say nothing there,
-                because a sandbox counts its own.
-        """
         self._node = node
         self._student_pids = student_pids
         self._rescan = rescan
@@ -94,9 +97,10 @@ class GraphObserver:
         self._services: dict[tuple[str, str, str], Service] = {}
         self._private = private
         self.forbidden_names = False
-        if private:
-            self._take_all_as_ours()
         self.changed_ns = 0
+        for topic, _ in node.get_topic_names_and_types() if private else ():
+            for info in node.get_publishers_info_by_topic(topic):
+                self._owners[bytes(info.endpoint_gid)[:12].hex()] = Owner.PROBE
 
     @property
     def nodes(self) -> tuple[Node, ...]:
@@ -126,11 +130,12 @@ class GraphObserver:
                     nodes.add(self._see_node(info, now_ns))
                     if topic not in _INFRASTRUCTURE:
                         gids.add(self._see_endpoint(kind, topic, info, now_ns))
-        self._note_vanished(nodes, gids, now_ns)
+        _note_vanished(self._nodes, nodes, now_ns)
+        _note_vanished(self._endpoints, gids, now_ns)
         self._see_services(now_ns)
 
     def _found(self, ask: Callable[[], Iterable[_Found]]) -> Iterable[_Found]:
-        """What a question about the graph finds: nothing where a name in it is none of ROS."""
+        """What a question about the graph finds: nothing where ROS does not allow a name in it."""
         try:
             return ask()
         except (NameValidationException, UnicodeDecodeError):
@@ -182,14 +187,6 @@ class GraphObserver:
             self.changed_ns = now_ns
         return key
 
-    def _note_vanished(self, nodes: set[tuple[str, str]], gids: set[str], now_ns: int) -> None:
-        for key, node in self._nodes.items():
-            if node.vanished_ns is None and key not in nodes:
-                self._nodes[key] = dataclasses.replace(node, vanished_ns=now_ns)
-        for gid, endpoint in self._endpoints.items():
-            if endpoint.vanished_ns is None and gid not in gids:
-                self._endpoints[gid] = dataclasses.replace(endpoint, vanished_ns=now_ns)
-
     def _see_services(self, now_ns: int) -> None:
         seen: set[tuple[str, str, str]] = set()
         there = [one for one in self._nodes.values() if one.vanished_ns is None]
@@ -203,9 +200,7 @@ class GraphObserver:
                 first_ns = known.appeared_ns if known is not None else now_ns
                 self._services[key] = Service(*key, appeared_ns=first_ns)
                 self.changed_ns = now_ns
-        for key in self._services.keys() - seen:
-            if self._services[key].vanished_ns is None:
-                self._services[key] = dataclasses.replace(self._services[key], vanished_ns=now_ns)
+        _note_vanished(self._services, seen, now_ns)
 
     def _owner(self, gid: bytes) -> Owner:
         participant = gid[:12].hex()
@@ -213,19 +208,14 @@ class GraphObserver:
             self._owners[participant] = self._find_owner(process_bits(gid))
         return self._owners[participant]
 
-    def _take_all_as_ours(self) -> None:
-        for topic, _ in self._node.get_topic_names_and_types():
-            for info in self._node.get_publishers_info_by_topic(topic):
-                self._owners[bytes(info.endpoint_gid)[:12].hex()] = Owner.PROBE
-
     def _find_owner(self, bits: int) -> Owner:
         if self._private:
             return Owner.STUDENT
         if bits == os.getpid() & 0xFFFF:
             return Owner.PROBE
-        for attempt in range(2):
-            if any(pid & 0xFFFF == bits for pid in self._student_pids()):
-                return Owner.STUDENT
-            if attempt == 0:
-                self._rescan()
-        return Owner.FOREIGN
+        if not self._is_student(bits):
+            self._rescan()
+        return Owner.STUDENT if self._is_student(bits) else Owner.FOREIGN
+
+    def _is_student(self, bits: int) -> bool:
+        return any(pid & 0xFFFF == bits for pid in self._student_pids())

@@ -1,10 +1,9 @@
 """What a cell does from its fork to its end.
 
 It joins the graph on a domain of its own and waits for a line on standard input. Then it reads a
-:class:`~grader.run.order.CellOrder` from ``order.json`` in its folder, runs it, writes
-``recording.mcap`` beside it, and tells its progress as JSON lines on standard output. When its
-standard input ends, whoever ordered the run is gone, and the cell kills what it started and
-ends.
+:class:`~grader.run.order.CellOrder` from its folder, runs it, writes ``recording.mcap`` beside it,
+and tells its progress as JSON lines on standard output. When its standard input ends, the runner
+is gone, and the cell kills what it started and ends.
 """
 
 from __future__ import annotations
@@ -29,27 +28,20 @@ if TYPE_CHECKING:
     from grader.sandbox.namespaces import Rights
 
 
-def _definitions(order: CellOrder, types: set[str]) -> dict[str, str]:
-    find = definition_finder(Path(prefix) for prefix in order.prefixes)
-    return {name: concatenated_definition(name, find) for name in types}
-
-
 def _keep(recording: Recording, probe: Probe, order: CellOrder, folder: Path) -> None:
-    # What was written by another definition would be read as something that nobody sent.
+    # What was written by another definition would be read as something that was never sent.
     garbled = {one.topic for one in recording.endpoints if recording.misdefined(one.topic)}
     messages = [one for one in probe.messages if one.is_sent or one.topic not in garbled]
-    definitions = _definitions(order, {message.type for message in messages})
+    find = definition_finder(Path(prefix) for prefix in order.prefixes)
+    types = {message.type for message in messages}
+    definitions = {name: concatenated_definition(name, find) for name in types}
     write_recording(
         folder / RECORDING_FILE, recording, messages, definitions, order.submission.encode()
     )
     tell("recorded")
 
 
-def main(
-    folder: Path,
-    avoid_domains: tuple[int, ...],
-    rights: Rights | None = None,
-) -> int:
+def main(folder: Path, avoid_domains: tuple[int, ...], rights: Rights | None = None) -> int:
     """Get ready, wait for the word, run the order in the folder."""
     # A run makes few objects and ends soon; collections would cost a tenth of its CPU time.
     gc.disable()
@@ -59,16 +51,16 @@ def main(
         probe = Probe(domain.domain_id)
         if os.read(0, len(GO)) != GO:
             return 1
-        order = CellOrder.from_json((folder / ORDER_FILE).read_text(encoding="utf-8"))
+        order = CellOrder.from_bytes((folder / ORDER_FILE).read_bytes())
         if order.type_support:
             add_type_support(map(Path, order.type_support))
         if rights is not None and order.process_sandbox is not None:
             bounds = order.process_sandbox.limits
             rights.mounter.mount(bounds.disk_bytes, bounds.files, bounds.shared_bytes)
-        wire = rights.wire if rights is not None else None
+        packets = rights.packets if rights is not None else None
         probe.listen(order.topics, order.limits)
         try:
-            recording = Cell(order, domain.domain_id, probe, wire).run()
+            recording = Cell(order, domain.domain_id, probe, packets).run()
         except Abandoned:
             return 1
         finally:

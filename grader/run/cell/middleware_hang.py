@@ -28,14 +28,13 @@ _BUSY_S = 5.0
 
 
 class MiddlewareHung(GraderFault):
-    """The student's processes keep the cell's middleware busy, and it was ended for it."""
+    """The student's processes kept the cell's middleware busy, and it was ended for it."""
 
 
 class HangMonitor:
     """Looks at one cell, again and again."""
 
     def __init__(self, task: Path) -> None:
-        """Only prepare."""
         self._task = task
         self._waiting: tuple[bytes, ...] = ()
         self._before_s = 0.0
@@ -45,7 +44,7 @@ class HangMonitor:
         return ENDED_BY if self._lasts() else None
 
     def _lasts(self) -> bool:
-        """Whether its first thread has been waiting all the time that another one was busy."""
+        """Whether the first thread has been waiting all the time that another one was busy."""
         try:
             waiting = _switches((self._task / "status").read_bytes())
             if waiting and waiting == self._waiting:
@@ -57,7 +56,6 @@ class HangMonitor:
         return False
 
     def _middleware_s(self) -> float:
-        """CPU time that the threads of the middleware took so far."""
         total = 0
         for thread in (self._task / "task").iterdir():
             stat = (thread / "stat").read_bytes()

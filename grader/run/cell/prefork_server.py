@@ -2,10 +2,8 @@
 
 ``python -m grader.run.cell.prefork_server SOCKET`` reads requests from the socket that it
 inherits as that descriptor. Interpreter start, imports and loading of the DDS libraries are most
-of what a cell costs; here they are paid once for all cells of a batch. Nothing of a student's is
-ever imported by it, and it has neither a node nor a thread of its own, so that a fork of it is a
-whole process. (rclpy's tracetools bring two idle threads of LTTng-UST; a fork goes on without
-them.)
+of what a cell costs; here they are paid once for all cells of a batch. It never imports anything
+of a student's, and has no node or thread of its own, so that a fork of it is a whole process.
 """
 
 from __future__ import annotations
@@ -16,7 +14,9 @@ import errno
 import gc
 import importlib
 import json
+import math
 import os
+import select
 import signal
 import socket
 import struct
@@ -26,16 +26,14 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
-from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.run.cell.middleware_hang import HangMonitor
 from grader.run.environment import RMW, TRACER, TRACER_IN_SANDBOX, cell_environment
-from grader.run.host.readable import readable
-from grader.run.process.descendants import descendants, is_stopped, kill_tree, send
+from grader.run.process.descendants import descendant_pids, is_stopped, kill_tree, send
 from grader.sandbox import bubblewrap
 from grader.sandbox.bubblewrap import Bind
 from grader.sandbox.namespaces import CELL, enter
@@ -44,17 +42,16 @@ from grader.scratch import Scratch
 if TYPE_CHECKING:
     from grader.sandbox.sandbox import Sandbox
 
+STATUS = struct.Struct("=id")
+"""What is told of each cell: process id and 0, then exit status and CPU time in seconds."""
 _REQUEST_BYTES = 65_536
-_TOLD = struct.Struct("=id")
-"""Process id and 0, then exit status and CPU time in seconds."""
-_FORK_LIMIT_S = 10.0
 _IN_FLIGHT_S, _IN_FLIGHT_POLL_S = 10.0, 0.02
 _CLOSING_LIMIT_S = 20.0
 """More than a cell may take to end what it started."""
 _STOPPED_S = 3.0
 """Time between two looks for what was stopped, in which a cell ends what is its student's."""
 _ORPHANED_LIMIT_S = 30.0
-"""More than whoever needs cells waits before it kills them itself."""
+"""More than the runner waits before it kills cells itself."""
 _ALWAYS = (
     "grader.run.cell.main",
     "rcl_interfaces/msg/Log",
@@ -64,90 +61,33 @@ SIMULATOR_MODULE = "grader.run.cell.simulator"
 """What a cell with a simulated robot imports besides."""
 
 
-class ForkedCell:
-    """A cell that a prefork server forks, with the surface of :class:`subprocess.Popen`.
-
-    Attributes:
-        returncode: As in :mod:`subprocess`, or None while it runs.
-        cpu_s: CPU time of it and of all processes of the student, and what the prefork server
-            took since another one ended; known at its end.
-    """
-
-    def __init__(
-        self, stdin: IO[str], stdout: IO[str], status: int, kill: Callable[[int], None]
-    ) -> None:
-        """Take over the descriptors."""
-        self._kill = kill
-        self.stdin = stdin
-        self.stdout = stdout
-        self.returncode: int | None = None
-        self.cpu_s = 0.0
-        self._status = status
-        self._pid: int | None = None
-        self._waiting = threading.Lock()
-
-    def wait(self, timeout: float | None = None) -> int:
-        """Wait for its end.
-
-        Raises:
-            subprocess.TimeoutExpired: It has not ended within the timeout.
-        """
-        with self._waiting:
-            if self.returncode is None:
-                self._await_fork(timeout)
-                # Nobody is left to tell when the prefork server itself was killed.
-                self.returncode, self.cpu_s = self._told(timeout) or (-signal.SIGKILL, 0.0)
-                os.close(self._status)
-            return self.returncode
-
-    def kill(self) -> None:
-        """SIGKILL it and all that descends from it."""
-        with self._waiting:
-            if self.returncode is None:
-                self._await_fork(_FORK_LIMIT_S)
-                if self._pid is not None:
-                    self._kill(self._pid)
-
-    def _await_fork(self, timeout: float | None) -> None:
-        if self._pid is None:
-            told = self._told(timeout)
-            self._pid = told and told[0]
-
-    def _told(self, timeout: float | None) -> tuple[int, float] | None:
-        if not readable((self._status,), timeout):
-            raise subprocess.TimeoutExpired("cell", timeout or 0.0)
-        told = os.read(self._status, _TOLD.size)
-        if not told:
-            return None
-        number, cpu_s = _TOLD.unpack(told)
-        return number, cpu_s
+def readable(descriptors: Collection[int], limit_s: float | None = None) -> set[int]:
+    """Wait until descriptors can be read or have ended; any number of them, unlike select(2)."""
+    poll = select.poll()
+    for descriptor in descriptors:
+        poll.register(descriptor, select.POLLIN)
+    found = poll.poll(None if limit_s is None else math.ceil(1000 * limit_s))
+    return {descriptor for descriptor, _ in found}
 
 
 class PreforkServer:
-    """The process, as whoever needs cells sees it."""
+    """The process, as the runner sees it; it begins to import at once.
+
+    Args:
+        sandbox: What it and its cells run in, or None.
+    """
 
     def __init__(self, ros: RosInstallation, sandbox: Sandbox | None = None) -> None:
-        """Start it; it begins to import at once.
-
-        Args:
-            sandbox: What it and its cells run in, or None.
-        """
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket = ours
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._sandbox = sandbox
         self._trees = _trees_of(sandbox)
         self._cells = Scratch("cells")
         command = [str(ros.python), "-m", "grader.run.cell.prefork_server", str(theirs.fileno())]
         environment = cell_environment(ros, sandboxed=sandbox is not None)
         if sandbox is not None:
-            bubblewrap.give(self._cells.path)
-            command = sandbox.server_command(
-                command,
-                ros,
-                self._cells.path,
-                environment,
-                [Bind(TRACER, TRACER_IN_SANDBOX)],
-            )
+            bubblewrap.give(self.cells)
+            shown = [Bind(TRACER, TRACER_IN_SANDBOX)]
+            command = sandbox.server_command(command, ros, self.cells, environment, shown)
             environment = bubblewrap.PLAIN_ENVIRONMENT
         with theirs:
             self._popen = subprocess.Popen(
@@ -171,45 +111,13 @@ class PreforkServer:
         """Where the folders of its cells are made."""
         return self._cells.path
 
-    def start_cell(
-        self, folder: Path, errors: IO[bytes], arguments: Sequence[str], imports: Sequence[str] = ()
-    ) -> ForkedCell:
-        """Fork a cell.
-
-        Args:
-            imports: Modules and interfaces that it will import besides what every cell does;
-                ours or ROS's only.
-
-        Raises:
-            GraderFault: The prefork server has ended.
-        """
-        in_read, in_write = os.pipe()
-        out_read, out_write = os.pipe()
-        status_read, status_write = os.pipe()
-        request = {
-            "arguments": [str(folder), *arguments],
-            "imports": list(imports),
-            "private": self._sandbox is not None,
-        }
-        self.give(folder)
-        try:
-            self._send(
-                json.dumps(request).encode(), [in_read, out_write, errors.fileno(), status_write]
-            )
-        except OSError as error:
-            for descriptor in (in_write, out_read, status_read):
-                os.close(descriptor)
-            raise GraderFault(f"the prefork server of cells has ended: {error.strerror}") from error
-        finally:
-            for descriptor in (in_read, out_write, status_write):
-                os.close(descriptor)
-        return ForkedCell(open(in_write, "w"), open(out_read), status_read, self._kill)  # noqa: PTH123
-
-    def _send(self, request: bytes, descriptors: list[int]) -> None:
+    def request(self, request: dict[str, Any], descriptors: list[int]) -> None:
+        """Ask for a cell with these descriptors: 0, 1, 2 and where its status is told."""
+        data = json.dumps({**request, "private": self._sandbox is not None}).encode()
         deadline = time.monotonic() + _IN_FLIGHT_S
         while True:
             try:
-                socket.send_fds(self._socket, [request], descriptors)
+                socket.send_fds(self._socket, [data], descriptors)
                 return
             except OSError as error:
                 # Some submission has too many on their way, and is ended for it.
@@ -221,6 +129,15 @@ class PreforkServer:
         """Let a cell read and write all that is in its folder."""
         if self._sandbox is not None:
             bubblewrap.give(folder)
+
+    def kill(self, pid: int) -> None:
+        """SIGKILL a cell and all that descends from it."""
+        if self._sandbox is None:
+            kill_tree(pid)
+            return
+        # In a sandbox it counts processes in its own way. Without it the cell is gone as well.
+        with contextlib.suppress(OSError):
+            self._socket.send(json.dumps({"kill": pid}).encode())
 
     def close(self, limit_s: float = _CLOSING_LIMIT_S) -> None:
         """Wait for the cells that it has forked, and for itself, to end."""
@@ -235,11 +152,7 @@ class PreforkServer:
         self._cells.remove()
 
     def _end_stopped(self) -> None:
-        """Kill what a signal such as SIGSTOP has stopped: whoever waits for it would hang.
-
-        That is this process or a cell. A cell itself ends student's processes that are stopped,
-        and sooner.
-        """
+        """Kill this process or a cell that a signal such as SIGSTOP has stopped: it would hang."""
         before: frozenset[int] = frozenset()
         while not self._closed.wait(_STOPPED_S):
             stopped = self._stopped()
@@ -247,26 +160,18 @@ class PreforkServer:
             before = stopped
 
     def _stopped(self) -> frozenset[int]:
-        pids = (self._popen.pid, *descendants(self._popen.pid))
+        pids = (self._popen.pid, *descendant_pids(self._popen.pid))
         return frozenset(filter(is_stopped, pids))
-
-    def _kill(self, pid: int) -> None:
-        if self._sandbox is None:
-            kill_tree(pid)
-            return
-        # In a sandbox it counts processes in its own way. Without it the cell is gone as well.
-        with contextlib.suppress(OSError):
-            self._socket.send(json.dumps({"kill": pid}).encode())
 
 
 def _trees_of(sandbox: Sandbox | None) -> list[tuple[int, int]]:
-    """What a sandbox shows of the cache: other folders once somebody has deleted in there."""
+    """What a sandbox shows of the cache: other folders once something was deleted in there."""
     found = [path.stat() for path in sandbox.cached] if sandbox is not None else []
     return [(status.st_dev, status.st_ino) for status in found]
 
 
 def _serve(requests: socket.socket) -> None:
-    """Fork a cell for each request, and tell how each ended, until nobody can ask any more."""
+    """Fork a cell for each request, and tell how each ended, until the runner has gone."""
     running: dict[int, int] = {}
     ended_read, ended_write = os.pipe()
     os.set_blocking(ended_read, False)
@@ -275,11 +180,10 @@ def _serve(requests: socket.socket) -> None:
     signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
     sources = [requests.fileno(), ended_read]
     told_s = 0.0
-    # Without anybody to ask for more, the cells that run are still waited for, but not those
-    # that hang: whoever could kill them is gone.
+    # Without a runner the cells that run are still waited for, but not those that hang.
     limit_s: float | None = None
     while len(sources) > 1 or running:
-        ready = readable(tuple(sources), limit_s)
+        ready = readable(sources, limit_s)
         if not ready:
             for pid in running:
                 kill_tree(pid)
@@ -317,33 +221,26 @@ def _fork(
     for descriptor in standard:
         os.close(descriptor)
     running[pid] = status
-    # Whoever asked may be gone; the cell notices it as well.
+    # The runner may be gone; the cell notices it as well.
     with contextlib.suppress(BrokenPipeError):
-        os.write(status, _TOLD.pack(pid, 0.0))
+        os.write(status, STATUS.pack(pid, 0.0))
 
 
 def _tell_ended(running: dict[int, int], own_s: float) -> bool:
-    """Tell of each cell that has ended.
-
-    Args:
-        own_s: CPU time that nobody was told of yet; it is added to that of the first one.
-    """
+    """Tell of each cell that has ended; our own CPU time counts for the first one."""
     has_told = False
-    while True:
-        try:
+    with contextlib.suppress(ChildProcessError):
+        while True:
             pid, status, usage = os.wait4(-1, os.WNOHANG)
-        except ChildProcessError:
-            return has_told
-        if not pid:
-            return has_told
-        descriptor = running.pop(pid)
-        cpu_s = usage.ru_utime + usage.ru_stime + (0.0 if has_told else own_s)
-        has_told = True
-        told = _TOLD.pack(os.waitstatus_to_exitcode(status), cpu_s)
-        # Whoever asked may be gone.
-        with contextlib.suppress(BrokenPipeError):
-            os.write(descriptor, told)
-        os.close(descriptor)
+            if not pid:
+                break
+            descriptor = running.pop(pid)
+            cpu_s = usage.ru_utime + usage.ru_stime + (0.0 if has_told else own_s)
+            has_told = True
+            with contextlib.suppress(BrokenPipeError):
+                os.write(descriptor, STATUS.pack(os.waitstatus_to_exitcode(status), cpu_s))
+            os.close(descriptor)
+    return has_told
 
 
 def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool) -> None:
@@ -358,15 +255,15 @@ def _become_cell(arguments: list[str], descriptors: list[int], *, private: bool)
         for target, descriptor in enumerate(descriptors):
             os.dup2(descriptor, target)
         # Of a class on a large machine there are hundreds, one for each cell that runs.
-        for descriptor in [int(path.name) for path in Path("/proc/self/fd").iterdir()]:
-            if descriptor > 2:
+        for name in os.listdir("/proc/self/fd"):  # noqa: PTH208
+            if int(name) > 2:
                 with contextlib.suppress(OSError):
-                    os.close(descriptor)
+                    os.close(int(name))
         folder, rights = Path(arguments[0]), None
         if private:
-            # As the one that waits for it sees it: nothing of this process can while it stalls.
-            stall = HangMonitor(Path("/proc/1"))
-            rights = enter(folder, stall.sentence)
+            # As the one that waits for it sees it: nothing of this process can while it hangs.
+            monitor = HangMonitor(Path("/proc/1"))
+            rights = enter(folder, monitor.sentence)
             folder = CELL
         status = main(folder, tuple(map(int, arguments[1:])), rights)
         sys.stdout.flush()
@@ -388,20 +285,13 @@ def _import(names: Sequence[str]) -> None:
                 getattr(module, path[-1]).__import_type_support__()
 
 
-def _reset_signals() -> None:
-    """Let students' processes inherit the signals that a terminal gives.
-
-    A shell starts background jobs, and `nohup` its command, with some of them ignored; a program
-    that inherits that never sees the Ctrl-C that ends it.
-    """
+def main(descriptor: int) -> int:
+    """Import, then serve."""
+    # A shell starts background jobs, and `nohup` its command, with some signals of a terminal
+    # ignored; a student's process that inherits that never sees the Ctrl-C that ends it.
     for number in (signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
-
-
-def main(descriptor: int) -> int:
-    """Import, then serve."""
-    _reset_signals()
     # Python 3.12 warns of every fork beside other threads. These two are LTTng-UST's, which come
     # with rclpy's tracetools, only wait, and belong to none of the locks that a cell takes.
     warnings.filterwarnings("ignore", ".*use of fork", DeprecationWarning)

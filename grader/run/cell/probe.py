@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import importlib
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import rclpy
+from rcl_interfaces.msg import Log
 from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidServiceNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -21,23 +24,24 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.mcap_writer import RawMessage
-from grader.recording.model import Call, Endpoint, Kind, Owner
-from grader.run.cell.rosout import RosoutLog, told_of_matches
+from grader.recording.model import NS, Call, Endpoint, Kind, LogLine, Owner
 from grader.run.order import RunLimits, Topic
+from grader.run.process.output import KeptLines
 
 NAME = "rosgrade_probe"
 _BEFORE_ALL_NS = 1
 _LAST_SEQUENCE = 2**32 - 1
 # One lost answer must not end the observation, and a blocked node must not be flooded.
 _MOST_UNANSWERED = 5
+_ROSOUT = "/rosout"
+_ROSOUT_DEPTH = 1000
+_LONGEST = 8192
+_LONGEST_NAME = 256
+_LEVELS = {10: "DEBUG", 20: "INFO", 30: "WARN", 40: "ERROR", 50: "FATAL"}
 
 
 def import_interface(name: str) -> Any:
-    """Import a message class by its interface name.
-
-    Raises:
-        ImportError: The package or the message does not exist.
-    """
+    """Import a message class by its interface name."""
     package, kind, short = name.split("/")
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), short)
@@ -70,6 +74,46 @@ class _Pending:
             self.answered_ns = time.time_ns()
 
 
+def told_of_matches(on_match: Callable[[Any], None]) -> SubscriptionEventCallbacks:
+    """Events of a subscription without rclpy's own, which only warn and cost CPU time."""
+    return SubscriptionEventCallbacks(matched=on_match, use_default_callbacks=False)
+
+
+class RosoutLog:
+    """Subscribes to /rosout; the probe itself publishes nothing there."""
+
+    def __init__(self) -> None:
+        self._kept = KeptLines(0)
+
+    def listen(self, node: Node, limit_bytes: int, on_match: Callable[[Any], None]) -> None:
+        """Keep what comes from now on, and what was published before a logger was matched."""
+        self._kept = KeptLines(limit_bytes)
+        profile = QoSProfile(
+            depth=_ROSOUT_DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL,
+        )
+        events = told_of_matches(on_match)
+        node.create_subscription(Log, _ROSOUT, self._take, profile, event_callbacks=events)
+
+    @property
+    def lines(self) -> tuple[LogLine, ...]:
+        """Everything kept so far, in the order of its arrival."""
+        return tuple(self._kept.lines)
+
+    def _take(self, record: Any) -> None:
+        stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
+        if stamp_ns < 0:
+            # What is recorded has a time after 1970.
+            stamp_ns = time.time_ns()
+        name, text = (
+            str(value)[:longest].encode(errors="replace").decode()
+            for value, longest in ((record.name, _LONGEST_NAME), (record.msg, _LONGEST))
+        )
+        level = _LEVELS.get(int(record.level), str(record.level))
+        self._kept.add(LogLine(stamp_ns, name, "rosout", text, level))
+
+
 class Probe:
     """Subscribes to the scenario's topics and calls parameter services.
 
@@ -79,7 +123,6 @@ class Probe:
     """
 
     def __init__(self, domain_id: int) -> None:
-        """Join the graph; nothing is recorded yet."""
         self._context = Context()
         rclpy.init(args=[], context=self._context, domain_id=domain_id)
         self.node = Node(
@@ -101,20 +144,16 @@ class Probe:
         self.messages: list[RawMessage] = []
         self.rosout = RosoutLog()
         self.counts: dict[str, int] = {}
-        self._kept: dict[str, int] = {}
+        self._kept: dict[tuple[str, str], int] = {}
         self.last_message_ns: int | None = None
         self.recording = True
         self.counts_servers = True
         self._has_met = False
 
     def listen(self, topics: tuple[Topic, ...], limits: RunLimits) -> None:
-        """Record topics from now on.
-
-        Raises:
-            ImportError: An interface of a topic does not exist.
-        """
+        """Record topics from now on."""
         self._limits = limits
-        self.rosout.listen(self.node, limits.output_bytes, self._meet)
+        self.rosout.listen(self.node, limits.output_bytes, self._note_match)
         for topic in topics:
             self._topics[topic.name] = topic
             if not topic.ours:
@@ -126,10 +165,7 @@ class Probe:
         self._executor.spin_once(timeout_sec=limit_s)
 
     def has_met(self) -> bool:
-        """Whether a publisher came or went since this was last asked.
-
-        The middleware tells it at once: nobody has to look at the graph again and again.
-        """
+        """Whether a publisher came or went since this was last asked, as the middleware tells."""
         met, self._has_met = self._has_met, False
         return met
 
@@ -145,35 +181,15 @@ class Probe:
         return tuple(name for name, topic in self._topics.items() if not topic.ours)
 
     def join(self, name: str, topic: str, type: str, profile: QoSProfile) -> Any:
-        """Subscribe to a topic from now on, and record it under a name of its own.
-
-        Raises:
-            ImportError: The interface does not exist.
-        """
-        heard = 0
+        """Subscribe to a topic from now on, and record it under a name of its own."""
 
         def receive(data: bytes, info: Any) -> None:
-            nonlocal heard
-            heard += 1
-            if not self.recording or self._limits is None or heard > self._limits.messages:
-                return
-            if len(data) <= self._limits.message_bytes:
-                self.messages.append(_raw(topic, type, data, info, join=name))
+            self._keep(topic, type, data, info, name)
 
-        return self.node.create_subscription(
-            import_interface(type),
-            topic,
-            receive,  # type: ignore[arg-type]  # with raw=True the info comes too
-            profile,
-            raw=True,
-        )
+        return self._create_subscription(topic, type, profile, receive)
 
     def matches(self, endpoint: Endpoint) -> bool:
-        """Whether an endpoint of the student is one that the scenario is about.
-
-        That is a publisher on a topic of the student's that is recorded, or a subscription to
-        a topic of the simulator.
-        """
+        """Whether it is a publisher that is recorded, or subscribes to the simulator."""
         topic = self._topics.get(endpoint.topic)
         if topic is None or endpoint.owner is not Owner.STUDENT or endpoint.type != topic.type:
             return False
@@ -195,11 +211,7 @@ class Probe:
         self._subscribe(topic, "best_effort", "volatile")
 
     def answers(self, node: str) -> bool | None:
-        """Whether a node answered a service that it answers only while it spins.
-
-        Returns:
-            True if it did, False if it was only called, None if it could not be called.
-        """
+        """Whether a node answered what it answers only while it spins; None if not called."""
         calls = [call for name in executor_services(node) for call in self._calls.get(name, ())]
         return any(call.answered_ns is not None for call in calls) if calls else None
 
@@ -209,10 +221,7 @@ class Probe:
         return max((call.requested_ns for call in calls), default=0)
 
     def call_executor(self, node: str, name: str) -> None:
-        """Call a service that a node answers only while it spins.
-
-        Nothing happens as long as several calls are still unanswered.
-        """
+        """Call a service that a node answers only while it spins, unless many are unanswered."""
         kind = import_interface(EXECUTOR_SERVICES[name])
         service = f"{node}/{name}"
         if service not in self._clients:
@@ -235,17 +244,13 @@ class Probe:
     @property
     def calls(self) -> tuple[Call, ...]:
         """Every call so far, oldest first."""
-        found = [
-            Call(
-                service,
-                _type_of(service),
-                call.requested_ns,
-                call.answered_ns,
-                servers=call.servers,
-            )
-            for service, calls in self._calls.items()
-            for call in calls
-        ]
+        found = []
+        for service, calls in self._calls.items():
+            kind = EXECUTOR_SERVICES[service.rpartition("/")[2]]
+            found += [
+                Call(service, kind, call.requested_ns, call.answered_ns, servers=call.servers)
+                for call in calls
+            ]
         return tuple(sorted(found, key=lambda call: call.requested_ns))
 
     def _subscribe(self, topic: Topic, reliability: str, durability: str) -> None:
@@ -255,16 +260,15 @@ class Probe:
         def receive(data: bytes, info: Any) -> None:
             self._receive(topic, data, info)
 
-        self.node.create_subscription(
-            import_interface(topic.type),
-            topic.name,
-            receive,  # type: ignore[arg-type]  # with raw=True the info comes too
-            profile,
-            event_callbacks=told_of_matches(self._meet),
-            raw=True,
+        self._create_subscription(topic.name, topic.type, profile, receive)
+
+    def _create_subscription(self, topic: str, type: str, profile: QoSProfile, receive: Any) -> Any:
+        events = told_of_matches(self._note_match)
+        return self.node.create_subscription(
+            import_interface(type), topic, receive, profile, event_callbacks=events, raw=True
         )
 
-    def _meet(self, _: Any) -> None:
+    def _note_match(self, _: Any) -> None:
         self._has_met = True
 
     def _receive(self, topic: Topic, data: bytes, info: Any) -> None:
@@ -277,15 +281,32 @@ class Probe:
             return
         if topic.name in self._fallbacks:
             self._seen.add(key)
-        self._kept[topic.name] = self._kept.get(topic.name, 0) + 1
         if not topic.ours:
             self.counts[topic.name] += 1
             self.last_message_ns = time.time_ns()
-        if self._kept[topic.name] > self._limits.messages:
+        self._keep(topic.name, topic.type, data, info)
+
+    def _keep(self, topic: str, type: str, data: bytes, info: Any, join: str = "") -> None:
+        """Keep a message, within bounds for each topic and late joiner."""
+        if not self.recording or self._limits is None:
             return
-        if len(data) > self._limits.message_bytes:
+        number = self._kept[topic, join] = self._kept.get((topic, join), 0) + 1
+        if number > self._limits.messages or len(data) > self._limits.message_bytes:
             return
-        self.messages.append(_raw(topic.name, topic.type, data, info))
+        # Both come from the writer, who may have written the packet by hand: a recording holds
+        # what its format has room for, which no check believes to be the time of anything.
+        stamp_ns, sequence = info["source_timestamp"], info["publication_sequence_number"] or 0
+        self.messages.append(
+            RawMessage(
+                topic,
+                type,
+                bytes(data),
+                stamp_ns if stamp_ns >= 0 else _BEFORE_ALL_NS,
+                info["received_timestamp"],
+                sequence if 0 <= sequence <= _LAST_SEQUENCE else 0,
+                join,
+            )
+        )
 
 
 def _count_answers(client: Any, calls: list[_Pending]) -> None:
@@ -301,22 +322,3 @@ def _count_answers(client: Any, calls: list[_Pending]) -> None:
         return find(sequence)
 
     client.get_pending_request = found
-
-
-def _type_of(service: str) -> str:
-    return EXECUTOR_SERVICES[service.rpartition("/")[2]]
-
-
-def _raw(topic: str, type: str, data: bytes, info: Any, join: str = "") -> RawMessage:
-    # Both come from the writer, who may have written the packet by hand: a recording holds what
-    # its format has room for, which no check believes to be the time of anything.
-    stamp_ns, sequence = info["source_timestamp"], info["publication_sequence_number"] or 0
-    return RawMessage(
-        topic=topic,
-        type=type,
-        cdr=bytes(data),
-        stamp_ns=stamp_ns if stamp_ns >= 0 else _BEFORE_ALL_NS,
-        received_ns=info["received_timestamp"],
-        sequence=sequence if 0 <= sequence <= _LAST_SEQUENCE else 0,
-        join=join,
-    )

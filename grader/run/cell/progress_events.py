@@ -1,4 +1,4 @@
-"""What a cell tells whoever ordered the run: one JSON line for each event."""
+"""What a cell tells the runner: one JSON line for each event."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import json
 import os
 import sys
 import threading
+from collections import Counter
 from typing import Any
 
 from grader.recording.model import LogLine
 
 # Lines of the student are told by the thread that reads them.
 _TELLING = threading.Lock()
+_MOST_LINES = 2000
 
 
 def tell(event: str, **data: Any) -> None:
@@ -21,18 +23,22 @@ def tell(event: str, **data: Any) -> None:
         print(json.dumps({"event": event, **data}), flush=True)
 
 
-def tell_line(line: LogLine) -> None:
-    """Tell what a process of the student printed."""
-    # Whoever ordered the run may be gone; the pipes must be drained all the same.
-    with contextlib.suppress(OSError):
-        tell("printed", process=line.process, text=line.text)
+class LineTeller:
+    """Tells the first lines that each process of the student printed, of each stream."""
+
+    def __init__(self) -> None:
+        self._told: Counter[tuple[str, str]] = Counter()
+
+    def __call__(self, line: LogLine) -> None:
+        """Tell a line."""
+        self._told[line.process, line.stream] += 1
+        if self._told[line.process, line.stream] <= _MOST_LINES:
+            # The runner may be gone; the pipes must be drained all the same.
+            with contextlib.suppress(OSError):
+                tell("printed", process=line.process, text=line.text)
 
 
 def keep_apart() -> None:
-    """Let nothing but our progress go to standard output.
-
-    Fast DDS writes its warnings there, such as one for every message that is too long for the
-    type that the probe reads.
-    """
+    """Let nothing but our progress go to standard output, where Fast DDS writes warnings."""
     sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)

@@ -22,20 +22,15 @@ from sim.simulation import Simulation, Step, make_simulation
 
 _REST_M_S = 1e-3
 _REST_RAD_S = 1e-3
-# Drifting odometry and noise never move the robot; this is motion that somebody commanded.
+# Drifting odometry and noise never move the robot; this is motion that was commanded.
 _MOVED_M = 1e-3
 _MOVED_RAD = 1e-2
 
 
 class SimulatedRobot:
-    """A robot in its world, driven by what the student publishes."""
+    """A robot in its world, driven by what the student publishes; keeps every step so far."""
 
     def __init__(self, node: Node, order: SimulatorOrder) -> None:
-        """Create its topics; simulated time does not run yet.
-
-        Raises:
-            AssignmentError: World or options are wrong.
-        """
         options = self._options = SimulatorOptions.model_validate_json(order.options)
         self._world = read_scenario_world(Path(order.world), order.values)
         self._simulation: Simulation = make_simulation(self._world, options, order.seed)
@@ -43,40 +38,24 @@ class SimulatedRobot:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._ros.run, args=(self._stop,), daemon=True)
         self._start = self._simulation.pose
-        self._truth: list[Truth] = []
-        self._incidents: list[Incident] = []
+        self.truth: list[Truth] = []
+        self.incidents: list[Incident] = []
         self._stamp_ns = 0
         self._began_ns = 0
-        self._way_m = 0.0
+        self.travelled_m = 0.0
         self._has_moved = False
         self._rest_since_ns = 0
         self._contact_ns: int | None = None
 
     def start(self) -> None:
         """Let simulated time run, in a thread of its own."""
-        if not self._thread.is_alive():
-            self._thread.start()
+        self._thread.start()
 
     def stop(self) -> None:
         """Stop simulated time; the truth ends here."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
-
-    @property
-    def truth(self) -> tuple[Truth, ...]:
-        """Every step so far."""
-        return tuple(self._truth)
-
-    @property
-    def incidents(self) -> tuple[Incident, ...]:
-        """What was noted so far."""
-        return tuple(self._incidents)
-
-    @property
-    def travelled_m(self) -> float:
-        """Way along the path so far."""
-        return self._way_m
 
     @property
     def at_rest_s(self) -> float:
@@ -111,34 +90,30 @@ class SimulatedRobot:
             self._began_ns = stamp_ns - step.time_ns
         self._follow(step, stamp_ns)
         self._stamp_ns = stamp_ns
-        self._truth.append(
+        pose, twist, command = step.pose, step.twist, step.command
+        self.truth.append(
             Truth(
-                time_ns=stamp_ns,
-                x_m=step.pose.x_m,
-                y_m=step.pose.y_m,
-                yaw_rad=step.pose.yaw_rad,
-                linear_m_s=step.twist.linear_m_s,
-                angular_rad_s=step.twist.angular_rad_s,
-                command_m_s=step.command.linear_m_s,
-                command_rad_s=step.command.angular_rad_s,
-                contact=step.contact,
+                *(stamp_ns, pose.x_m, pose.y_m, pose.yaw_rad),
+                *(twist.linear_m_s, twist.angular_rad_s),
+                *(command.linear_m_s, command.angular_rad_s),
+                step.contact,
             )
         )
         for event in step.events:
-            self._incidents.append(Incident(stamp_ns, event.kind.value, event.text))
+            self.incidents.append(Incident(stamp_ns, event.kind.value, event.text))
 
     def on_late(self, lateness: Lateness) -> None:
         """Note steps that the host did not let us do in time; called by the simulator."""
         late_ms = lateness.late_ns / 1e6
         text = f"{lateness.steps} steps done {late_ms:.0f} ms late"
-        self._incidents.append(Incident(self._stamp_ns, "late", text, lateness.late_ns / NS))
+        self.incidents.append(Incident(self._stamp_ns, "late", text, lateness.late_ns / NS))
 
     def _follow(self, step: Step, stamp_ns: int) -> None:
-        if self._truth:
-            before = self._truth[-1]
-            self._way_m += math.hypot(step.pose.x_m - before.x_m, step.pose.y_m - before.y_m)
+        if self.truth:
+            before = self.truth[-1]
+            self.travelled_m += math.hypot(step.pose.x_m - before.x_m, step.pose.y_m - before.y_m)
         turned_rad = abs(math.remainder(step.pose.yaw_rad - self._start.yaw_rad, math.tau))
-        self._has_moved |= self._way_m > _MOVED_M or turned_rad > _MOVED_RAD
+        self._has_moved |= self.travelled_m > _MOVED_M or turned_rad > _MOVED_RAD
         resting = (
             abs(step.twist.linear_m_s) < _REST_M_S and abs(step.twist.angular_rad_s) < _REST_RAD_S
         )

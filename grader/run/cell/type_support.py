@@ -13,33 +13,24 @@ from pathlib import Path
 
 
 def add_type_support(prefixes: Iterable[Path]) -> None:
-    """Make the interfaces of install spaces importable in this process.
-
-    Args:
-        prefixes: Install spaces of ours (merged layout), never a student's.
-
-    Raises:
-        OSError: A library cannot be loaded.
-    """
+    """Make the interfaces of install spaces of ours importable in this process."""
     for prefix in prefixes:
         sys.path[:0] = [str(path) for path in sorted(prefix.glob("lib/python3.*/site-packages"))]
         _load(sorted(prefix.glob("lib/lib*.so")))
 
 
 def _load(libraries: list[Path]) -> None:
-    """Load libraries that need each other, in whatever order that takes.
+    """Load libraries that need each other: each one again until all that it needs are there.
 
     A library that is loaded is found by its name afterwards, wherever it lies.
     """
     while libraries:
-        waiting: list[Path] = []
-        error: OSError | None = None
+        errors: dict[Path, OSError] = {}
         for library in libraries:
             try:
                 ctypes.CDLL(str(library))
-            except OSError as caught:
-                waiting.append(library)
-                error = error or caught
-        if error is not None and len(waiting) == len(libraries):
-            raise error
-        libraries = waiting
+            except OSError as error:
+                errors[library] = error
+        if len(errors) == len(libraries):
+            raise errors[libraries[0]]
+        libraries = list(errors)

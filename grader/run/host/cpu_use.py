@@ -1,8 +1,7 @@
 """CPU time: what the student's own processes took, and how much of a wait others can explain.
 
-A thread waits for a CPU because somebody else runs on it. Where that is the student's own other
-threads and processes, the wait is the submission's; only what others took, rosgrade's own
-processes among them, is a disturbance.
+A thread waits for a CPU because another one runs on it. Where that is one of the student's, the
+wait is the submission's; only what others took, also rosgrade, is a disturbance.
 """
 
 from __future__ import annotations
@@ -27,12 +26,7 @@ _PROCESS_CLOCK = 2
 
 @dataclass(frozen=True)
 class Interval:
-    """CPU time in an interval.
-
-    Attributes:
-        others_ns: CPU time of all CPUs together that neither the student's processes had nor
-            nobody: the host's other processes, ours, and what a hypervisor took.
-    """
+    """CPU time in an interval that was neither idle nor the student's, of all CPUs together."""
 
     begin_ns: int
     end_ns: int
@@ -40,19 +34,14 @@ class Interval:
 
 
 def others_share(waited_ns: int, intervals: Iterable[Interval]) -> int:
-    """How much of a wait for a CPU others than the student can explain, at most.
+    """How much of a wait for a CPU others than the student can explain, at most; nanoseconds.
 
-    Every nanosecond that a thread waits on a CPU's queue while somebody else's thread runs there
-    is one of that one's CPU time; so what others had during the wait bounds their share, however
-    the scheduler arranged it.
+    Every nanosecond that a thread waits on a CPU's queue while another one runs there is one of
+    that one's CPU time; so what others had during the wait bounds their share.
 
     Args:
-        waited_ns: Length of a wait that was over within the last interval; it may have begun
-            before it.
+        waited_ns: Of a wait that was over within the last interval; it may have begun before it.
         intervals: Without gaps, oldest first; nothing is known without any.
-
-    Returns:
-        Nanoseconds, at most ``waited_ns``.
     """
     known = list(intervals)
     if not known:
@@ -67,9 +56,10 @@ class CpuTimes:
 
     Attributes:
         student_ns: Of the student's processes, with those that they have waited for.
-        idle_ns: Of nobody, on the CPUs that may be used; 0 where it is not known.
-        unwaited: How many processes of the student's have ended since the reading before, if
-            anything of what they took was lost.
+        idle_ns: Of the CPUs that may be used; 0 where it is not known.
+        own_ns: Of this process, the cell.
+        orphans: How many processes of the student's have ended since the reading before, if some
+            of what they took was lost.
     """
 
     time_ns: int
@@ -80,19 +70,14 @@ class CpuTimes:
 
 
 def interval(before: CpuTimes, after: CpuTimes, cpus: int) -> Interval:
-    """What happened between two moments.
-
-    Args:
-        after: The second.
-    """
+    """What happened between two moments."""
     all_ns = cpus * (after.time_ns - before.time_ns)
     # A process that has just ended takes its time with it until its parent is looked at.
     student_ns = max(0, after.student_ns - before.student_ns)
     own_ns = after.own_ns - before.own_ns
     if own_ns > _FLOODED * (after.time_ns - before.time_ns):
         student_ns += own_ns
-    # What they took since they were seen last nobody knows; whoever sees to it that nobody does
-    # cannot have it counted as the machine's.
+    # What they took since they were seen last is unknown: it does not count as the machine's.
     student_ns += after.orphans * (after.time_ns - before.time_ns)
     idle_ns = max(0, after.idle_ns - before.idle_ns)
     return Interval(before.time_ns, after.time_ns, max(0, all_ns - student_ns - idle_ns))
@@ -102,33 +87,22 @@ class CpuMeter:
     """Reads CPU times of this machine."""
 
     def __init__(self) -> None:
-        """Find out which CPUs are ours to use."""
         self._cpus = os.sched_getaffinity(0)
-        # A container's stand-in (lxcfs) calls a CPU idle that another container uses.
+        self.cpus = len(self._cpus)
+        # A container's /proc/stat (lxcfs) calls a CPU idle that another container uses.
         self._knows_idle = not os.path.ismount(_STAT)
         self._orphan_cpu = OrphanCpu()
 
-    @property
-    def cpus(self) -> int:
-        """How many CPUs there are."""
-        return len(self._cpus)
-
     def read(self, pids: Iterable[int]) -> CpuTimes:
         """Read them now."""
-        there: dict[Process, Taken] = {}
-        student_ns = 0
-        complete = True
-        for pid in pids:
-            found = _process(pid)
-            complete = complete and found is not None
-            if found is not None:
-                process, taken, own_ns = found
-                there[process] = taken
-                student_ns += own_ns
-        there[Process(os.getpid(), 0)] = _waited_here()
-        self._orphan_cpu.look(there, complete=complete)
+        found = [_process(pid) for pid in pids]
+        there = {process: taken for process, taken, _ in filter(None, found)}
+        waited = os.times()
+        waited_s = waited.children_user + waited.children_system
+        there[Process(os.getpid(), 0)] = Taken(0, round(waited_s * NS / _TICK_NS))
+        self._orphan_cpu.look(there, complete=None not in found)
         ticks = sum(taken.waited for taken in there.values()) + self._orphan_cpu.ticks
-        student_ns += ticks * _TICK_NS
+        student_ns = ticks * _TICK_NS + sum(own_ns for *_, own_ns in filter(None, found))
         times = (time.monotonic_ns(), student_ns, self._idle_ns(), time.process_time_ns())
         return CpuTimes(*times, self._orphan_cpu.ended)
 
@@ -148,14 +122,7 @@ def idle_ticks(stat: str, cpus: Iterable[int]) -> int:
     return sum(int(row[4]) + int(row[5]) for row in rows if row and row[0] in wanted)
 
 
-def _waited_here() -> Taken:
-    """Of the student's processes that this one, the cell, has waited for."""
-    waited = os.times()
-    return Taken(0, round((waited.children_user + waited.children_system) * NS / _TICK_NS))
-
-
 def _process(pid: int) -> tuple[Process, Taken, int] | None:
-    """A process with all its threads, what it took, and the same of itself in nanoseconds."""
     try:
         own_ns = time.clock_gettime_ns(~pid << 3 | _PROCESS_CLOCK)
         with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  often

@@ -1,24 +1,22 @@
 """What the host takes from a run, measured while it runs.
 
-Two instruments: a metronome, a thread that asks to be woken every 20 ms and notes how late
-it was; and the kernel's run delay of each thread of the student, the time it was ready to
-run but had no CPU. A verdict that this could explain is not held against anybody.
-
-Of both only what others than the student's processes can explain is counted (see
-:mod:`grader.run.host.cpu_use`): who keeps the CPUs from himself was not disturbed.
+Two instruments: a metronome, a thread that asks to be woken every 20 ms and notes how late it was;
+and the time that each thread of the student was ready to run but had no CPU (its run delay). Of
+both only what others than the student's processes can explain is counted.
 """
 
 from __future__ import annotations
 
+import contextlib
+import os
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 
 from grader.recording.event import Disturbance
 from grader.recording.model import NS
 from grader.run.host.cpu_use import CpuMeter, CpuTimes, Interval, interval, others_share
-from grader.run.host.run_delay import RunDelays
 
 _TICK_S = 0.02
 _TICKS_PER_SAMPLE = 5
@@ -27,9 +25,24 @@ _SAMPLES_PER_LOOK = 10
 """Processes are looked for in the first samples, in one of so many of the others, and where one
 of those that are known had to wait."""
 _TRIFLE_NS = 2_000_000
-"""A wait in one sample that nobody has to explain."""
+"""A wait in one sample that needs no explanation."""
+_LONGEST_STRETCH = 8.0
 _KEPT = 100
 """Samples of CPU times that are kept, for waits that were long."""
+
+
+def run_delays(pid: int) -> dict[int, int]:
+    """Run delay of each thread of a process so far, from schedstat: thread id -> nanoseconds."""
+    found: dict[int, int] = {}
+    # It may end meanwhile.
+    with contextlib.suppress(OSError):
+        for name in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208  often
+            with (
+                contextlib.suppress(OSError, IndexError),
+                open(f"/proc/{pid}/task/{name}/schedstat", "rb") as file,  # noqa: PTH123
+            ):
+                found[int(name)] = int(file.read().split()[1])
+    return found
 
 
 class DisturbanceMeter:
@@ -39,10 +52,9 @@ class DisturbanceMeter:
         self,
         pids: Callable[[], Iterable[int]],
         cpu: CpuMeter | None = None,
-        delays: RunDelays | None = None,
+        delays: Callable[[int], Mapping[int, int]] = run_delays,
     ) -> None:
-        """Prepare the meter."""
-        self._run_delays = delays or RunDelays()
+        self._run_delays = delays
         self._pids = pids
         self._known: tuple[int, ...] = ()
         self._number = 0
@@ -64,7 +76,6 @@ class DisturbanceMeter:
         """End the measurement and return all samples, oldest first."""
         self._stop.set()
         self._thread.join()
-        self._run_delays.forget()
         return tuple(self._samples)
 
     @property
@@ -93,28 +104,39 @@ class DisturbanceMeter:
         looks = self._number < _STARTING or self._number % _SAMPLES_PER_LOOK == 0
         self._number += 1
         if looks:
-            self._look()
+            self._known = tuple(self._pids())
         waited_ns = 0
         for pid in self._known:
-            for thread, delay_ns in self._run_delays.read(pid).items():
+            for thread, delay_ns in self._run_delays(pid).items():
                 before_ns = self._delays.get(thread, 0)
                 self._delays[thread] = delay_ns
                 waited_ns = max(waited_ns, delay_ns - before_ns)
         if looks or waited_ns + late_ns > _TRIFLE_NS:
             if not looks:
-                self._look()
+                self._known = tuple(self._pids())
             self._read_cpu_times()
             waited_ns = others_share(waited_ns, self._intervals)
             late_ns = others_share(late_ns, self._intervals)
         self._taken_ns += waited_ns + late_ns
         self._samples.append(Disturbance(time.time_ns(), late_ns, waited_ns))
 
-    def _look(self) -> None:
-        self._known = tuple(self._pids())
-        self._run_delays.forget(but=self._known)
-
     def _read_cpu_times(self) -> None:
         times = self._cpu.read(self._known)
         if self._times is not None:
             self._intervals.append(interval(self._times, times, self._cpu.cpus))
         self._times = times
+
+
+class Stopwatch:
+    """Time since its start, less what the host took from us meanwhile."""
+
+    def __init__(self, meter: DisturbanceMeter) -> None:
+        self._meter = meter
+        self._wall_s = time.monotonic()
+        self._stolen_s = meter.stolen_s
+
+    @property
+    def elapsed_s(self) -> float:
+        """Undisturbed seconds; at least an eighth of the wall time, so that every wait ends."""
+        wall_s = time.monotonic() - self._wall_s
+        return max(wall_s - (self._meter.stolen_s - self._stolen_s), wall_s / _LONGEST_STRETCH)

@@ -1,8 +1,7 @@
 """Watches what the student's processes take in a sandbox, beyond what the kernel bounds itself.
 
-The kernel's limits are per process: a hundred processes may each stay within theirs. Here they
-are counted together several times a second, and ended when they take too much, or when a witness
-saw them do what nobody may.
+The kernel's limits are per process. Here all are counted together several times a second, and
+ended when they take too much, or when they do what is never allowed.
 """
 
 from __future__ import annotations
@@ -34,14 +33,18 @@ _LOOKS_PER_SEARCH = 5
 _OWN_BYTES = 2048 * MIB
 """Of the cell itself: messages wait in it, and it is in no sandbox of a student's."""
 _FULL = 0.99
-# Some for subprocesses of good manners; every session gets a share of the CPU of its own.
+# Some for ordinary subprocesses; every session gets a share of the CPU of its own.
 _MOST_SESSIONS = 16
 _MOST_IN_FLIGHT = 64
 _JUST_ENDED = 8
 
 
 class Watchdog:
-    """Looks from a thread of its own until it is stopped."""
+    """Looks from a thread of its own until it is stopped.
+
+    Args:
+        violations: What was done so far that is never allowed: its kind, and the same in words.
+    """
 
     def __init__(
         self,
@@ -50,12 +53,6 @@ class Watchdog:
         output_bytes: Callable[[], int],
         violations: Callable[[], Iterable[tuple[str, str]]] = tuple,
     ) -> None:
-        """Prepare.
-
-        Args:
-            deeds: What they did so far that is never allowed: its kind (see :class:`Breach`), and
-                the same in words.
-        """
         self._limits = limits
         self._inits = inits
         self._output_bytes = output_bytes
@@ -101,7 +98,7 @@ class Watchdog:
         if own > _OWN_BYTES:
             words = f"{size_words(own)} of memory where messages wait"
             self._end_all("memory", words, size_words(_OWN_BYTES))
-        if self._cpu.stolen_s(usages) > limits.cpu_s:
+        if self._cpu.used_s(usages) > limits.cpu_s:
             words = f"more than {limits.cpu_s} s of CPU time"
             self._end_all("cpu time", words, f"{limits.cpu_s} s")
         threads = sum(usage.threads for usage in usages)

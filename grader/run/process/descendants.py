@@ -16,78 +16,42 @@ _LONGEST_COMMAND = 1000
 
 
 def become_subreaper() -> None:
-    """Make orphaned descendants our children, so that none can leave us by forking twice.
-
-    Source: prctl(2), PR_SET_CHILD_SUBREAPER.
-    """
+    """Make orphaned descendants our children (prctl(2)): none can leave us by forking twice."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 
 def descendants(of: int) -> dict[int, str]:
-    """All living descendants of a process."""
+    """Command lines of all living descendants of a process."""
+    return {pid: command_line(pid) for pid in descendant_pids(of)}
+
+
+def descendant_pids(of: int, *, zombies: bool = False) -> list[int]:
+    """Ids of the descendants of a process, with those that have ended and were not waited for."""
     children: dict[int, list[int]] = {}
     for entry in os.listdir("/proc"):  # noqa: PTH208  names only, and often
         if entry.isdigit():
-            parent = _parent(entry, of_zombie=False)
-            if parent is not None:
-                children.setdefault(parent, []).append(int(entry))
-    found: dict[int, str] = {}
-    queue = children.get(of, [])
-    while queue:
-        pid = queue.pop()
-        found[pid] = command_line(pid)
-        queue.extend(children.get(pid, ()))
+            try:
+                with open(f"/proc/{entry}/stat", "rb") as file:  # noqa: PTH123  often
+                    # The command's name may contain anything, but the last ")" ends it.
+                    state, parent, *_ = file.read().rpartition(b") ")[2].split()
+            except (OSError, ValueError):
+                continue
+            if zombies or state not in (b"Z", b"X"):
+                children.setdefault(int(parent), []).append(int(entry))
+    found: list[int] = []
+    pending = children.get(of, [])
+    while pending:
+        found.append(pending.pop())
+        pending += children.get(found[-1], [])
     return found
-
-
-class Family:
-    """The descendants of a process, for those who ask often: only new processes are read."""
-
-    def __init__(self, of: int) -> None:
-        """Nothing is known yet.
-
-        Args:
-            of: Id of the process; it adopts orphans of its descendants.
-        """
-        self._of = of
-        self._members: set[int] = set()
-        self._others: set[int] = set()
-
-    def look(self) -> frozenset[int]:
-        """Ids of those that are there now; of zombies too, which nobody has waited for yet."""
-        present = {int(name) for name in os.listdir("/proc") if name.isdigit()}  # noqa: PTH208
-        self._members &= present
-        self._others &= present
-        parents = {pid: _parent(str(pid)) for pid in present - self._members - self._others}
-        while new := {pid for pid, parent in parents.items() if self._is_member(parent)}:
-            self._members |= new
-            parents = {pid: parent for pid, parent in parents.items() if pid not in new}
-        self._others |= parents.keys()
-        return frozenset(self._members)
-
-    def _is_member(self, pid: int | None) -> bool:
-        return pid == self._of or pid in self._members
-
-
-def _parent(pid: str, *, of_zombie: bool = True) -> int | None:
-    """Parent of a process, or None for one that has ended."""
-    try:
-        with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  a scan of all processes
-            stat = file.read()
-    except OSError:
-        return None
-    # The command stands in parentheses and may contain anything; the rest is plain words.
-    state, parent = stat[stat.rindex(b")") + 2 :].split(b" ", 2)[:2]
-    return int(parent) if of_zombie or state not in (b"Z", b"X") else None
 
 
 def is_stopped(pid: int) -> bool:
     """Whether a signal such as SIGSTOP has stopped a process, so that it waits for SIGCONT."""
     try:
-        stat = (_PROC / str(pid) / "stat").read_bytes()
+        return (_PROC / str(pid) / "stat").read_bytes().rpartition(b") ")[2].startswith(b"T")
     except OSError:
         return False
-    return stat[stat.rindex(b")") + 2 :].startswith(b"T")
 
 
 def command_line(pid: int) -> str:
@@ -111,10 +75,7 @@ def is_init(pid: int) -> bool:
 
 
 def kill_descendants(of: int, *, limit_s: float = 5.0) -> dict[int, str]:
-    """SIGKILL every descendant until none is left.
-
-    New ones may be forked while we kill, so this repeats; they are stopped first.
-    """
+    """SIGKILL every descendant, which are stopped first, until none is left."""
     killed: dict[int, str] = {}
     deadline = time.monotonic() + limit_s
     while (alive := descendants(of)) and time.monotonic() < deadline:
@@ -141,23 +102,13 @@ def send(number: signal.Signals, pids: Iterable[int]) -> None:
 
 def reap() -> None:
     """Take the exit status of ended children that no Popen object waits for."""
-    while True:
-        try:
-            pid, _ = os.waitpid(-1, os.WNOHANG)
-        except ChildProcessError:
-            return
-        if pid == 0:
-            return
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
 
 
 def kill_by_variable(name: str, value: str, *, limit_s: float = 5.0) -> None:
-    """SIGKILL every process that was started with a variable of this value.
-
-    For what a cell left behind that was killed itself: its processes are nobody's descendants.
-
-    Args:
-        value: Its value; unique to what is to be killed.
-    """
+    """SIGKILL what a cell left behind that was killed itself: by a variable of this value."""
     wanted = f"{name}={value}".encode()
     deadline = time.monotonic() + limit_s
     while time.monotonic() < deadline:

@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-from grader.sandbox.seccomp import MOST_COUNTED, can_end, is_counted, told_of
+from grader.sandbox.seccomp import COUNTED, MOST_COUNTED, can_end, violation_of
 
 # linux/seccomp.h
 _SET_MODE_FILTER, _NEW_LISTENER = 1, 1 << 3
@@ -40,11 +40,6 @@ class Guard:
     """Starts the student's sandboxes, and refuses what is asked of it."""
 
     def __init__(self, program: bytes, calls: Mapping[str, int], unheard: bytes) -> None:
-        """Stand guard.
-
-        Raises:
-            OSError: The kernel takes no such filter.
-        """
         self._names = {number: name for name, number in calls.items()}
         self._starter = ThreadPoolExecutor(1, "starter")
         listener = self._starter.submit(_install, (program, unheard), calls["seccomp"]).result()
@@ -57,16 +52,12 @@ class Guard:
         self._thread.start()
 
     def start(self, start: Callable[[], _Started]) -> _Started:
-        """Start something under guard.
-
-        Raises:
-            OSError: It cannot be executed.
-        """
+        """Start something under guard."""
         return self._starter.submit(start).result()
 
     @property
     def is_heard(self) -> bool:
-        """Whether it is told of what the student's processes do."""
+        """Whether the kernel asks it."""
         return self._listener is not None
 
     def can_have_ended(self, ours: Collection[int | None]) -> bool:
@@ -75,7 +66,7 @@ class Guard:
 
     @property
     def violations(self) -> tuple[str, ...]:
-        """What the student's processes did so far that nobody may, in words."""
+        """What the student's processes did so far that is never allowed, in words."""
         return tuple(self._violations)
 
     def close(self) -> None:
@@ -97,11 +88,11 @@ class Guard:
                 if descriptor == self._wake_read:
                     return
                 if events & select.POLLIN:
-                    # Whoever asked may have been killed meanwhile.
+                    # The process may have been killed meanwhile.
                     with contextlib.suppress(OSError):
                         self._answer(descriptor)
                 else:
-                    # Nobody is left who could ask.
+                    # No process under the filter is left.
                     poll.unregister(descriptor)
 
     def _answer(self, listener: int) -> None:
@@ -109,9 +100,9 @@ class Guard:
         fcntl.ioctl(listener, _NOTIF_RECV, asked, True)
         number, process, _flags, call, _architecture, _place, *arguments = _ASKED.unpack(asked)
         name = self._names.get(call, f"system call {call}")
-        violation = told_of(name, arguments)
-        self._counted += is_counted(name)
-        if is_counted(name) and self._counted <= MOST_COUNTED:
+        violation = violation_of(name, arguments)
+        self._counted += name in COUNTED
+        if name in COUNTED and self._counted <= MOST_COUNTED:
             answer = (0, _CONTINUE)
         elif violation is None and can_end(name, arguments):
             self._ending.add(process)
@@ -124,11 +115,10 @@ class Guard:
 
 
 def _install(programs: tuple[bytes, bytes], call: int) -> int | None:
-    """Put this thread under a filter: the first, or the second where nobody can listen.
+    """Put this thread under a filter: the first, or the second where we cannot listen.
 
     Returns:
-        What the kernel asks through. None where somebody around us listens already (a container
-        may): what is asked otherwise is then refused, and nobody is told.
+        What the kernel asks through. None where a container around us listens already.
     """
     libc = ctypes.CDLL(None, use_errno=True)
 

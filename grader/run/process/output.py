@@ -21,7 +21,6 @@ _LONGEST_LINE = 8192
 # print again and again comes every half second at most often.
 _LONGEST_WAIT_NS = 400_000_000
 _MOST_DECLARATIONS = 2000
-_MOST_TOLD = 2000
 _LARGEST_NUMBER = 2**63
 _OF_ENDPOINTS = ("publisher", "subscription")
 _KINDS = frozenset(
@@ -38,11 +37,7 @@ _OF_PROCESS = frozenset({"started", "leaving", "exiting"})
 
 @dataclass
 class KeptLines:
-    """The first and the last lines of one stream, half of the bytes each.
-
-    Attributes:
-        limit: Bytes that are kept.
-    """
+    """The first and the last lines of one stream, half of ``limit`` bytes each."""
 
     limit: int
     head: list[LogLine] = field(default_factory=list)
@@ -50,6 +45,11 @@ class KeptLines:
     head_bytes: int = 0
     tail_bytes: int = 0
     dropped_bytes: int = 0
+
+    @property
+    def lines(self) -> list[LogLine]:
+        """What is kept, in the order of its arrival."""
+        return [*self.head, *self.tail]
 
     def add(self, line: LogLine) -> None:
         """Keep a line, perhaps instead of an older one."""
@@ -67,8 +67,6 @@ class KeptLines:
 
 
 class _Stream:
-    """One pipe being read."""
-
     def __init__(
         self,
         process: str,
@@ -79,7 +77,6 @@ class _Stream:
         self.process = process
         self.name = name
         self._on_line = on_line
-        self._untold = _MOST_TOLD
         self.kept = KeptLines(limit)
         self.written_bytes = 0
         self._partial = b""
@@ -89,14 +86,9 @@ class _Stream:
         self._ended = False
 
     def feed(self, data: bytes, now_ns: int | None = None) -> None:
-        """Split into lines; a line without end is cut at a bound.
+        """Split into lines; what has no line end is cut at a bound, and after 400 ms.
 
-        A carriage return ends a line too, so that a line which is written over again and again
-        (a progress bar) counts as many. So does time: what was begun 400 ms before and has no
-        end yet gets none, and counts from when it came.
-
-        Args:
-            now_ns: When; by default now.
+        A carriage return ends a line too: a progress bar writes many lines.
         """
         now_ns = time.time_ns() if now_ns is None else now_ns
         self.written_bytes += len(data)
@@ -130,21 +122,14 @@ class _Stream:
         self.kept.dropped_bytes += over
         kept = LogLine(now_ns, self.process, self.name, text)
         self.kept.add(kept)
-        if self._on_line is not None and self._untold:
-            self._untold -= 1
+        if self._on_line is not None:
             self._on_line(kept)
 
 
 class OutputReader:
-    """Reads all pipes of all processes in one thread."""
+    """Reads all pipes of all processes in one thread, which calls ``on_line`` with each line."""
 
     def __init__(self, limit_bytes: int, on_line: Callable[[LogLine], None] | None = None) -> None:
-        """Start reading.
-
-        Args:
-            on_line: Told the first lines of each stream as they come, but not a tracer's; called
-                in the thread that reads.
-        """
         self._limit = limit_bytes
         self._on_line = on_line
         self._selector = selectors.DefaultSelector()
@@ -159,10 +144,7 @@ class OutputReader:
         self._thread.start()
 
     def add(self, fd: int, process: str, stream: str) -> None:
-        """Read a pipe until its end; ``stream`` is stdout, stderr or tracer.
-
-        The descriptor belongs to the reader from here on.
-        """
+        """Read a pipe (stdout, stderr or tracer) until its end; it belongs to the reader now."""
         os.set_blocking(fd, False)
         on_line = self._on_line if stream != "tracer" else None
         target = _Stream(process, stream, self._limit, on_line)
@@ -185,8 +167,7 @@ class OutputReader:
         """The newest lines of a stream, for messages."""
         for item in list(self._streams):
             if item.process == process and item.name == stream:
-                kept = [*item.kept.head, *item.kept.tail]
-                return [line.text for line in kept[-lines:]]
+                return [line.text for line in item.kept.lines[-lines:]]
         return []
 
     def close(self, limit_s: float) -> tuple[LogLine, ...]:
@@ -196,12 +177,8 @@ class OutputReader:
         self._thread.join(limit_s)
         for stream in self._streams:
             stream.finish()
-        lines = [
-            line
-            for stream in self._streams
-            if stream.name != "tracer"
-            for line in (*stream.kept.head, *stream.kept.tail)
-        ]
+        outputs = [stream for stream in self._streams if stream.name != "tracer"]
+        lines = [line for stream in outputs for line in stream.kept.lines]
         return tuple(sorted(lines, key=lambda line: line.time_ns))
 
     @property
@@ -238,24 +215,20 @@ class OutputReader:
 
     def _take_declarations(self, stream: _Stream) -> None:
         """Turn lines of a tracer into declarations; what is not one is dropped, and that told."""
-        lines = [*stream.kept.head, *stream.kept.tail]
+        lines = stream.kept.lines
         stream.kept = KeptLines(self._limit)
         for line in lines:
             data = _parsed(line.text)
             if not _is_of_tracer(data):
-                self._tell_foreign(line)
+                if line.process not in self._foreign:
+                    self._foreign.add(line.process)
+                    self._declare(line, "foreign", {})
                 continue
             # The first to start is the one that was launched.
             stream.pid = data["pid"] if stream.pid is None else stream.pid
             is_own = data["pid"] == stream.pid or data["kind"] not in _OF_PROCESS
             if is_own and _is_fit(data):
                 self._declare(line, data.pop("kind"), data)
-
-    def _tell_foreign(self, line: LogLine) -> None:
-        """Say once of a process that another than its tracer wrote to the tracer's pipe."""
-        if line.process not in self._foreign:
-            self._foreign.add(line.process)
-            self._declare(line, "foreign", {})
 
     def _declare(self, line: LogLine, kind: str, data: dict[str, Any]) -> None:
         if len(self._declarations) < _MOST_DECLARATIONS:
@@ -272,7 +245,6 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def _is_of_tracer(data: dict[str, Any]) -> bool:
-    """Whether a tracer can have written it, as far as that shows."""
     kind = data.get("kind")
     if not isinstance(kind, str) or kind not in _KINDS or not isinstance(data.get("pid"), int):
         return False
@@ -280,10 +252,7 @@ def _is_of_tracer(data: dict[str, Any]) -> bool:
 
 
 def _is_fit(data: dict[str, Any]) -> bool:
-    """Whether it can be written down again.
-
-    The student's process can write to the pipe too, so nothing in it may be large or deep.
-    """
+    """Whether it can be written down: the student can write to the pipe too, large and deep."""
     inner = [value for value in data.values() if isinstance(value, dict)]
     values = [value for item in (data, *inner) for value in item.values() if value not in inner]
     keys = [key for item in (data, *inner) for key in item]

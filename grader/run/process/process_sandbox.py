@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from grader.run.process.descendants import descendants
+from grader.run.process.descendants import descendant_pids
 from grader.sandbox.limits import SandboxLimits
 
 WORKSPACE = "/ws"
@@ -35,7 +35,15 @@ _FORMATS = (b"\x7fELF", b"#!")
 
 @dataclass(frozen=True)
 class ProcessSandbox:
-    """What a cell has to know to put a student into a sandbox."""
+    """What a cell has to know to put a student into a sandbox.
+
+    Attributes:
+        arguments: Of bubblewrap.
+        filter: File with the filter of system calls within the sandbox.
+        guard: File with the filter that asks the guard; ``unheard`` where it cannot listen.
+        calls: Numbers of the calls that the guard knows.
+        folders: What a student sees at a path -> where the cell finds it.
+    """
 
     arguments: tuple[str, ...]
     filter: str
@@ -44,16 +52,6 @@ class ProcessSandbox:
     calls: dict[str, int]
     limits: SandboxLimits
     folders: dict[str, str]
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> ProcessSandbox:
-        """Read what :func:`dataclasses.asdict` made."""
-        given = {
-            **data,
-            "arguments": tuple(data["arguments"]),
-            "limits": SandboxLimits(**data["limits"]),
-        }
-        return cls(**given)
 
     def outside(self, path: str) -> Path:
         """Where the cell finds what a student sees at a path."""
@@ -73,11 +71,6 @@ class SandboxedProcess(subprocess.Popen[bytes]):
         environment: Mapping[str, str],
         pass_fds: Sequence[int],
     ) -> None:
-        """Start it.
-
-        Raises:
-            OSError: It cannot be executed.
-        """
         if argv[0].startswith(f"{WORKSPACE}/"):
             _check_executable(process_sandbox.outside(argv[0]))
         self._status, status = os.pipe()
@@ -128,53 +121,38 @@ class SandboxedProcess(subprocess.Popen[bytes]):
     def exit_code(self) -> int | None:
         """As in :mod:`subprocess`: negative for the signal that ended it."""
         code = self.returncode
-        if code is not None and code > _SIGNALLED and code - _SIGNALLED in _signal_numbers():
+        if code is not None and code > _SIGNALLED and code - _SIGNALLED in set(signal.Signals):
             return _SIGNALLED - code
         return code
 
     def signal_group(self, number: signal.Signals) -> None:
-        """Send a signal to the student's process group.
-
-        Raises:
-            ProcessLookupError: It is not there.
-        """
+        """Send a signal to the student's process group."""
         init = self.init
         if init is None and number is not signal.SIGKILL:
             raise ProcessLookupError
         if init is None or number is not signal.SIGKILL:
             os.killpg(init or self.pid, number)
             return
-        # Without its init everything would be gone, and nobody could say what was left behind.
-        for pid in descendants(init):
+        # Without its init everything would be gone, and what was left behind unknown.
+        for pid in descendant_pids(init):
             with contextlib.suppress(ProcessLookupError):
                 if os.getpgid(pid) == init:
                     os.kill(pid, number)
 
     def _read_status(self) -> dict[str, Any]:
-        try:
+        with contextlib.suppress(OSError):
             while block := os.read(self._status, _STATUS_BYTES):
                 self._told += block
-        except (BlockingIOError, OSError):
-            pass
         found: dict[str, Any] = {}
-        for line in self._told.splitlines():
-            try:
+        # The last line may not be there in full yet.
+        with contextlib.suppress(ValueError):
+            for line in self._told.splitlines():
                 found.update(json.loads(line))
-            except ValueError:
-                break
         return found
 
 
-def _signal_numbers() -> frozenset[int]:
-    return frozenset(int(number) for number in signal.Signals)
-
-
 def _check_executable(path: Path) -> None:
-    """Raise what the kernel would say of a program.
-
-    Raises:
-        OSError: It is not there, or nothing to execute.
-    """
+    """Raise what the kernel would say of a program."""
     with path.open("rb") as file:
         begin = file.read(4)
     if not begin.startswith(_FORMATS):

@@ -1,9 +1,7 @@
 """Shared memory that killed nodes leave: Fast DDS removes its segments only at a clean end.
 
-A living participant holds a lock on ``fastrtps_<hex>_el`` beside each of its segments
-``fastrtps_<hex>`` in /dev/shm; where nobody holds it, the owner is dead. The command
-``fastdds shm clean`` decides in the same way. Port files are few and Fast DDS takes them over
-by itself.
+A living participant holds a lock on ``fastrtps_<hex>_el`` beside each of its segments in /dev/shm;
+without one the owner is dead. ``fastdds shm clean`` decides in the same way.
 """
 
 from __future__ import annotations

@@ -7,18 +7,17 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from grader.recording.event import Breach
 from grader.recording.model import NS, Process
-from grader.run.host.disturbance import DisturbanceMeter
-from grader.run.host.stopwatch import Stopwatch
+from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
 from grader.run.order import RunLimits
 from grader.run.process.descendants import (
-    descendants,
+    descendant_pids,
     is_init,
     is_stopped,
     kill_descendants,
@@ -38,10 +37,26 @@ _SUSPENDED_NS = NS // 2
 """What was stopped for so long will not go on by itself."""
 
 
+class PlainProcess(subprocess.Popen[bytes]):
+    """A process without a sandbox, with what there is to know of one in a sandbox."""
+
+    init: int | None = None
+    was_set_up = True
+
+    @property
+    def exit_code(self) -> int | None:
+        """As in :mod:`subprocess`."""
+        return self.returncode
+
+    def signal_group(self, number: signal.Signals) -> None:
+        """Send a signal to its process group."""
+        os.killpg(self.pid, number)
+
+
 @dataclass
 class _Running:
     name: str
-    popen: subprocess.Popen[bytes]
+    popen: PlainProcess | SandboxedProcess
     started_ns: int
     seen_fd: int | None
     exited_ns: int | None = None
@@ -53,7 +68,9 @@ class _Running:
 
     def end_if_suspended(self) -> None:
         """Kill it if a signal such as SIGSTOP stopped it some time ago: it would wait for ever."""
-        if not any(map(is_stopped, self._own_pids())):
+        init = self.popen.init
+        own = (self.popen.pid, *([] if init is None else (init, *descendant_pids(init))))
+        if not any(map(is_stopped, own)):
             self.suspended_ns = None
         elif self.suspended_ns is None:
             self.suspended_ns = time.time_ns()
@@ -61,27 +78,16 @@ class _Running:
             self.is_ended = True
             kill_tree(self.popen.pid)
 
-    def _own_pids(self) -> Iterable[int]:
-        """Its processes, as far as they are found without looking at all of the machine's."""
-        init = self.popen.init if isinstance(self.popen, SandboxedProcess) else None
-        return (self.popen.pid, *([] if init is None else (init, *descendants(init))))
-
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to its process group, if that is still there."""
         with contextlib.suppress(ProcessLookupError):
-            if isinstance(self.popen, SandboxedProcess):
-                self.popen.signal_group(number)
-            else:
-                os.killpg(self.popen.pid, number)
+            self.stopped_by = number.name
+            self.popen.signal_group(number)
 
     @property
     def exit_code(self) -> int | None:
         """As in :mod:`subprocess`; of a process that was stopped, SIGSTOP ended it."""
-        if self.is_ended:
-            return -signal.SIGSTOP
-        if isinstance(self.popen, SandboxedProcess):
-            return self.popen.exit_code
-        return self.popen.returncode
+        return -signal.SIGSTOP if self.is_ended else self.popen.exit_code
 
 
 class StudentProcesses:
@@ -92,14 +98,6 @@ class StudentProcesses:
         output: OutputReader,
         process_sandbox: ProcessSandbox | None = None,
     ) -> None:
-        """Prepare; nothing is started yet.
-
-        Args:
-            process_sandbox: The sandbox that each of them gets, or None.
-
-        Raises:
-            OSError: Nobody can watch over a sandbox here.
-        """
         self._output = output
         self._sandbox = process_sandbox
         self._guard: Guard | None = None
@@ -121,24 +119,18 @@ class StudentProcesses:
         of_run: Mapping[str, str],
         folder: Path,
     ) -> None:
-        """Start a process in a session of its own.
-
-        Args:
-            of_run: Further variables, of this run; the tracer's pipe is added.
-
-        Raises:
-            OSError: It cannot be executed.
-        """
+        """Start a process in a session of its own; variables ``of_run`` are added."""
         tracer_read, tracer_write = os.pipe()
         seen_read, seen_write = os.pipe()
         try:
             variables = {
+                **environment,
                 **of_run,
                 "ROSGRADE_TRACER_FD": str(tracer_write),
                 "ROSGRADE_TRACER_PIPE": str(os.fstat(tracer_write).st_ino),
                 "ROSGRADE_SEEN_FD": str(seen_read),
             }
-            popen = self._popen(argv, environment, variables, folder, (tracer_write, seen_read))
+            popen = self._popen(argv, variables, folder, (tracer_write, seen_read))
         except OSError:
             os.close(tracer_read)
             os.close(seen_write)
@@ -157,17 +149,15 @@ class StudentProcesses:
     def _popen(
         self,
         argv: tuple[str, ...],
-        environment: Mapping[str, str],
-        of_run: Mapping[str, str],
+        variables: Mapping[str, str],
         folder: Path,
         pass_fds: tuple[int, int],
-    ) -> subprocess.Popen[bytes]:
-        variables = {**environment, **of_run}
+    ) -> PlainProcess | SandboxedProcess:
         if self._sandbox is not None and self._guard is not None:
             return self._guard.start(
                 partial(SandboxedProcess, self._sandbox, argv, variables, pass_fds)
             )
-        return subprocess.Popen(
+        return PlainProcess(
             argv,
             cwd=folder,
             env=variables,
@@ -181,16 +171,12 @@ class StudentProcesses:
     @property
     def inits(self) -> tuple[int, ...]:
         """The first process of each sandbox that still stands."""
-        inits = [
-            process.popen.init
-            for process in self._running
-            if isinstance(process.popen, SandboxedProcess) and process.exited_ns is None
-        ]
+        inits = [one.popen.init for one in self._running if one.exited_ns is None]
         return tuple(init for init in inits if init is not None)
 
     @property
     def violations(self) -> tuple[str, ...]:
-        """System calls of theirs that nobody may make, in words."""
+        """System calls of theirs that are never allowed, in words."""
         return self._guard.violations if self._guard is not None else ()
 
     @property
@@ -200,7 +186,7 @@ class StudentProcesses:
 
     def refresh(self) -> None:
         """Look for descendants that are not known yet."""
-        self._pids |= frozenset(descendants(os.getpid()))
+        self._pids |= frozenset(descendant_pids(os.getpid()))
 
     def poll(self) -> bool:
         """Note ended processes; whether any is still running."""
@@ -239,7 +225,6 @@ class StudentProcesses:
         running = self.is_running(name)
         for process in self._running:
             if process.name == name and process.exited_ns is None:
-                process.stopped_by = number.name
                 process.killed_ns = process.killed_ns or time.time_ns()
                 process.signal(number)
         return running
@@ -257,7 +242,6 @@ class StudentProcesses:
                 break
             for process in self._running:
                 if process.exited_ns is None:
-                    process.stopped_by = number.name
                     process.signal(number)
             step = Stopwatch(meter)
             while self.poll() and step.elapsed_s <= limit_s:
@@ -276,9 +260,9 @@ class StudentProcesses:
         """Kill whatever is left and remove what it left in shared memory."""
         # Helpers such as multiprocessing's resource tracker end by themselves a moment later.
         deadline = time.monotonic() + _AFTERMATH_S
-        while not self.poll() and descendants(os.getpid()) and time.monotonic() < deadline:
+        while not self.poll() and descendant_pids(os.getpid()) and time.monotonic() < deadline:
             time.sleep(0.01)
-        inits = {pid for pid in descendants(os.getpid()) if is_init(pid)}
+        inits = {pid for pid in descendant_pids(os.getpid()) if is_init(pid)}
         self._survivors = tuple(
             command
             for pid, command in kill_descendants(os.getpid()).items()
@@ -296,8 +280,7 @@ class StudentProcesses:
             f"the sandbox of {process.name} could not be set up: "
             f"{' '.join(self._output.tail(process.name, 'stderr', 1)) or 'it said nothing'}"
             for process in self._running
-            if isinstance(process.popen, SandboxedProcess)
-            and process.stopped_by == "itself"
+            if process.stopped_by == "itself"
             and not process.is_ended
             and not process.popen.was_set_up
         )
@@ -305,12 +288,10 @@ class StudentProcesses:
     def ended_from_outside(self, breaches: Sequence[Breach]) -> str | None:
         """That something outside of its sandbox killed or stopped a process; None if not.
 
-        Within a sandbox only its own processes can send a signal, and a guard is told of that.
-        Without one, or where they may have done it, it cannot be told who did.
+        Within one only its own processes can send a signal, and the guard sees that.
         """
         # A sandbox's own processes end with the status of what was started in it.
-        started = [item.popen for item in self._running if isinstance(item.popen, SandboxedProcess)]
-        ours = {pid for popen in started for pid in (popen.pid, popen.init)}
+        ours = {pid for one in self._running for pid in (one.popen.pid, one.popen.init)}
         if breaches or self._guard is None or self._guard.can_have_ended(ours):
             return None
         for process in self._running:

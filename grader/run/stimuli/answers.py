@@ -17,7 +17,6 @@ class Answers:
     """
 
     def __init__(self, within_s: float) -> None:
-        """Nothing was asked yet."""
         self._within_s = within_s
         self._newest: bytes | None = None
         self._before: bytes | None = None

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from grader.recording.event import Intervention, Wait
-from grader.recording.interaction import EXECUTOR_SERVICES
+from grader.recording.interaction import EXECUTOR_SERVICES, Goal
 from grader.recording.model import NS, Endpoint, Join, Kind, Owner
 from grader.run.cell.graph import GraphObserver
 from grader.run.cell.probe import Probe
-from grader.run.host.disturbance import DisturbanceMeter
-from grader.run.host.stopwatch import Stopwatch
+from grader.run.host.disturbance import DisturbanceMeter, Stopwatch
 from grader.run.order import RunLimits
 from grader.run.process.student import StudentProcesses
-from grader.run.stimuli.asking import Asker
-
-if TYPE_CHECKING:
-    from grader.run.stimuli.calling import Asking
-    from grader.run.stimuli.goal_sending import SentGoal
+from grader.run.stimuli.service_calls import ServiceCalls
 
 # A node that has added nothing to the graph for so long has left its constructor, or hangs in it.
 _SET_UP_S = 0.5
@@ -32,13 +26,16 @@ _SETTLED_NS = NS // 2
 P = TypeVar("P", bound="Playing")
 
 
+class Request(Protocol):
+    """A stimulus that sends requests to a server, in the order of the YAML."""
+
+    def holds_up(self, other: Any) -> bool:
+        """Whether the other one has to wait for it."""
+
+
 @dataclass
 class StimulusContext:
-    """What a stimulus acts on.
-
-    Attributes:
-        asking: What asks something of a service or an action, in the order of the YAML.
-    """
+    """What a stimulus acts on; ``requests`` are those that send some, in the order of the YAML."""
 
     probe: Probe
     graph: GraphObserver
@@ -49,14 +46,14 @@ class StimulusContext:
     waits: list[Wait]
     joins: dict[str, Join] = field(default_factory=dict)
     interventions: list[Intervention] = field(default_factory=list)
-    goals: list[SentGoal] = field(default_factory=list)
-    asking: list[Asking] = field(default_factory=list)
+    goals: list[Goal] = field(default_factory=list)
+    requests: list[Request] = field(default_factory=list)
     _calm: tuple[int, Stopwatch] | None = None
 
     @cached_property
-    def asker(self) -> Asker:
-        """Made with the first call."""
-        return Asker(self.probe, self.limits.message_bytes)
+    def calls(self) -> ServiceCalls:
+        """Calls of services, apart from those that only show whether a node spins."""
+        return ServiceCalls(self.probe, self.limits.message_bytes)
 
     def endpoints(self, kind: Kind, topic: str) -> list[Endpoint]:
         """The student's endpoints on a topic that are there at the moment."""
@@ -75,11 +72,7 @@ class StimulusContext:
         return next((item.node for item in offered if item.vanished_ns is None), None)
 
     def call_executor(self, node: str) -> None:
-        """Call a service of a node that it answers only while it spins.
-
-        That is the first of :data:`EXECUTOR_SERVICES`, and the second where a node was made
-        without the first.
-        """
+        """Call a service of a node that it answers only while it spins."""
         first, second = EXECUTOR_SERVICES
         seen = {item.name: item.appeared_ns for item in self.graph.services if item.node == node}
         appeared_ns = seen.get(f"{node}/{second}")
@@ -110,7 +103,7 @@ class StimulusContext:
         ) or self.is_set_up
 
 
-class Playing(ABC):
+class Playing:
     """One stimulus being played; its clock starts with the first match.
 
     A subclass in a module of this package says with :func:`plays` what it plays. It is created
@@ -126,22 +119,23 @@ class Playing(ABC):
     last_ns: int | None = None
     """When it last published something, if there is an end to that."""
 
-    @abstractmethod
+    asks = False
+    """Whether it needs a service or an action of the student's, and no topic."""
+
+    def __init__(self, order: Any, context: StimulusContext) -> None:
+        self._order = order
+        self._context = context
+
     def tick(self, elapsed_s: float | None) -> None:
-        """Do what is due.
+        """Do what is due; called with the seconds since the first match, or None before it."""
+        if elapsed_s is not None and elapsed_s >= self._order.after_s:
+            self.play(elapsed_s)
 
-        Args:
-            elapsed_s: Seconds since the first match; None before it.
-        """
-
-    @property
-    def asks(self) -> bool:
-        """Whether it needs a service or an action of the student's, and no topic."""
-        return False
+    def play(self, elapsed_s: float) -> None:
+        """Do what is due; called again and again from its time on."""
 
     def finish(self) -> None:
-        """The observation is over: note what could not be played; by default nothing."""
-        return
+        """The observation is over: note what could not be played."""
 
     @property
     def due_s(self) -> float | None:

@@ -13,11 +13,7 @@ _NOW = "now"
 
 
 def filled(message: Any, value: Mapping[str, Any], now_ns: int) -> Any:
-    """Set the fields of a message.
-
-    Args:
-        value: Fields by name, nested; checked when the order was made.
-    """
+    """Set fields of a message, by name and nested; checked when the order was made."""
     types = message.get_fields_and_field_types()
     for name, item in value.items():
         before = getattr(message, name)

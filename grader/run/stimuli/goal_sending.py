@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
 from grader.recording.interaction import Feedback, Goal
 from grader.run.cell.probe import import_interface
-from grader.run.stimuli.asking import NO_SERVER
-from grader.run.stimuli.calling import Asking
+from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import StimulusContext, plays
 from grader.run.stimuli.filling import filled, plain
+from grader.run.stimuli.service_calls import NO_SERVER
 
 _MOST_FEEDBACK = 5000
 _ACCEPT_S = 1.0
@@ -30,11 +29,7 @@ _STATUSES = {
 
 @dataclass(frozen=True)
 class GoalOrder:
-    """Send a goal to an action.
-
-    Attributes:
-        cancel_after_s: Ask to cancel it so long after it was accepted, or None.
-    """
+    """Send a goal to an action; cancel it ``cancel_after_s`` after it was accepted, or None."""
 
     action: str
     type: str
@@ -45,103 +40,91 @@ class GoalOrder:
     within_s: float = 10.0
 
 
-@dataclass
-class SentGoal:
-    """A goal under way, or one that could not be sent."""
-
-    order: GoalOrder
-    goal: Mapping[str, Any]
-    sent_ns: int
-    accepted: bool | None = None
-    answered_ns: int | None = None
-    feedback: list[Feedback] = field(default_factory=list)
-    statuses: list[tuple[int, str]] = field(default_factory=list)
-    canceled_ns: int | None = None
-    cancel_answered_ns: int | None = None
-    cancel_accepted: bool | None = None
-    status: str = ""
-    result: Mapping[str, Any] | None = None
-    result_ns: int | None = None
-    preempted: bool = False
-    error: str = ""
-
-    @property
-    def is_over(self) -> bool:
-        """Whether it was rejected, has its result, or was never sent."""
-        return self.accepted is False or self.result_ns is not None or bool(self.error)
-
-    @property
-    def record(self) -> Goal:
-        """For the recording."""
-        order = self.order
-        seen = {key: value for key, value in vars(self).items() if key != "order"}
-        return Goal(
-            action=order.action,
-            type=order.type,
-            cancel_after_s=order.cancel_after_s,
-            preempts=order.preempt,
-            **{**seen, "feedback": tuple(self.feedback), "statuses": tuple(self.statuses)},
-        )
-
-
 @plays(GoalOrder)
-class SendingGoal(Asking):
+class SendingGoal(Requesting):
     """One goal, from its sending to its result."""
 
     def __init__(self, order: GoalOrder, context: StimulusContext) -> None:
-        """Nothing is sent yet."""
-        super().__init__(
-            order, f"an action {order.action}", f"{order.action}/_action/send_goal", context
-        )
-        self._order = order
         # Those of the orders before it are there already, and are waited for.
         self._before = [
             item
-            for item in context.asking
+            for item in context.requests
             if isinstance(item, SendingGoal) and item._order.action == order.action
-        ][:-1]
+        ]
+        send_goal = f"{order.action}/_action/send_goal"
+        super().__init__(order, f"an action {order.action}", send_goal, context)
         self._client: Any = None
         self._handle: Any = None
-        self._sent: SentGoal | None = None
+        self._number: int | None = None
         self._failed: str | None = None
 
     @property
+    def _sent(self) -> Goal | None:
+        return None if self._number is None else self._context.goals[self._number]
+
+    @property
+    def _is_over(self) -> bool:
+        sent = self._sent
+        return sent is not None and (sent.accepted is False or sent.result_ns is not None)
+
+    @property
     def is_done(self) -> bool:
-        """Whether it has ended, or was waited for; or nobody was there."""
+        """Whether it has ended, or was waited for; or there is no server."""
         if self._failed is not None or self._ready.given_up:
             return True
-        return self._sent is not None and (self._sent.is_over or not self._waits)
+        return self._sent is not None and (self._is_over or not self._waits)
 
     @property
     def is_through(self) -> bool:
         """Whether it was answered; what comes after it goes out while it is worked on."""
-        if self.is_done or self._sent is None or self._since_asked is None:
+        sent = self._sent
+        if self.is_done or sent is None or self._since_sent is None:
             return self.is_done
-        return self._sent.accepted is not None or self._since_asked.elapsed_s > _ACCEPT_S
+        return sent.accepted is not None or self._since_sent.elapsed_s > _ACCEPT_S
 
-    def holds_up(self, other: Asking) -> bool:
+    def holds_up(self, other: Requesting) -> bool:
         """A goal may wait for the end of another one: it holds up only what is due at once."""
-        is_goal = isinstance(other, SendingGoal) and other._order.action == self._order.action
-        return self.after_s == other.after_s and not is_goal and super().holds_up(other)
+        same_action = isinstance(other, SendingGoal) and other._order.action == self._order.action
+        is_at_once = self._order.after_s == other._order.after_s
+        return is_at_once and not same_action and super().holds_up(other)
 
-    def tick(self, elapsed_s: float | None) -> None:
+    def play(self, elapsed_s: float) -> None:
         """Send it, and ask to cancel it, when that is due."""
-        if elapsed_s is None or elapsed_s < self._order.after_s or self._failed is not None:
+        if self._failed is not None:
             return
-        self._go_on(elapsed_s)
-        if self._sent is None:
-            if self._is_ready() and self._is_turn and self._is_free:
-                self._send()
-            return
-        self._follow(self._sent)
+        super().play(elapsed_s)
+        if self._sent is not None:
+            self._follow(self._sent)
+        elif self._is_ready() and self._is_turn and self._is_free:
+            self._send()
 
     def finish(self) -> None:
         """Note that it could not be sent, unless it was not due yet."""
         if self._failed is not None or self._ready.is_in_vain:
-            error = self._failed or NO_SERVER
-            self._note(SentGoal(self._order, self._order.goal, time.time_ns(), error=error))
+            self._note(self._order.goal, time.time_ns(), self._failed or NO_SERVER)
         elif self._ready.never_answered and self._sent is None:
-            self._note(SentGoal(self._order, self._order.goal, self._ready.there_ns))
+            self._note(self._order.goal, self._ready.there_ns)
+
+    def _note(self, goal: dict[str, Any], sent_ns: int, error: str = "") -> None:
+        order = self._order
+        self._number = len(self._context.goals)
+        self._context.goals.append(
+            Goal(
+                order.action,
+                order.type,
+                goal,
+                sent_ns,
+                cancel_after_s=order.cancel_after_s,
+                preempts=order.preempt,
+                error=error,
+            )
+        )
+
+    def _update(self, **changes: Any) -> None:
+        assert self._number is not None
+        if self._context.probe.recording:
+            goals = self._context.goals
+            goals[self._number] = replace(goals[self._number], **changes)
 
     def _is_ready(self) -> bool:
         from rclpy.action.client import ActionClient
@@ -165,63 +148,50 @@ class SendingGoal(Asking):
         )
 
     def _send(self) -> None:
-        if self._order.preempt:
-            for item in self._before:
-                if item._sent is not None and not item._sent.is_over:
-                    item._sent.preempted = True
+        for item in self._before if self._order.preempt else ():
+            if item._sent is not None and not item._is_over:
+                item._update(preempted=True)
         now_ns = time.time_ns()
         message = filled(import_interface(self._order.type).Goal(), self._order.goal, now_ns)
-        sent = self._sent = SentGoal(self._order, plain(message), now_ns)
-        self._note(sent)
+        self._note(plain(message), now_ns)
         self._wait_for_answer()
+        future = self._client.send_goal_async(message, feedback_callback=self._take_feedback)
+        future.add_done_callback(self._take_acceptance)
 
-        def take(message: Any) -> None:
-            if self._context.probe.recording and len(sent.feedback) < _MOST_FEEDBACK:
-                sent.feedback.append(Feedback(time.time_ns(), plain(message.feedback)))
+    def _take_feedback(self, message: Any) -> None:
+        sent = self._sent
+        if sent is not None and len(sent.feedback) < _MOST_FEEDBACK:
+            feedback = Feedback(time.time_ns(), plain(message.feedback))
+            self._update(feedback=(*sent.feedback, feedback))
 
-        future = self._client.send_goal_async(message, feedback_callback=take)
-        future.add_done_callback(lambda done: self._answer(sent, done))
-
-    def _note(self, sent: SentGoal) -> None:
-        self._context.goals.append(sent)
-
-    def _answer(self, sent: SentGoal, future: Any) -> None:
-        if not self._context.probe.recording:
-            return
+    def _take_acceptance(self, future: Any) -> None:
         handle = future.result()
-        sent.accepted, sent.answered_ns = bool(handle.accepted), time.time_ns()
-        if sent.accepted:
+        self._update(accepted=bool(handle.accepted), answered_ns=time.time_ns())
+        if handle.accepted and self._context.probe.recording:
             self._handle = handle
-            handle.get_result_async().add_done_callback(lambda done: self._end(sent, done))
+            handle.get_result_async().add_done_callback(self._take_result)
 
-    def _end(self, sent: SentGoal, future: Any) -> None:
-        if not self._context.probe.recording:
-            return
+    def _take_result(self, future: Any) -> None:
         answer = future.result()
-        sent.result_ns = time.time_ns()
-        sent.status = _STATUSES.get(answer.status, "unknown")
-        sent.result = plain(answer.result)
+        status = _STATUSES.get(answer.status, "unknown")
+        self._update(result_ns=time.time_ns(), status=status, result=plain(answer.result))
 
-    def _follow(self, sent: SentGoal) -> None:
-        """Note a new status, and ask to cancel when it is due."""
+    def _follow(self, sent: Goal) -> None:
         if self._handle is None:
             return
+        now_ns = time.time_ns()
         status = _STATUSES.get(self._handle.status)
         if status and (not sent.statuses or sent.statuses[-1][1] != status):
-            sent.statuses.append((time.time_ns(), status))
+            self._update(statuses=(*sent.statuses, (now_ns, status)))
         cancel_s = self._order.cancel_after_s
-        if cancel_s is None or sent.canceled_ns is not None or sent.is_over:
+        if cancel_s is None or sent.canceled_ns is not None or self._is_over:
             return
-        now_ns = time.time_ns()
         if now_ns - (sent.answered_ns or now_ns) >= cancel_s * 1e9:
-            sent.canceled_ns = now_ns
+            self._update(canceled_ns=now_ns)
             # A server that works on the goal to its end takes that in only then.
             self._wait_for_answer()
-            self._handle.cancel_goal_async().add_done_callback(
-                lambda done: self._cancel(sent, done)
-            )
+            self._handle.cancel_goal_async().add_done_callback(self._take_cancellation)
 
-    def _cancel(self, sent: SentGoal, future: Any) -> None:
-        if self._context.probe.recording:
-            sent.cancel_answered_ns = time.time_ns()
-            sent.cancel_accepted = bool(future.result().goals_canceling)
+    def _take_cancellation(self, future: Any) -> None:
+        accepted = bool(future.result().goals_canceling)
+        self._update(cancel_answered_ns=time.time_ns(), cancel_accepted=accepted)

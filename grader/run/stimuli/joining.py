@@ -33,9 +33,7 @@ class Joining(Playing):
     """A late joiner."""
 
     def __init__(self, order: JoinOrder, context: StimulusContext) -> None:
-        """Nothing is subscribed to yet."""
-        self._order = order
-        self._context = context
+        super().__init__(order, context)
         self._subscription: Any = None
         self._joined_s = 0.0
         self._matched_s: float | None = None
@@ -45,7 +43,7 @@ class Joining(Playing):
     def due_s(self) -> float | None:
         """Its time to join; then until it is matched, in short steps."""
         if self._subscription is None:
-            return self._order.after_s
+            return float(self._order.after_s)
         return None if self.is_done else self._now_s + _POLL_S
 
     @property
@@ -57,32 +55,17 @@ class Joining(Playing):
             return self._now_s - self._matched_s > _HISTORY_S
         return self._now_s - self._joined_s > self._context.limits.settle_s
 
-    def tick(self, elapsed_s: float | None) -> None:
-        """Join when it is due; then note the match."""
-        if elapsed_s is None or elapsed_s < self._order.after_s:
-            return
+    def play(self, elapsed_s: float) -> None:
+        """Join; then note the match."""
+        order, joins = self._order, self._context.joins
         self._now_s = elapsed_s
         if self._subscription is None:
-            self._join(elapsed_s)
+            self._joined_s = elapsed_s
+            qos = Qos(order.reliability, order.durability, "keep_last", order.depth)
+            joins[order.name] = Join(order.name, order.topic, order.type, qos, time.time_ns())
+            profile = qos_profile(order.reliability, order.durability, order.depth)
+            join = self._context.probe.join
+            self._subscription = join(order.name, order.topic, order.type, profile)
         elif self._matched_s is None and self._subscription.get_publisher_count():
             self._matched_s = elapsed_s
-            joins, name = self._context.joins, self._order.name
-            joins[name] = replace(joins[name], matched_ns=time.time_ns())
-
-    def _join(self, elapsed_s: float) -> None:
-        order = self._order
-        self._joined_s = elapsed_s
-        self._context.joins[order.name] = Join(
-            name=order.name,
-            topic=order.topic,
-            type=order.type,
-            qos=Qos(
-                reliability=order.reliability,
-                durability=order.durability,
-                history="keep_last",
-                depth=order.depth,
-            ),
-            joined_ns=time.time_ns(),
-        )
-        profile = qos_profile(order.reliability, order.durability, order.depth)
-        self._subscription = self._context.probe.join(order.name, order.topic, order.type, profile)
+            joins[order.name] = replace(joins[order.name], matched_ns=time.time_ns())

@@ -21,28 +21,23 @@ class ListingParameters(Playing):
     """Calls ``list_parameters`` of every node, or what stands in for it; it has no end."""
 
     def __init__(self, order: ListParametersOrder, context: StimulusContext) -> None:
-        """Nothing is called yet."""
-        self._every_s = order.every_s
-        self._context = context
+        super().__init__(order, context)
         self._next = 0.0
         self._due_s: float | None = None
 
     @property
     def due_s(self) -> float | None:
-        """When to call next; whoever waits for a message instead asks in the student's rhythm."""
+        """When to call next: calls that wait for a message would keep the student's rhythm."""
         return self._due_s
 
     def tick(self, elapsed_s: float | None) -> None:
         """Call when it is due; also before the first match, since a node may be blocked."""
         now = time.monotonic()
         if now >= self._next and self._context.is_set_up:
-            self._next = now + self._every_s
-            self._call()
+            self._next = now + self._order.every_s
+            there = (node for node in self._context.graph.nodes if node.vanished_ns is None)
+            for name in dict.fromkeys(node.name for node in there if node.owner is Owner.STUDENT):
+                self._context.call_executor(name)
         self._due_s = None
         if elapsed_s is not None and self._next > now:
             self._due_s = elapsed_s + self._next - now
-
-    def _call(self) -> None:
-        there = (node for node in self._context.graph.nodes if node.vanished_ns is None)
-        for name in dict.fromkeys(node.name for node in there if node.owner is Owner.STUDENT):
-            self._context.call_executor(name)

@@ -34,7 +34,6 @@ class Player:
     """Plays every stimulus of a run at its time."""
 
     def __init__(self, orders: Sequence[Mapping[str, Any]], context: StimulusContext) -> None:
-        """Prepare what has to be there before anything of the student's is launched."""
         self._playing = [_played(order, context) for order in orders]
         self._began_s: float | None = None
 

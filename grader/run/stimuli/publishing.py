@@ -13,7 +13,7 @@ from grader.recording.event import Wait
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Kind, Qos
 from grader.run.cell.probe import import_interface, qos_profile
-from grader.run.host.stopwatch import Stopwatch
+from grader.run.host.disturbance import Stopwatch
 from grader.run.stimuli.answers import Answers
 from grader.run.stimuli.context import Playing, StimulusContext, plays
 from grader.run.stimuli.filling import filled
@@ -51,15 +51,10 @@ class Publishing(Playing):
     """A publisher of the probe with its messages."""
 
     def __init__(self, order: PublishOrder, context: StimulusContext) -> None:
-        """Create the publisher, and publish what is to be there before the student's launch.
-
-        Raises:
-            ImportError: The interface does not exist.
-        """
+        super().__init__(order, context)
+        self._order: PublishOrder = order
         self.topic = order.topic
         self.answer = order.answer
-        self._order = order
-        self._context = context
         self._class = import_interface(order.type)
         self._qos = Qos(reliability=order.reliability, durability=order.durability)
         self._publisher: Any = context.probe.node.create_publisher(
@@ -81,7 +76,7 @@ class Publishing(Playing):
 
     @property
     def is_done(self) -> bool:
-        """Whether everything was published, with its answer; or nobody ever listened."""
+        """Whether everything was published, with its answer; or nothing ever subscribed."""
         order = self._order
         if order.repeat_s is not None or self._given_up:
             return True
@@ -92,17 +87,15 @@ class Publishing(Playing):
 
     @property
     def due_s(self) -> float | None:
-        """When the next message is due; until somebody listens, in short steps."""
+        """When the next message is due; until something subscribes, in short steps."""
         if self._next_s is None:
             return max(self._order.after_s, self._now_s + _POLL_S)
         if self._order.answer and self._sent > self._order.before_launch:
             return max(self._next_s, self._now_s + _POLL_S) if not self.is_done else None
         return self._next_s if self._is_more else None
 
-    def tick(self, elapsed_s: float | None) -> None:
+    def play(self, elapsed_s: float) -> None:
         """Publish what is due."""
-        if elapsed_s is None or elapsed_s < self._order.after_s:
-            return
         self._now_s = elapsed_s
         if self._next_s is None:
             self._await_listener(elapsed_s)
@@ -155,7 +148,6 @@ class Publishing(Playing):
         return bool(able) and matched >= len(able) and self._context.is_heard
 
     def _listen(self) -> None:
-        """Take note of the answers that came since the last time."""
         if self._order.answer is None:
             return
         messages = self._context.probe.messages
@@ -175,13 +167,5 @@ class Publishing(Playing):
         if order.repeat_s is None:
             self.last_ns = stamp_ns
         self._context.probe.messages.append(
-            RawMessage(
-                topic=order.topic,
-                type=order.type,
-                cdr=cdr,
-                stamp_ns=stamp_ns,
-                received_ns=stamp_ns,
-                sequence=self._sent,
-                is_sent=True,
-            )
+            RawMessage(order.topic, order.type, cdr, stamp_ns, stamp_ns, self._sent, is_sent=True)
         )

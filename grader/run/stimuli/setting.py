@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from grader.run.stimuli.asking import NO_SERVER, Asked
-from grader.run.stimuli.calling import Asking
+from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import StimulusContext, plays
+from grader.run.stimuli.service_calls import NO_SERVER
 
 _EVERY: Mapping[str, Any] = {"prefixes": [], "depth": 0}
 _TYPES = {
@@ -21,11 +21,7 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class ParametersOrder:
-    """Read the parameters of a node, and set some of them.
-
-    Attributes:
-        values: What to set; empty to read only.
-    """
+    """Read the parameters of a node, and set some of them, or none."""
 
     node: str
     values: dict[str, Any]
@@ -34,16 +30,14 @@ class ParametersOrder:
 
 
 @plays(ParametersOrder)
-class SettingParameters(Asking):
+class SettingParameters(Requesting):
     """One round of calls to the parameter services of a node; each waits for the one before."""
 
     def __init__(self, order: ParametersOrder, context: StimulusContext) -> None:
-        """Nothing is asked yet."""
         what = f"parameter services of {order.node}"
         super().__init__(order, what, f"{order.node}/list_parameters", context)
-        self._order = order
-        self._steps: Iterator[Asked] | None = None
-        self._asked: Asked | None = None
+        self._steps: Iterator[int] | None = None
+        self._call: int | None = None
         self._done = False
 
     @property
@@ -51,74 +45,60 @@ class SettingParameters(Asking):
         """Whether every call was answered, or waited for; or the node has no such services."""
         return self._done or self._ready.given_up
 
-    def tick(self, elapsed_s: float | None) -> None:
-        """Ask the next, when the one before it was answered."""
-        if elapsed_s is None or elapsed_s < self._order.after_s or self._done:
+    def play(self, elapsed_s: float) -> None:
+        """Send the next call, when the one before it was answered."""
+        if self._done:
             return
-        self._go_on(elapsed_s)
+        super().play(elapsed_s)
         if self._steps is None:
             there = all(
-                self._context.asker.is_ready(f"{self._order.node}/{service}", interface)
+                self._context.calls.is_ready(f"{self._order.node}/{service}", interface)
                 for service, interface in _TYPES.items()
             )
             if not self._ready.met(there) or not self._is_turn:
                 return
             self._steps = self._conversation()
-        if self._asked is not None and not self._asked.is_over:
-            # A node that does not answer one call is not asked more.
+        if self._call is not None and not self._context.calls.is_over(self._call):
+            # A node that does not answer one call gets no more.
             self._done = not self._waits
             return
-        self._asked = next(self._steps, None)
+        self._call = next(self._steps, None)
         self._wait_for_answer()
-        self._done = self._asked is None
+        self._done = self._call is None
 
     def finish(self) -> None:
-        """Note that nothing could be asked, unless it was not due yet."""
+        """Note that nothing could be sent, unless it was not due yet."""
         service, type = f"{self._order.node}/list_parameters", _TYPES["list_parameters"]
+        note = self._context.calls.note_unsent
         if self._ready.is_in_vain:
-            self._context.asker.fail(service, type, _EVERY, NO_SERVER)
+            note(service, type, _EVERY, NO_SERVER)
         elif self._ready.never_answered and self._steps is None:
-            self._context.asker.wait(service, type, _EVERY, self._ready.there_ns)
+            note(service, type, _EVERY, "", self._ready.there_ns)
 
-    def _conversation(self) -> Iterator[Asked]:
-        listed = self._ask("list_parameters", _EVERY)
+    def _conversation(self) -> Iterator[int]:
+        listed = self._send("list_parameters", _EVERY)
         yield listed
-        names = _names(listed)
+        response = self._context.calls.calls[listed].response or {}
+        names = [str(name) for name in response.get("result", {}).get("names", [])]
         if names:
-            yield self._ask("describe_parameters", {"names": names})
-            yield self._ask("get_parameters", {"names": names})
-        if not self._order.values:
-            return
+            yield self._send("describe_parameters", {"names": names})
+            yield self._send("get_parameters", {"names": names})
         values = self._order.values
-        yield self._ask(
-            "set_parameters",
-            {
-                "parameters": [
-                    {"name": name, "value": parameter_value(value)}
-                    for name, value in values.items()
-                ]
-            },
-        )
+        if not values:
+            return
+        wanted = [{"name": name, "value": parameter_value(one)} for name, one in values.items()]
+        yield self._send("set_parameters", {"parameters": wanted})
         known = [name for name in values if name in names]
         if known:
-            yield self._ask("get_parameters", {"names": known})
+            yield self._send("get_parameters", {"names": known})
 
-    def _ask(self, service: str, request: Mapping[str, Any]) -> Asked:
+    def _send(self, service: str, request: Mapping[str, Any]) -> int:
         name = f"{self._order.node}/{service}"
-        return self._context.asker.ask(name, _TYPES[service], request)
-
-
-def _names(listed: Asked) -> list[str]:
-    result = (listed.response or {}).get("result", {})
-    return [str(name) for name in result.get("names", [])]
+        return self._context.calls.send(name, _TYPES[service], request)
 
 
 def parameter_value(value: Any) -> dict[str, Any]:
-    """A value as rcl_interfaces/msg/ParameterValue.
-
-    Args:
-        value: A truth, a number, a text, or a list of one kind of these, not empty.
-    """
+    """A bool, number, str, or a list of one kind of these, as rcl_interfaces/msg/ParameterValue."""
     many = isinstance(value, list)
     kinds: Sequence[tuple[type, int, str]] = (
         (bool, 1, "bool"),

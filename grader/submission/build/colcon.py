@@ -208,7 +208,6 @@ class Colcon:
             room = None
             environment: Mapping[str, str] = self.environment
             if setting.sandbox is not None:
-                setting.limits.room.check_allowed()
                 room = stack.enter_context(
                     setting.sandbox.build(setting.ros, folders, setting.limits.room)
                 )

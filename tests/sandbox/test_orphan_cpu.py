@@ -115,9 +115,9 @@ def test_the_time_of_children_counts_whether_they_are_waited_for_or_not(action: 
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:
         # The time between two looks; all have ended when it writes a line.
         while not select.select([parent.stdout], [], [], 0.02)[0]:
-            account.stolen_s(usage_of([parent.pid]))
+            account.used_s(usage_of([parent.pid]))
         # Who is missing twice has ended for certain.
-        account.stolen_s(usage_of([parent.pid]))
-        stolen_s = account.stolen_s(usage_of([parent.pid]))
+        account.used_s(usage_of([parent.pid]))
+        stolen_s = account.used_s(usage_of([parent.pid]))
         parent.communicate(b"\n")
     assert 0.3 < stolen_s < 1.3

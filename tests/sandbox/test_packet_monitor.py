@@ -13,17 +13,17 @@ from grader.sandbox.packet_monitor import heartbeats
 
 SOURCE = """\
 import fcntl, socket, struct
-from grader.sandbox.packet_monitor import Wire, bound_ports
+from grader.sandbox.packet_monitor import PacketMonitor, bound_ports
 from grader.sandbox.namespaces import _bring_up_loopback
 _bring_up_loopback()
-wire = Wire()
+monitor = PacketMonitor()
 ear, mouth = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
 ear.bind(('127.0.0.1', 7410))
 ours = bound_ports()
 def send(data, port=7410, times=20):
     for _ in range(times):
         mouth.sendto(data, ('127.0.0.1', port))
-    print(wire.malformed(ours))
+    print(monitor.malformed(ours))
 send(b'RTPS' + bytes((2, 3, 1, 15)) + bytes(60_000))
 send(b'RTPS' + bytes((2, 3, 1, 15)) + bytes(12))
 send(b'telemetry of a student', 7500)
@@ -36,8 +36,8 @@ for begin in range(0, 64 * 40, 64):
     writers = (number.to_bytes(3, 'big') + bytes((3,)) for number in range(begin, begin + 64))
     told = (struct.pack('<BBHI4siIiIi', 7, 1, 28, 0, one, 0, 1, 0, 1, 7) for one in writers)
     mouth.sendto(b'RTPS' + bytes((2, 3, 1, 15)) + bytes(12) + b''.join(told), ('127.0.0.1', 7410))
-wire.malformed(ours)
-print(len(wire.heartbeats))
+monitor.malformed(ours)
+print(len(monitor.heartbeats))
 """
 
 

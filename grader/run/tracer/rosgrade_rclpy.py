@@ -1,0 +1,299 @@
+"""What the tracer wraps of rclpy; loaded with the first module of rclpy that is imported."""
+
+from __future__ import annotations
+
+import gc
+import itertools
+import os
+import sys
+
+from sitecustomize import (  # type: ignore[import-not-found]
+    HELD_TOPICS,
+    LEAST_THREADS,
+    MIDDLEWARE,
+    SEEN_FD,
+    THRESHOLDS,
+    of_middleware,
+    pipe_at,
+    quietly,
+    report,
+)
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+_HOLD_LIMIT_S = 2.0
+_HOLD_POLL_S = 0.002
+_FLUSH_LIMIT_S = 0.5
+_SEEN_LIMIT_S = 2.0
+_SLICE_S = 0.5
+_OWN_TOPICS = ("/parameter_events", "/rosout")
+
+
+def _full_name(node: Any) -> str:
+    return str(node.get_namespace().rstrip("/") + "/" + node.get_name())
+
+
+def _type_name(interface: Any) -> str:
+    module = interface.__module__.split(".")
+    return "/".join([module[0], module[1] if len(module) > 1 else "msg", interface.__name__])
+
+
+def _qos(profile: Any) -> dict[str, Any]:
+    return {
+        "reliability": profile.reliability.name.lower(),
+        "durability": profile.durability.name.lower(),
+        "history": profile.history.name.lower(),
+        "depth": profile.depth,
+    }
+
+
+def _group(group: Any, node: Any) -> dict[str, Any]:
+    chosen = group if group is not None else node.default_callback_group
+    return {"type": type(chosen).__name__, "id": id(chosen)}
+
+
+def _endpoint(kind: str, node: Any, endpoint: Any, **more: Any) -> None:
+    if endpoint.topic_name in _OWN_TOPICS:
+        return
+    number = next(_count)
+    _endpoints[id(endpoint)] = number, kind, endpoint.topic_name
+    report(
+        kind,
+        number=number,
+        node=_full_name(node),
+        topic=endpoint.topic_name,
+        type=_type_name(endpoint.msg_type),
+        **_qos(endpoint.qos_profile),
+        **more,
+    )
+
+
+def _patch_endpoint(endpoint_class: Any) -> None:
+    def destroyed(endpoint: Any) -> None:
+        number, _kind, _topic = _endpoints.pop(id(endpoint))
+        report("destroyed", number=number)
+
+    _wrap(endpoint_class, "destroy", before=destroyed)
+
+
+def _hold(node: Any, publisher: Any) -> None:
+    """Wait until a publisher that the probe listens to is matched with another process.
+
+    Only with a node's first one on the topic: a node that makes a new publisher for every
+    message loses them.
+    """
+    key = (_full_name(node), publisher.topic_name)
+    if publisher.topic_name not in HELD_TOPICS or key in _held:
+        return
+    _held.add(key)
+    import time
+
+    began = time.monotonic()
+    own = sum(item[1:] == ("subscription", publisher.topic_name) for item in _endpoints.values())
+    while publisher.get_subscription_count() <= own:
+        if time.monotonic() - began > _HOLD_LIMIT_S:
+            break
+        time.sleep(_HOLD_POLL_S)
+    _publishers.append(publisher)
+    report(
+        "held",
+        topic=publisher.topic_name,
+        waited_s=time.monotonic() - began,
+        matched=publisher.get_subscription_count() > own,
+    )
+
+
+def _report_messages(publisher: Any) -> None:
+    """Report of messages 1, 2, 4, 8, ... on a topic of the probe's where they are published."""
+    topic, publish = publisher.topic_name, publisher.publish
+    if topic not in HELD_TOPICS:
+        return
+
+    def reported(*args: Any, **kwargs: Any) -> Any:
+        number = _messages[topic] = _messages.get(topic, 0) + 1
+        if not number & (number - 1):
+            report("published", topic=topic, number=number, in_callback=_is_in_callback())
+        return publish(*args, **kwargs)
+
+    publisher.publish = reported
+
+
+def _is_in_callback() -> bool:
+    """Whether an executor has called what runs now."""
+    frame = sys._getframe()
+    while frame is not None:
+        if frame.f_code.co_filename.endswith(("/rclpy/executors.py", "/rclpy/task.py")):
+            return True
+        frame = frame.f_back  # type: ignore[assignment]
+    return False
+
+
+_messages: dict[str, int] = {}
+_endpoints: dict[int, tuple[int, str, str]] = {}
+"""Publishers and subscriptions that are not destroyed: id -> number of the report, kind, topic."""
+_count = itertools.count()
+_publishers: list[Any] = []
+_held: set[tuple[str, str]] = set()
+_added: set[str] = set()
+_nodes: list[bool] = []
+
+
+def flush() -> None:
+    """Let what was published arrive, and what was created be seen, before it goes away.
+
+    Discovery takes a moment: of a process that ends at once, the graph might show the node or
+    not, by chance. So it waits until the cell has seen everything that was declared.
+    """
+    from rclpy.duration import Duration
+
+    while _publishers:
+        publisher = _publishers.pop()
+        quietly(publisher.wait_for_all_acked, Duration(seconds=_FLUSH_LIMIT_S))
+    if _nodes and pipe_at(SEEN_FD):
+        import select
+
+        _nodes.clear()
+        report("leaving")
+        # The cell closes its end.
+        select.select([SEEN_FD], [], [], _SEEN_LIMIT_S)
+
+
+def _wrap(owner: Any, name: str, before: Any = None, after: Any = None) -> None:
+    import functools
+
+    original = getattr(owner, name)
+
+    @functools.wraps(original)
+    def wrapped(self: Any, *args: Any, **kwargs: Any) -> Any:
+        if before is not None:
+            quietly(before, self)
+        result = original(self, *args, **kwargs)
+        if after is not None:
+            quietly(after, self, result)
+        return result
+
+    setattr(owner, name, wrapped)
+
+
+def _patch_node(module: Any) -> None:
+    node_class = module.Node
+
+    def made(node: Any, _: Any) -> None:
+        _nodes.append(True)
+        report("node", node=_full_name(node))
+
+    def published(node: Any, publisher: Any) -> None:
+        _endpoint("publisher", node, publisher)
+        quietly(_report_messages, publisher)
+        _hold(node, publisher)
+
+    def timer_made(node: Any, timer: Any) -> None:
+        report(
+            "timer",
+            node=_full_name(node),
+            period_s=timer.timer_period_ns / 1e9,
+            callback=str(getattr(timer.callback, "__qualname__", type(timer.callback).__name__)),
+            group=_group(timer.callback_group, node),
+        )
+
+    def subscribed(node: Any, subscription: Any) -> None:
+        group = _group(subscription.callback_group, node)
+        _endpoint("subscription", node, subscription, group=group)
+
+    _wrap(node_class, "__init__", after=made)
+    _wrap(node_class, "create_publisher", after=published)
+    _wrap(node_class, "create_subscription", after=subscribed)
+    _wrap(node_class, "create_timer", after=timer_made)
+    _wrap(node_class, "destroy_node", before=lambda _: flush())
+
+
+def _freeze(_context: Any) -> None:
+    """Spare the garbage collector what was imported: its passes cost a tenth of the CPU time."""
+    gc.freeze()
+    gc.set_threshold(*THRESHOLDS)
+
+
+def _patch_context(module: Any) -> None:
+    def made(context: Any, _: Any) -> None:
+        changed = {name for name in MIDDLEWARE if os.environ.get(name) != MIDDLEWARE[name]}
+        changed.update(name for name in of_middleware() if name not in MIDDLEWARE)
+        if str(context.get_domain_id()) != MIDDLEWARE.get("ROS_DOMAIN_ID", "0"):
+            changed.add("ROS_DOMAIN_ID")
+        report("init", changed=" ".join(sorted(changed)))
+
+    _wrap(module.Context, "init", before=_freeze, after=made)
+    _wrap(module.Context, "shutdown", before=lambda _: flush())
+    _wrap(module.Context, "try_shutdown", before=lambda _: flush())
+
+
+def _patch_executors(module: Any) -> None:
+    executor_class = module.Executor
+    original = executor_class.wait_for_ready_callbacks
+
+    def first_wait(self: Any, *args: Any, **kwargs: Any) -> Any:
+        # From the second call on the executor runs rclpy's own method again.
+        self.wait_for_ready_callbacks = original.__get__(self)
+        threads = getattr(getattr(self, "_executor", None), "_max_workers", 1)
+        report("spin", executor=type(self).__name__, threads=threads, tells_added=True)
+        return original(self, *args, **kwargs)
+
+    def added(self: Any, _: Any) -> None:
+        # rclpy.spin_once(node) adds its node at each call.
+        for name in {_full_name(node) for node in self.get_nodes()} - _added:
+            _added.add(name)
+            report("added", node=name)
+
+    executor_class.wait_for_ready_callbacks = first_wait
+    _wrap(executor_class, "add_node", after=added)
+    _give_threads(module.MultiThreadedExecutor)
+
+
+def _give_threads(executor_class: Any) -> None:
+    make = executor_class.__init__
+
+    def made(self: Any, num_threads: Any = None, **kwargs: Any) -> None:
+        if num_threads is None:
+            num_threads = max(LEAST_THREADS, len(os.sched_getaffinity(0)))
+        make(self, num_threads, **kwargs)
+
+    executor_class.__init__ = made
+
+
+def _patch_events_executor(module: Any) -> None:
+    make = module.EventsExecutor
+
+    def made(*args: Any, **kwargs: Any) -> Any:
+        # It is made in C++ and has no method to wrap.
+        report("spin", executor="EventsExecutor", threads=1)
+        return make(*args, **kwargs)
+
+    module.EventsExecutor = made
+    if os.environ.get("_ROS_WHEELS_BOOTSTRAP_COMPLETE"):
+        _wait_in_slices(module._rclpy.EventsExecutor)
+
+
+def _wait_in_slices(executor_class: Any) -> None:
+    """Repair the wheels' EventsExecutor, whose waits without a limit overflow and end at once."""
+    spin_once = executor_class.spin_once
+
+    def once(self: Any, timeout_sec: Any = None) -> None:
+        spin_once(self, _SLICE_S if timeout_sec is None else timeout_sec)
+
+    def spin(self: Any) -> None:
+        while self.context.ok():
+            once(self)
+
+    executor_class.spin_once = once
+    executor_class.spin = spin
+
+
+PATCHES = {
+    "rclpy.experimental.events_executor": _patch_events_executor,
+    "rclpy.node": _patch_node,
+    "rclpy.publisher": lambda module: _patch_endpoint(module.Publisher),
+    "rclpy.subscription": lambda module: _patch_endpoint(module.Subscription),
+    "rclpy.context": _patch_context,
+    "rclpy.executors": _patch_executors,
+}
