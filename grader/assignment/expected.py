@@ -14,8 +14,7 @@ from grader.assignment.interfaces import Interfaces
 from grader.assignment.model import Assignment
 from grader.assignment.stimuli.message import Find, part_of
 from grader.checks.check import NamedFields
-from grader.checks.field import value_at
-from grader.checks.value import NoSuchField, expected_leaves, tolerance_of, unreachable
+from grader.checks.value import NoSuchField, expected_leaves, tolerance_of, unreachable, value_at
 from grader.errors import Problem
 from grader.recording.interface import FLOATS, TEXTS, fields_of
 from grader.spec.source import Source

@@ -8,9 +8,15 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from grader.checks.check import NamedFields
-from grader.checks.field import FieldPath
 from grader.checks.finding import Table
-from grader.checks.value import EXACT, Difference, Tolerance, differences, expected_leaves
+from grader.checks.value import (
+    EXACT,
+    Difference,
+    FieldPath,
+    Tolerance,
+    differences,
+    expected_leaves,
+)
 from grader.checks.wording import codes, value_text
 
 _MOST_FIELDS = 6

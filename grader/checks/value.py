@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import AfterValidator
 
 from grader.spec.nearest_name import did_you_mean
 
@@ -17,6 +20,22 @@ Tolerance = float | Mapping[str, float]
 """Largest difference of two numbers: of every field, or by path, where others are exact."""
 
 FLOAT32_MAX = 3.4028234663852886e38
+
+_NAME = r"[A-Za-z][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*"
+_PATH = re.compile(rf"{_NAME}(?:\.{_NAME})*")
+_STEP = re.compile(r"[A-Za-z0-9_]+")
+
+
+def _field_path(text: str) -> str:
+    if not _PATH.fullmatch(text):
+        raise ValueError(
+            f"{text!r} is not a field: write its path, such as 'pose.pose.position.x' or "
+            "'ranges[0]'"
+        )
+    return text
+
+
+FieldPath = Annotated[str, AfterValidator(_field_path)]
 
 
 class NoSuchField(ValueError):
@@ -54,12 +73,8 @@ def expected_leaves(expected: Mapping[str, Any], message: Mapping[str, Any]) -> 
     return found
 
 
-def field_of(message: Any, name: str, here: str) -> Any:
-    """The value of a field, of which the message is called ``here`` in errors.
-
-    Raises:
-        NoSuchField: There is no such field.
-    """
+def _field_of(message: Any, name: str, here: str) -> Any:
+    """The value of a field of a message that is called ``here`` in errors."""
     if not isinstance(message, Mapping):
         raise NoSuchField(f"{here} has no field {name!r}: it is a plain value")
     if name not in message:
@@ -70,9 +85,34 @@ def field_of(message: Any, name: str, here: str) -> Any:
     return message[name]
 
 
+def value_at(message: Mapping[str, Any], path: str) -> Any:
+    """The plain value in a field of a message; :class:`NoSuchField` if there is none."""
+    here: Any = message
+    done = "the message"
+    for step in _STEP.findall(path):
+        if isinstance(here, Sequence) and not isinstance(here, str) and step.isdigit():
+            if int(step) >= len(here):
+                raise NoSuchField(f"{done} has {len(here)} items, so there is no [{step}]")
+            here = here[int(step)]
+        else:
+            here = _field_of(here, step, done)
+        done = step
+    if isinstance(here, Mapping):
+        raise NoSuchField(f"{path} is a message: name one of its fields ({', '.join(here)})")
+    return here
+
+
+def number_at(message: Mapping[str, Any], path: str) -> float:
+    """The number in a field of a message; :class:`NoSuchField` if there is none."""
+    value = value_at(message, path)
+    if not isinstance(value, int | float):
+        raise NoSuchField(f"{path} is not a number")
+    return float(value)
+
+
 def _expect(names: list[str], item: Any, message: Any, path: str, found: dict[str, Any]) -> None:
     if names:
-        inner = field_of(message, names[0], path or "the message")
+        inner = _field_of(message, names[0], path or "the message")
         _expect(names[1:], item, inner, f"{path}.{names[0]}" if path else names[0], found)
     elif isinstance(item, Mapping):
         for key, inner in item.items():
@@ -128,7 +168,7 @@ def differences(
     """
     found = []
     for path, wanted in expected.items():
-        observed = _at(message, path)
+        observed = value_at(message, path)
         if not same(wanted, observed, tolerance_of(tolerance, path)):
             found.append(Difference(path, wanted, observed))
     if rest_zero:
@@ -176,12 +216,6 @@ def _is_zero(value: Any, tolerance: float) -> bool:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return abs(value) <= tolerance
     return not value
-
-
-def _at(message: Any, path: str) -> Any:
-    for name in path.split("."):
-        message = message[name]
-    return message
 
 
 def _items(value: Any) -> Sequence[Any] | None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from grader.checks.field import number_at
 from grader.checks.finding import Evidence, Moment, Table
 from grader.checks.first_seen import endpoints_seen, first_seen
+from grader.checks.value import number_at
 from grader.checks.wording import code, counted, listing, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed

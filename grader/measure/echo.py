@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.checks.field import number_at
+from grader.checks.value import number_at
 from grader.measure.printed import exchanged, logged_text, numbers, shows
 from grader.recording.model import NS, LogLine, Message, Recording
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from grader.checks.field import number_at
+from grader.checks.value import number_at
 from grader.checks.value import NoSuchField
 from grader.recording.model import NS, Message
 

@@ -9,10 +9,9 @@ from typing import Literal
 from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.field import FieldPath, value_at
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import endpoints_seen
-from grader.checks.value import NoSuchField
+from grader.checks.value import FieldPath, NoSuchField, value_at
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.field import FieldPath
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.checks.messages.derived_messages import (
     DerivedMessages,
@@ -17,7 +16,7 @@ from grader.checks.messages.derived_messages import (
     SourceValue,
 )
 from grader.checks.need import Recorded
-from grader.checks.value import NoSuchField
+from grader.checks.value import FieldPath, NoSuchField
 from grader.checks.wording import code, codes, counted, listing
 from grader.diagnosis.no_messages import why_few, why_silent
 from grader.recording.model import NS, Recording

@@ -9,10 +9,9 @@ from typing import Any
 from pydantic import Field, model_validator
 
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.field import FieldPath, number_at, value_at
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Recorded
-from grader.checks.value import NoSuchField, same
+from grader.checks.value import FieldPath, NoSuchField, number_at, same, value_at
 from grader.checks.wording import code, counted, value_text
 from grader.diagnosis.no_messages import why_few, why_silent
 from grader.measure.numbering import is_numbered

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
@@ -68,36 +70,24 @@ def exists(recording: Recording, parameters: NodeExists) -> Finding:
     Judged by the ROS graph: a node of the student with this fully qualified name was seen.
     """
     stop_if(why_not_node(recording, parameters.name))
-    stop_if(_other_publisher(recording, parameters))
-    node = next(item for item in recording.student_nodes if item.name == parameters.name)
-    return _appeared(recording, parameters, node, "it")
-
-
-def _other_publisher(recording: Recording, parameters: NodeExists) -> Cause | None:
-    """Another node publishes what this one should; a topic without a publisher is no matter."""
-    if parameters.publishes is None:
-        return None
     publishers = recording.student_endpoints(Kind.PUBLISHER, parameters.publishes)
     others = sorted({item.node for item in publishers} - {parameters.name})
-    if not others:
-        return None
-    return Cause(
-        f"{code(parameters.name)} is there, but {codes(others)} publishes on "
-        f"{code(parameters.publishes)}",
-        "Create the publisher with self.create_publisher(...) in the node that is asked for.",
-        Evidence(moments=endpoints_seen(recording, publishers)),
-    )
+    if parameters.publishes is not None and others:
+        return Finding.failed(
+            parameters.asked_for,
+            f"{code(parameters.name)} is there, but {codes(others)} publishes on "
+            f"{code(parameters.publishes)}",
+            "Create the publisher with self.create_publisher(...) in the node that is asked for.",
+            Evidence(moments=endpoints_seen(recording, publishers)),
+        )
+    node = next(item for item in recording.student_nodes if item.name == parameters.name)
+    return _appeared(recording, parameters, node, "it")
 
 
 def target_nodes(recording: Recording) -> tuple[Node, ...]:
     """The student's nodes that publish what the probe subscribes to, or subscribe to what it sends.
 
-    A program may have more nodes, such as one that only reads parameters or listens to another
-    node of the program, and is destroyed again or never spun; what becomes of those is its own
-    affair.
-
-    Returns:
-        In the order of their appearance; empty if no node has such an endpoint.
+    In the order of their appearance. What becomes of other nodes is the program's own affair.
     """
     ends = {(item.kind, item.topic) for item in recording.endpoints if item.owner is Owner.PROBE}
     names = {
@@ -213,27 +203,30 @@ def ends(recording: Recording, parameters: Ends) -> Finding:
     if not recording.processes:
         stop_if(why_no_node(recording) or Cause("nothing was launched"))
     stop_if(why_ended(recording, "it had already ended before SIGINT"))
-    stuck = [process.name for process in recording.processes if process.exited_ns is None]
+    processes, took_s = recording.processes, partial(_stop_s, recording)
+    stuck = [process.name for process in processes if process.exited_ns is None]
     if stuck:
         text = f"{codes(stuck)} could not be ended, not even by SIGKILL"
         return Finding.error(parameters.asked_for, text)
-    asked = [process for process in recording.processes if not _was_killed(recording, process)]
+    asked = [process for process in processes if not _was_killed(recording, process)]
     slow = [process for process in asked if not _in_time(process, parameters)]
     if slow:
-        worst = max(slow, key=lambda process: _stop_s(recording, process))
-        stop_if(_why_slow(recording, worst, parameters))
-    for process in recording.processes:
+        stop_if(_why_slow(recording, max(slow, key=took_s), parameters))
+    for process in processes:
         if process.survivors:
-            stop_if(_why_survived(recording, process))
+            number = counted(len(process.survivors), "process", "processes")
+            return Finding.failed(
+                parameters.asked_for,
+                f"{code(process.name)} left {number} running behind it: {codes(process.survivors)}",
+                "End child processes before main() returns: process.terminate(), then "
+                "process.wait().",
+                Evidence(moments=(_end(recording, process),)),
+            )
     if not asked:
-        text = "a stimulus of the scenario had ended it before"
-        return Finding.error(parameters.asked_for, text)
-    longest_s = max(_stop_s(recording, process) for process in asked)
-    return Finding.passed(
-        parameters.asked_for,
-        f"ended {format_duration(longest_s)} after SIGINT",
-        Evidence(moments=(Moment("SIGINT", recording.since_launch_s(recording.stop_ns)),)),
-    )
+        return Finding.error(parameters.asked_for, "a stimulus of the scenario had ended it before")
+    observed = f"ended {format_duration(max(map(took_s, asked)))} after SIGINT"
+    sigint = Moment("SIGINT", recording.since_launch_s(recording.stop_ns))
+    return Finding.passed(parameters.asked_for, observed, Evidence(moments=(sigint,)))
 
 
 def _was_killed(recording: Recording, process: Process) -> bool:
@@ -281,15 +274,6 @@ def _why_slow(recording: Recording, process: Process, parameters: Ends) -> Cause
         "in a loop that swallows it, for a signal handler of your own, for a callback that "
         "sleeps or loops, and for a thread that is not a daemon.",
         Evidence(moments=(sigint, _end(recording, process)), log=tuple(lines[-10:])),
-    )
-
-
-def _why_survived(recording: Recording, process: Process) -> Cause:
-    number = counted(len(process.survivors), "process", "processes")
-    return Cause(
-        f"{code(process.name)} left {number} running behind it: {codes(process.survivors)}",
-        "End child processes before main() returns: process.terminate(), then process.wait().",
-        Evidence(moments=(_end(recording, process),)),
     )
 
 

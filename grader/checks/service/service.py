@@ -10,12 +10,11 @@ from typing import Any, Literal
 from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
-from grader.checks.field import value_at
 from grader.checks.fields import FieldTolerance, brief, toleranced, words
 from grader.checks.finding import Evidence, Finding, Moment, Table
 from grader.checks.need import Called, Doubt
 from grader.checks.requests import judged_requests, why_late, why_other_fields
-from grader.checks.value import EXACT
+from grader.checks.value import EXACT, value_at
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_one_cpu

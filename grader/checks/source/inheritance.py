@@ -21,7 +21,6 @@ _NODES = {
     "rclpy.lifecycle.node.LifecycleNode",
     "rclpy.lifecycle.node.LifecycleNodeMixin",
 }
-_MOST_STEPS = 200
 
 
 class FoundClass(NamedTuple):
@@ -40,35 +39,24 @@ class Family:
 
     def inherits(self, item: FoundClass, base: str) -> bool:
         """Whether a class inherits another one, as far as the files tell."""
-        return bool(self._ancestors(item) & (_NODES if base == NODE else {base}))
+        return bool({*self._ancestors(item)} & (_NODES if base == NODE else {base}))
 
     def foreign(self, item: FoundClass) -> list[str]:
         """Classes that it inherits from packages that were not handed in."""
-        return sorted(
-            name
-            for name in self._ancestors(item)
-            if "." in name
-            and name.partition(".")[0] not in ("rclpy", *sys.stdlib_module_names)
-            and self._split(name)[0] is None
-        )
+        ours = ("rclpy", *sys.stdlib_module_names)
+        names = [name for name in self._ancestors(item) if self._split(name)[0] is None]
+        return sorted(name for name in names if "." in name and name.split(".")[0] not in ours)
 
-    def _ancestors(self, item: FoundClass) -> set[str]:
+    def _ancestors(self, item: FoundClass) -> list[str]:
         """Dotted names of everything that a class inherits."""
-        pending = _bases(item)
-        known: set[str] = set()
-        while pending and len(known) < _MOST_STEPS:
-            name = pending.pop()
+        known = _bases(item)
+        for name in known:
             module, rest = self._split(name)
-            if name in known or module is None:
-                known.add(name)
-                continue
-            known.add(name)
-            own = next((one for one in module.classes if one.name == rest), None)
-            if own is not None:
-                pending += _bases(FoundClass(module, own))
-            else:
-                # A name that the module itself has from elsewhere, such as in __init__.py.
-                pending += [found for found in _named(rest, module) if found != rest]
+            if module is not None:
+                own = next((one for one in module.classes if one.name == rest), None)
+                # What is no class there the module has from elsewhere, such as in __init__.py.
+                more = _bases(FoundClass(module, own)) if own else _named(rest, module)
+                known += [found for found in more if found not in known]
         return known
 
     def _split(self, name: str) -> tuple[SourceFile | None, str]:
@@ -85,27 +73,21 @@ def _bases(item: FoundClass) -> list[str]:
     """What the base classes of a class may be, by their dotted names."""
     file, inheriting = item
     names = {one.name for one in file.classes if one is not inheriting}
-    scope = inheriting.name.split(".")[:-1]
+    scope = inheriting.name.rpartition(".")[0]
     found: list[str] = []
     for base in inheriting.bases:
-        # A class of the same file, the nearest scope first.
-        nested = [".".join([*scope[:end], base]) for end in range(len(scope), -1, -1)]
-        own = next((name for name in nested if name in names), None)
+        # A class beside it in the same function or class, or else one of the file.
+        own = next((name for name in (f"{scope}.{base}", base) if name in names), None)
         found += [f"{file.module}.{own}"] if own else _named(base, file)
     return found
 
 
 def _named(dotted: str, file: SourceFile) -> list[str]:
     """What a name in a file may stand for; the name itself if the file says nothing of it."""
-    head, _, rest = dotted.partition(".")
-    names = dict(file.names)
-    tail = f".{rest}" if rest else ""
-    seen: set[str] = set()
+    names, seen, found = dict(file.names), set[str](), dotted
     # An alias of an alias, as in `Base = N` after `from rclpy.node import Node as N`.
-    while head in names and head not in seen:
+    while (head := found.partition(".")[0]) in names and head not in seen:
         seen.add(head)
-        first, _, more = names[head].partition(".")
-        if first == head or first not in names:
-            return [names[head] + tail]
-        head, tail = first, (f".{more}" if more else "") + tail
-    return [f"{module}.{dotted}" for module in file.stars] or [dotted]
+        found = names[head] + found[len(head) :]
+    stars = [f"{module}.{dotted}" for module in file.stars]
+    return [found] if seen or not stars else stars

@@ -37,13 +37,10 @@ def _judged_package(submission: SubmissionRecord, name: str) -> PackageRecord:
     package = existing_package(submission, name)
     stop_if(why_too_new(package))
     if package.syntax_errors:
-        stop_if(
-            Cause(
-                f"Python cannot read {package.syntax_errors[0]}",
-                "Correct this line or the one before it.",
-                Evidence(places=package.syntax_errors[:_MOST_PLACES]),
-            )
-        )
+        seen = f"Python cannot read {package.syntax_errors[0]}"
+        places = package.syntax_errors[:_MOST_PLACES]
+        hint = "Correct this line or the one before it."
+        stop_if(Cause(seen, hint, Evidence(places=places)))
     if not package.sources:
         hint = f"The code belongs into the folder {code(f'{name}/{name}')}, beside __init__.py."
         stop_if(Cause(f"the package {code(name)} has no Python code", hint))
@@ -108,12 +105,9 @@ def _why_no_class(
     for item in named:
         foreign = family.foreign(item)
         if foreign:
-            return Cause(
-                f"{code(item.found.name)} inherits {codes(foreign)}, which was not handed in, so "
-                "it cannot be told whether that is a node",
-                "Somebody has to look at the class; the source of its base class is needed.",
-                ours=True,
-            )
+            seen = f"{code(item.found.name)} inherits {codes(foreign)}, which was not handed in"
+            hint = "A person has to look at the class: the source of its base class is needed."
+            return Cause(seen, hint, ours=True)
     place = _place(named[0], "")
     seen = "; ".join(_inherits(item) for item in named[:4])
     return Cause(f"{seen} ({place.file}:{place.line})", hint, evidence)
@@ -255,16 +249,13 @@ def _shared(
     """Judge by how many have what they need."""
     lacking = [place for good, place in judged if not good]
     having = len(judged) - len(lacking)
-    if not judged:
-        observed = "there is none of these in the package"
-        return Finding.failed(parameters.asked_for, observed, hint)
     observed = f"{having} of {len(judged)} have {what}"
     # The small amount is float noise of the product.
-    if having >= parameters.share * len(judged) - 1e-9:
+    if judged and having >= parameters.share * len(judged) - 1e-9:
         return Finding.passed(parameters.asked_for, observed)
-    observed = f"{observed}; the first without is {lacking[0]}"
+    first = f"the first without is {lacking[0]}" if lacking else "there is nothing to judge"
     shown = Evidence(places=tuple(lacking[:_MOST_PLACES]))
-    return Finding.failed(parameters.asked_for, observed, hint, shown)
+    return Finding.failed(parameters.asked_for, f"{observed}; {first}", hint, shown)
 
 
 class NoPrint(OfPackage):
@@ -286,10 +277,10 @@ def no_print(submission: SubmissionRecord, parameters: NoPrint) -> Finding:
     ]
     if not places:
         return Finding.passed(parameters.asked_for, "no print()")
+    number = counted(len(places), "place")
     return Finding.failed(
         parameters.asked_for,
-        f"{counted(len(places), 'place')} with print(), the first at "
-        f"{places[0].file}:{places[0].line}",
+        f"{number} with print(), the first at {places[0].file}:{places[0].line}",
         "Write self.get_logger().info('...'): it has a level and the node's name, and goes to "
         "/rosout as well.",
         Evidence(places=tuple(places[:_MOST_PLACES])),
