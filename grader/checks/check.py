@@ -53,6 +53,9 @@ class Parameters(Model):
     @property
     def asked_for(self) -> str:
         """The same with the values of the parameters."""
+        return self._asked()
+
+    def _asked(self) -> str:
         return self.asks.format(self=self)
 
     def named_fields(self) -> Iterator[NamedFields]:

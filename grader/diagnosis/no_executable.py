@@ -143,3 +143,33 @@ def other_console_scripts(symptom: NoExecutable) -> Cause:
         f"'{name} = ...'.",
         symptom.setup_py,
     )
+
+
+def why_nothing_to_run(package: PackageRecord) -> Cause | None:
+    """A syntax error that leaves no executable of the package to run."""
+    origins = dict(package.files)
+    broken = {error.file: error for error in package.syntax_errors}
+    errors: list[SourceError] = []
+    for _, target in package.entry_points:
+        files = (origins.get(path, "") for path in _modules(target.partition(":")[0]))
+        error = next((broken[file] for file in files if file in broken), None)
+        if error is None:
+            return None
+        errors.append(error)
+    if not errors:
+        return None
+    hint = "Correct this line or the one before it"
+    if "null bytes" in errors[0].message:
+        hint = "Save this file as plain text in UTF-8, not in UTF-16"
+    return Cause(
+        f"Python cannot read {errors[0]}",
+        f"{hint}; `colcon build` prints the error too, but goes on.",
+        Evidence(places=tuple(dict.fromkeys(errors))),
+    )
+
+
+def _modules(dotted: str) -> list[str]:
+    """Installed paths that the import of a module reads: ``a.b`` reads a/__init__.py first."""
+    steps = dotted.strip().split(".")
+    folders = ["/".join(steps[:end]) for end in range(1, len(steps) + 1)]
+    return [*(f"{folder}/__init__.py" for folder in folders), f"{folders[-1]}.py"]

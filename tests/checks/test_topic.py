@@ -182,7 +182,7 @@ class TestPublished:
     def test_the_evidence_lists_what_there_is(self):
         finding = judge("topic.published", with_endpoints(endpoint("/cmdvel")), topic="/cmd_vel")
         assert finding.evidence.tables[0].rows == ((NODE, "publisher", "/cmdvel", TWIST),)
-        assert finding.evidence.moments[0].time_s == pytest.approx(0.35)
+        assert finding.evidence.moments[0].time_s == pytest.approx(0.3)
 
 
 class TestSubscribed:

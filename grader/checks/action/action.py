@@ -17,7 +17,7 @@ from grader.checks.fields import (
     unlike,
     words,
 )
-from grader.checks.finding import Evidence, Finding, Plot
+from grader.checks.finding import Evidence, Finding
 from grader.checks.need import Doubt, GoalSent
 from grader.checks.requests import (
     judged_requests,
@@ -181,9 +181,7 @@ class FeedbackOf(OfGoals):
             raise ValueError("a rate needs at_least: 3 messages of feedback or more")
         return self
 
-    @property
-    def asked_for(self) -> str:
-        """The feedback in words."""
+    def _asked(self) -> str:
         parts = [f"at least {counted(self.at_least, 'message')} of feedback"]
         if self.rate is not None:
             parts.append(f" at {self.rate:g} Hz (within {percent(self.tolerance)})")
@@ -243,14 +241,8 @@ def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) ->
         return Cause.to_repeat(
             f"{seen}, but the machine took {format_duration(stolen_s)} from the process meanwhile"
         )
-    times_s = tuple(recording.since_launch_s(item.time_ns) for item in goal.feedback)
-    numbers = tuple(float(number) for number in range(1, len(times_s) + 1))
-    plot = Plot("Feedback", "time since launch (s)", "message of feedback", times_s, numbers)
-    return Cause(
-        seen,
-        f"Each round of the loop should take {format_duration(1.0 / parameters.rate)}.",
-        replace(evidence(recording, goal), tables=(), plots=(plot,)),
-    )
+    hint = f"Each round of the loop should take {format_duration(1.0 / parameters.rate)}."
+    return Cause(seen, hint, evidence(recording, goal))
 
 
 def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Cause | None:
@@ -286,9 +278,7 @@ class Result(OfGoals):
         yield from super().named_fields()
         yield from toleranced("result", self.action, self.result, self.tolerance, part=1)
 
-    @property
-    def asked_for(self) -> str:
-        """The result in words."""
+    def _asked(self) -> str:
         wanted = f" with {words(self.result)}" if self.result else ""
         return f"{self.words} {self.status}{wanted} within {format_duration(self.within)}"
 

@@ -25,14 +25,10 @@ class Cancels(OfGoals):
     needs = (GoalSent(having="cancel_after"),)
 
     within: Duration = Field(
-        1.0,
-        description="How soon after it was asked the goal must be canceled, by default 1 s.",
-        validate_default=False,
+        1.0, description="How soon after it was asked the goal must be canceled, by default 1 s."
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The end in words."""
+    def _asked(self) -> str:
         return f"{self.words} is canceled within {format_duration(self.within)}"
 
 
@@ -72,14 +68,10 @@ class Preempts(OfGoals):
     needs = (GoalSent(having="preempt"),)
 
     within: Duration = Field(
-        1.0,
-        description="How soon after the new goal the old one must end, by default 1 s.",
-        validate_default=False,
+        1.0, description="How soon after the new goal the old one must end, by default 1 s."
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The end of the old goal in words."""
+    def _asked(self) -> str:
         return f"{self.words} ends the goal before it within {format_duration(self.within)}"
 
 

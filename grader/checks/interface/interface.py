@@ -111,9 +111,7 @@ class Defined(OfInterface):
 class Fields(Defined):
     """Parameters of interface.fields."""
 
-    @property
-    def asked_for(self) -> str:
-        """The fields in words."""
+    def _asked(self) -> str:
         wanted = [str(item) for section in self.sections for item in section.fields]
         return f"the fields {codes(wanted)}" if wanted else "no field"
 
@@ -132,9 +130,7 @@ def fields(submission: SubmissionRecord, parameters: Fields) -> Finding:
 class Constants(Defined):
     """Parameters of interface.constants."""
 
-    @property
-    def asked_for(self) -> str:
-        """The constants in words."""
+    def _asked(self) -> str:
         wanted = [str(item) for section in self.sections for item in section.constants]
         return f"the constants {codes(wanted)}" if wanted else "no constant"
 

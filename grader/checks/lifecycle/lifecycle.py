@@ -38,9 +38,7 @@ class State(Parameters):
         "`unconfigured`, `inactive`, `active`, `finalized`.",
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The states in words."""
+    def _asked(self) -> str:
         return f"the states of {code(self.node)}: {listing(self.states, 'then')}"
 
 

@@ -106,9 +106,7 @@ class Alive(Parameters):
         None, description="Name of the node; by default everything that was launched."
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The life of the node in words."""
+    def _asked(self) -> str:
         return f"{code(self.name) if self.name else 'the node'} runs until SIGINT (Ctrl-C)"
 
 
@@ -187,9 +185,7 @@ class Ends(Parameters):
 
     within: Duration = Field(description="How long the process may take to end after SIGINT.")
 
-    @property
-    def asked_for(self) -> str:
-        """The end in words."""
+    def _asked(self) -> str:
         return f"the process ends within {format_duration(self.within)} of SIGINT (Ctrl-C)"
 
 

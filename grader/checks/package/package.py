@@ -14,7 +14,7 @@ from grader.checks.finding import Evidence, Finding, Table
 from grader.checks.need import Need, Submitted
 from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.no_executable import why_no_executable
+from grader.diagnosis.no_executable import why_no_executable, why_nothing_to_run
 from grader.diagnosis.not_built import (
     existing_package,
     why_no_manifest,
@@ -42,9 +42,7 @@ class PackageFound(OfPackage):
         None, description="Expected build type; by default any."
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The package in words."""
+    def _asked(self) -> str:
         build_type = f" with the build type {self.build_type}" if self.build_type else ""
         return f"the package {code(self.package)}{build_type}"
 
@@ -84,38 +82,8 @@ def builds(submission: SubmissionRecord, parameters: Builds) -> Finding:
     goes on.
     """
     stop_if(why_not_built(submission, parameters.package))
-    stop_if(_why_unreadable(existing_package(submission, parameters.package)))
+    stop_if(why_nothing_to_run(existing_package(submission, parameters.package)))
     return Finding.passed(parameters.asked_for, "it builds")
-
-
-def _why_unreadable(package: PackageRecord) -> Cause | None:
-    """A syntax error that leaves no executable of the package to run."""
-    origins = dict(package.files)
-    broken = {error.file: error for error in package.syntax_errors}
-    errors: list[SourceError] = []
-    for _, target in package.entry_points:
-        files = (origins.get(path, "") for path in _modules(target.partition(":")[0]))
-        error = next((broken[file] for file in files if file in broken), None)
-        if error is None:
-            return None
-        errors.append(error)
-    if not errors:
-        return None
-    hint = "Correct this line or the one before it"
-    if "null bytes" in errors[0].message:
-        hint = "Save this file as plain text in UTF-8, not in UTF-16"
-    return Cause(
-        f"Python cannot read {errors[0]}",
-        f"{hint}; `colcon build` prints the error too, but goes on.",
-        Evidence(places=tuple(dict.fromkeys(errors))),
-    )
-
-
-def _modules(dotted: str) -> list[str]:
-    """Installed paths that the import of a module reads: ``a.b`` reads a/__init__.py first."""
-    steps = dotted.strip().split(".")
-    folders = ["/".join(steps[:end]) for end in range(1, len(steps) + 1)]
-    return [*(f"{folder}/__init__.py" for folder in folders), f"{folders[-1]}.py"]
 
 
 # Its name is the student's, and stands in a list of rules.

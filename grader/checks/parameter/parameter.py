@@ -69,9 +69,7 @@ class Declared(OfParameter):
             raise ValueError("'step' needs a 'range'")
         return self
 
-    @property
-    def asked_for(self) -> str:
-        """The declaration in words."""
+    def _asked(self) -> str:
         parts = [_article(self.type)] if self.type else []
         if self.default is not None:
             parts.append(f"{value_text(self.default)} at first")
@@ -92,7 +90,9 @@ def declared(recording: Recording, parameters: Declared) -> Finding:
     Judged by the node's own parameter services, which the probe asked (`read_parameters` or
     `set_parameters`): type, value before anybody set it, and descriptor.
     """
-    found = found_declared(recording, parameters)
+    stop_if(why_not_declared(recording, parameters.node, parameters.name))
+    found = descriptor(recording, parameters.node, parameters.name)
+    assert found is not None
     values = readings(recording, parameters.node, parameters.name)
     shown = _evidence(recording, parameters, found, values)
     stop_if(_why_other_descriptor(found, parameters, shown))
@@ -120,14 +120,6 @@ def _article(kind: str) -> str:
 def _range_words(found: tuple[float, float, float]) -> str:
     low, high, step = found
     return f"{low:g} to {high:g}" + (f" in steps of {step:g}" if step else "")
-
-
-def found_declared(recording: Recording, parameters: OfParameter) -> Descriptor:
-    """How a parameter is declared; ends the check if it is not."""
-    stop_if(why_not_declared(recording, parameters.node, parameters.name))
-    found = descriptor(recording, parameters.node, parameters.name)
-    assert found is not None
-    return found
 
 
 def _why_other_descriptor(found: Descriptor, parameters: Declared, shown: Evidence) -> Cause | None:
@@ -162,10 +154,8 @@ def _evidence(
         ("range", _range_words(found.range) if found.range else "none"),
         ("read-only", value_text(found.read_only)),
         ("description", found.description or "none"),
+        *(("value", value_text(item.value)) for item in values[:20]),
     ]
-    for item in values[:20]:
-        at_s = recording.since_launch_s(item.call.requested_ns)
-        rows.append((f"value at {at_s:.2f} s", value_text(item.value)))
     asked = calls_to(recording, parameters.node, "describe_parameters")
     table = Table(f"The parameter {parameters.name}", ("", ""), tuple(rows))
     return Evidence(moments=answered_at(recording, asked), tables=(table,))
@@ -179,7 +169,7 @@ class OfSetting(OfParameter):
 
 def settings_to(recording: Recording, parameters: OfSetting) -> tuple[Setting, ...]:
     """The attempts to set a parameter to the value; ends the check if there is none."""
-    found_declared(recording, parameters)
+    stop_if(why_not_declared(recording, parameters.node, parameters.name))
     tried = tuple(
         item
         for item in settings(recording, parameters.node, parameters.name)
@@ -206,9 +196,7 @@ class Set(OfSetting):
         "", description="A word that the reason of a refusal must hold, upper and lower case alike."
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The answer in words."""
+    def _asked(self) -> str:
         verb = "accepts" if self.accepted else "refuses"
         reason = f", with a reason that says “{self.reason}”" if self.reason else ""
         return f"{code(self.node)} {verb} {self.name} = {value_text(self.value)}{reason}"

@@ -57,11 +57,7 @@ class TakesEffect(OfSetting):
     period_tolerance: Ratio = Field(
         0.05, description="How far the median of the intervals may be from the period."
     )
-    within: Duration = Field(
-        0.5,
-        description="How soon after it was set, by default 500 ms.",
-        validate_default=False,
-    )
+    within: Duration = Field(0.5, description="How soon after it was set, by default 500 ms.")
 
     def named_fields(self) -> Iterator[NamedFields]:
         """The fields that change."""
@@ -73,9 +69,7 @@ class TakesEffect(OfSetting):
             raise ValueError("say what changes: 'fields' or 'period'")
         return self
 
-    @property
-    def asked_for(self) -> str:
-        """The effect in words."""
+    def _asked(self) -> str:
         parts = [words(self.fields)] if self.fields else []
         if self.period is not None:
             parts.append(f"a message every {format_duration(self.period)}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal
 
 from pydantic import Field
@@ -70,15 +70,9 @@ class Responds(Parameters):
         "case alike.",
     )
     tolerance: FieldTolerance = EXACT
-    within: Duration = Field(
-        1.0,
-        description="How long the answer may take, by default 1 s.",
-        validate_default=False,
-    )
+    within: Duration = Field(1.0, description="How long the answer may take, by default 1 s.")
 
-    @property
-    def asked_for(self) -> str:
-        """The answer in words."""
+    def _asked(self) -> str:
         asked = f" to {words(self.request)}" if self.request else ""
         wanted = [words(self.response)] if self.response else []
         wanted += [f"{path} with “{word}”" for path, word in self.contains.items()]
@@ -160,7 +154,7 @@ def _why_other_response(
     return Cause(f"{seen} {' and '.join(lacking)}", hint, shown)
 
 
-def _evidence(recording: Recording, calls: tuple[Call, ...]) -> Evidence:
+def _evidence(recording: Recording, calls: Sequence[Call]) -> Evidence:
     rows = tuple(
         (
             f"{_since_s(recording, call):.2f} s",
@@ -170,13 +164,9 @@ def _evidence(recording: Recording, calls: tuple[Call, ...]) -> Evidence:
         )
         for call in calls[:50]
     )
-    header = ("called at", "request", "response", "after")
-    return Evidence(
-        moments=tuple(
-            Moment(f"{call.service} called", _since_s(recording, call)) for call in calls[:5]
-        ),
-        tables=(Table("Calls", header, rows),),
-    )
+    moments = [Moment(f"{call.service} called", _since_s(recording, call)) for call in calls[:5]]
+    table = Table("Calls", ("called at", "request", "response", "after"), rows)
+    return Evidence(moments=tuple(moments), tables=(table,))
 
 
 def _since_s(recording: Recording, call: Call) -> float:
@@ -197,9 +187,7 @@ class Concurrent(Parameters):
         "side_by_side", description="How it works on two calls that come at once."
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The order in words."""
+    def _asked(self) -> str:
         return (
             f"{code(self.service)} works on calls that come at once "
             f"{self.calls.replace('_', ' ')}, each for {format_duration(self.takes)}"

@@ -16,13 +16,13 @@ from grader.checks.check import Subject, check, stop_if
 from grader.checks.finding import Evidence, Finding
 from grader.checks.need import RuffRules, Submitted
 from grader.checks.package.package import OfPackage
-from grader.checks.source.inheritance import NODE, Family, FoundClass
 from grader.checks.wording import code, codes, counted, listing, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.not_built import existing_package, why_no_package, why_too_new
 from grader.spec.nearest_name import nearest
 from grader.spec.quantity import Ratio
 from grader.submission.read.code_facts import SourceFile, SourceFunction
+from grader.submission.read.inheritance import NODE, Family, FoundClass
 from grader.submission.read.lint import EXCLUDED
 from grader.submission.record import PackageRecord, SourceError, SubmissionRecord
 
@@ -61,9 +61,7 @@ class Class(OfPackage):
         NODE, description="Class that it inherits, with its module."
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The class in words."""
+    def _asked(self) -> str:
         what = f"the class {code(self.name)}" if self.name else "a class"
         return f"{what} that inherits {code(self.inherits.rpartition('.')[2])}"
 
@@ -128,11 +126,7 @@ def _place(item: FoundClass, message: str) -> SourceError:
 class _Share(OfPackage):
     """Part of the parameters of source.docstrings and source.type_hints."""
 
-    share: Ratio = Field(
-        1.0,
-        description="Share of them that must have one, by default 100 %.",
-        validate_default=False,
-    )
+    share: Ratio = Field(1.0, description="Share of them that must have one, by default 100 %.")
 
     @field_validator("share")
     @classmethod
@@ -159,9 +153,7 @@ class Docstrings(_Share):
         description="What needs one: `module`, `class`, `function` (with methods).",
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The docstrings in words."""
+    def _asked(self) -> str:
         return f"docstrings of {self.needed} {listing(_PLURALS[kind] for kind in self.of)}"
 
 
@@ -210,9 +202,7 @@ class TypeHints(_Share):
 
     returns: bool = Field(True, description="Whether what a function returns needs a hint too.")
 
-    @property
-    def asked_for(self) -> str:
-        """The hints in words."""
+    def _asked(self) -> str:
         what = "parameters and return types" if self.returns else "parameters"
         return f"type hints for the {what} of {self.needed} functions"
 
@@ -310,9 +300,7 @@ class Ruff(OfPackage):
     )
     at_most: int = Field(0, ge=0, description="Places that may break a rule, at most 19.", le=19)
 
-    @property
-    def asked_for(self) -> str:
-        """The rules in words."""
+    def _asked(self) -> str:
         but = f" but {', '.join(self.except_)}" if self.except_ else ""
         most = f"at most {self.at_most}" if self.at_most else "no"
         return f"{most} places that break ruff's rules {', '.join(self.rules)}{but}"

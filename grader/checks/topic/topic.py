@@ -149,9 +149,7 @@ class Untouched(Parameters):
         description="Topics that belong to the robot.",
     )
 
-    @property
-    def asked_for(self) -> str:
-        """The absence of publishers in words."""
+    def _asked(self) -> str:
         return f"no publisher on {codes(self.topics, last='or')}"
 
 
