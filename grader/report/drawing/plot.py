@@ -45,7 +45,6 @@ def draw_plot(plot: Plot, name: str) -> Figure:
 
     Args:
         plot: Its values; those that are not finite are left out, and the caption says so.
-        name: Unique in the document; letters, digits and hyphens.
     """
     points = [
         (x, y)

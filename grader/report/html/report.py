@@ -15,7 +15,7 @@ from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import Figure
-from grader.report.html.comparison import align
+from grader.report.html.comparison import SIGNS, align
 from grader.report.html.page import render_page
 from grader.report.html.replay import Replay, embedded, make_replay, with_goals
 from grader.report.html.sections import Section, draw_run, make_sections
@@ -69,6 +69,7 @@ def render_report(
         files={run.id: run.recording for run in result.scenarios},
         remarks={run.id: run.remarks for run in result.scenarios},
         gallery=Gallery(),
+        SIGNS=SIGNS,
         align=align,
         build_lines=build_lines,
         draw_callbacks=draw_callbacks,

@@ -117,7 +117,7 @@ def _check(result: CheckResult) -> CheckPart:
     decisive = result.decisive
     missed = result.status in (Status.FAILED, Status.SKIPPED)
     return CheckPart(
-        **dict(_finding(decisive)),
+        **_finding(decisive),
         id=result.id,
         title=result.title,
         points=result.points,
@@ -125,22 +125,21 @@ def _check(result: CheckResult) -> CheckPart:
         visibility=result.visibility.value,
         author_hint=result.hint if missed else "",
         waits_for=result.waits_for,
-        other_scenarios=tuple(_finding(item) for item in result.findings if item is not decisive),
+        other_scenarios=tuple(
+            FindingPart(**_finding(item)) for item in result.findings if item is not decisive
+        ),
     )
 
 
-def _finding(item: ScenarioFinding) -> FindingPart:
-    finding = item.finding
-    return FindingPart(
-        scenario=item.scenario,
-        status=finding.status,
-        expected=finding.expected,
-        observed=finding.observed,
-        hint=finding.hint,
-        disturbed=finding.disturbed,
-        traceback=item.traceback,
-        evidence=finding.evidence,
-    )
+def _finding(item: ScenarioFinding) -> dict[str, Any]:
+    return {
+        "scenario": item.scenario,
+        "traceback": item.traceback,
+        **{
+            name: getattr(item.finding, name)
+            for name in ("status", "expected", "observed", "hint", "disturbed", "evidence")
+        },
+    }
 
 
 def _scenario(recording: Recording, facts: RunFacts) -> ScenarioPart:
