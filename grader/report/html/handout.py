@@ -14,7 +14,7 @@ from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Visibility
 from grader.checks.wording import counted
 from grader.errors import UsageError
-from grader.grade.points import total
+from grader.grade.model import total
 from grader.report.html.page import render_page
 from grader.report.text.words import counted_points
 

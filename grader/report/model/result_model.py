@@ -13,7 +13,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from grader.checks.finding import Evidence, Status
-from grader.grade.first import reason
+from grader.grade.model import reason
 from grader.safe_text import encodable
 from grader.submission.record import BuildRecord
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from grader.checks.finding import Status
 from grader.checks.wording import counted, listing
-from grader.grade import first
-from grader.grade.points import total
+from grader.grade import model as grades
+from grader.grade.model import total
 from grader.report.model.result_model import CheckPart, FindingPart, Result
 from grader.report.text.words import ADVICE, STATUS, counted_points, number
 from grader.safe_text import clean, one_line
@@ -156,7 +156,7 @@ def only_shown(result: Result) -> frozenset[str]:
         for check in result.checks
         if check.status in (Status.FAILED, Status.ERROR) and not check.max_points
     ]
-    return first.only_shown(mild, (check.waits_for for check in result.checks))
+    return grades.only_shown(mild, (check.waits_for for check in result.checks))
 
 
 def score(result: Result) -> str:
