@@ -24,14 +24,15 @@ from grader.spec.quantity import Duration
 _FEWEST = 5
 # DDS carries durations as seconds and a fraction of 2**32.
 _SAME_DURATION = 1e-3
-_WORD_POLICIES = {"reliability": "reliable", "durability": "volatile", "liveliness": "automatic"}
-"""Policy -> its default."""
-_DURATION_POLICIES = {
-    "deadline": ("deadline_s", "deadline"),
-    "lifespan": ("lifespan_s", "lifespan"),
-    "lease": ("liveliness_lease_s", "liveliness_lease_duration"),
+_DEFAULTS = {"reliability": "reliable", "durability": "volatile", "liveliness": "automatic"}
+_POLICIES = (*_DEFAULTS, "deadline", "lifespan", "lease")
+# Where the attribute of our profile, or the argument of rclpy's, has another name than the YAML.
+_ATTRIBUTES = {
+    "deadline": "deadline_s",
+    "lifespan": "lifespan_s",
+    "lease": "liveliness_lease_s",
 }
-"""Key of the YAML -> attribute of our profile, argument of rclpy's QoSProfile."""
+_ARGUMENTS = {"lease": "liveliness_lease_duration"}
 _DECLARED_POLICIES = {"reliability", "durability"}
 """What a process declares of an endpoint."""
 _WORDS = {
@@ -56,26 +57,18 @@ class Profile(Parameters):
     @model_validator(mode="after")
     def _something(self) -> Profile:
         if not self.policies:
-            raise ValueError(f"name a policy: {', '.join((*_WORD_POLICIES, *_DURATION_POLICIES))}")
+            raise ValueError(f"name a policy: {', '.join(_POLICIES)}")
         return self
 
     @property
     def policies(self) -> dict[str, Any]:
         """Policy -> expected value, those that are asked for only."""
-        names = (*_WORD_POLICIES, *_DURATION_POLICIES)
-        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return {name: getattr(self, name) for name in _POLICIES if getattr(self, name) is not None}
 
     @property
     def qos(self) -> Qos:
         """The expected profile, everything else unknown."""
-        return Qos(
-            reliability=self.reliability or "unknown",
-            durability=self.durability or "unknown",
-            liveliness=self.liveliness or "unknown",
-            deadline_s=self.deadline,
-            lifespan_s=self.lifespan,
-            liveliness_lease_s=self.lease,
-        )
+        return Qos(**{_ATTRIBUTES.get(name, name): item for name, item in self.policies.items()})
 
 
 @check("qos.offered", Subject.RECORDING, Profile)
@@ -122,8 +115,7 @@ def _judge(recording: Recording, parameters: Profile, kind: Kind) -> Finding:
     hidden = [
         name
         for name in parameters.policies
-        if name in _WORD_POLICIES
-        and (not profiles or any(getattr(qos, name) == "unknown" for _, qos in profiles))
+        if name in _DEFAULTS and any(getattr(qos, name) == "unknown" for _, qos in profiles)
     ]
     if hidden or not profiles:
         names = ", ".join(hidden) or "QoS"
@@ -135,11 +127,10 @@ def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
     """Policy -> (expected, found) where they differ and are known."""
     found: dict[str, tuple[Any, Any]] = {}
     for name, wanted in parameters.policies.items():
-        if name in _WORD_POLICIES:
-            actual = getattr(qos, name)
+        actual = getattr(qos, _ATTRIBUTES.get(name, name))
+        if name in _DEFAULTS:
             right = actual in (wanted, "unknown")
         else:
-            actual = getattr(qos, _DURATION_POLICIES[name][0])
             right = actual is not None and math.isclose(actual, wanted, rel_tol=_SAME_DURATION)
         if not right:
             found[name] = wanted, actual
@@ -175,19 +166,20 @@ def _mismatch(
 
 def _hint(parameters: Profile, kind: Kind, wrong: Collection[str]) -> str:
     asked = parameters.policies
-    if all(_WORD_POLICIES.get(name) == item for name, item in asked.items()):
+    if all(_DEFAULTS.get(name) == item for name, item in asked.items()):
         hint = "A number as QoS, such as 10, is the default profile: reliable and volatile."
         if "reliability" in wrong:
             hint += " qos_profile_sensor_data is best_effort."
         if "durability" in wrong:
             hint += " A profile is transient_local only where its durability says so: leave it out."
         return hint
-    arguments = ", ".join(
-        f"{name}={name.capitalize()}Policy.{item.upper()}"
-        if name in _WORD_POLICIES
-        else f"{_DURATION_POLICIES[name][1]}=Duration(seconds={item:g})"
+    values = {
+        name: f"{name.capitalize()}Policy.{item.upper()}"
+        if name in _DEFAULTS
+        else f"Duration(seconds={item:g})"
         for name, item in asked.items()
-    )
+    }
+    arguments = ", ".join(f"{_ARGUMENTS.get(name, name)}={item}" for name, item in values.items())
     return f"Give create_{kind.value} a profile: QoSProfile(depth=10, {arguments}), from rclpy.qos."
 
 

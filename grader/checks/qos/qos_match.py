@@ -167,8 +167,6 @@ def _left_open(recording: Recording, endpoint: Endpoint, pair: tuple[Qos, Qos]) 
 def _words(qos: Qos) -> str:
     words = [qos.reliability, qos.durability]
     words += [qos.liveliness] if qos.liveliness == "manual_by_topic" else []
-    if qos.deadline_s is not None:
-        words.append(f"deadline {qos.deadline_s:g} s")
-    if qos.liveliness_lease_s is not None:
-        words.append(f"liveliness lease {qos.liveliness_lease_s:g} s")
+    durations = {"deadline": qos.deadline_s, "liveliness lease": qos.liveliness_lease_s}
+    words += [f"{name} {item:g} s" for name, item in durations.items() if item is not None]
     return ", ".join(words)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
-from grader.checks.first_seen import first_seen
 from grader.checks.need import Recorded
 from grader.checks.timing.stamps import why_not_believed
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_messages import why_few
+from grader.diagnosis.process.blocked_executor import left_s
 from grader.diagnosis.wrong_rhythm import why_paused
 from grader.measure.numbering import is_numbered, lost
 from grader.recording.model import NS, Message, Recording
@@ -48,12 +49,9 @@ class Rate(Parameters):
     @property
     def words(self) -> str:
         """The bounds, in words."""
-        bounds = []
-        if self.at_least is not None:
-            bounds.append(f"at least {self.at_least:g} Hz")
-        if self.at_most is not None:
-            bounds.append(f"at most {self.at_most:g} Hz")
-        words = f"{' and '.join(bounds)} on {code(self.topic)}"
+        bounds = {"at least": self.at_least, "at most": self.at_most}
+        texts = [f"{name} {hz:g} Hz" for name, hz in bounds.items() if hz is not None]
+        words = f"{' and '.join(texts)} on {code(self.topic)}"
         if self.pause is not None:
             words += f", never longer than {format_duration(self.pause)} without one"
         return words
@@ -78,16 +76,9 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
         return unbelievable.finding(expected)
     first, last = messages[0], messages[-1]
     span_s = (last.stamp_ns - first.stamp_ns) / NS
-    if span_s <= 0.0:
-        return Finding.failed(
-            expected,
-            f"{counted(len(messages), 'message')} with the same time stamp",
-            "Publish from the callback of a timer.",
-            Evidence(moments=first_seen(recording, messages)),
-        )
     # Messages after the first, with those that were lost on their way.
     number = last.sequence - first.sequence if is_numbered(messages) else len(messages) - 1
-    found_hz = number / span_s
+    found_hz = number / span_s if span_s > 0.0 else math.inf
     observed = f"{found_hz:.4g} Hz: {counted(number + 1, 'message')} in {format_duration(span_s)}"
     evidence = Evidence(
         moments=(
@@ -95,27 +86,20 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
             Moment("last message", recording.since_launch_s(last.stamp_ns)),
         )
     )
-    low, high = parameters.at_least, parameters.at_most
-    if low is not None and found_hz < low:
-        free_s = span_s - recording.stolen_s(first.stamp_ns, last.stamp_ns)
-        if free_s <= 0.0 or number / free_s >= low:
-            return Finding.to_repeat(
-                expected, f"{observed}, but the machine took time from the process"
-            )
-        return Finding.failed(
-            expected,
-            observed,
-            "Publish in every call of the callback, without a counter, a condition or a "
-            "time.sleep() that leaves calls out. A timer takes its period in seconds: the "
-            "reciprocal of the rate.",
-            evidence,
+    is_slow = parameters.at_least is not None and found_hz < parameters.at_least
+    if is_slow and number >= (parameters.at_least or 0.0) * left_s(
+        recording, first.stamp_ns, last.stamp_ns
+    ):
+        return Finding.to_repeat(
+            expected, f"{observed}, but the machine took time from the process"
         )
-    if high is not None and found_hz > high:
+    if is_slow or (parameters.at_most is not None and found_hz > parameters.at_most):
         return Finding.failed(
             expected,
             observed,
-            "create_timer takes its period in seconds: the reciprocal of the rate. Look for a "
-            "second timer, and for a publish() in a loop or in a callback that is called often.",
+            "Publish once in every call of the callback: look for a condition that leaves calls "
+            "out, for a time.sleep(), and for a second timer or publish(). create_timer takes its "
+            "period in seconds: the reciprocal of the rate.",
             evidence,
         )
     paused = _why_paused(recording, parameters, messages)
