@@ -115,17 +115,17 @@ def _load() -> Part:
 
 
 def _discovery(installation: ros.RosInstallation) -> Part:
-    from grader.run.cell.discovery_probe import meet
+    from grader.errors import GraderFault
+    from grader.run.cell.discovery_probe import discovery_time_s
 
-    meeting = meet(installation)
-    if meeting.met_s is None:
+    try:
+        met = f"two nodes met after {format_duration(discovery_time_s(installation))}"
+    except GraderFault as error:
         return Part(
             "discovery",
             False,
-            remedy=f"two nodes on this machine do not meet: {meeting.error}. Is a firewall "
+            remedy=f"two nodes on this machine do not meet: {error}. Is a firewall "
             "closing UDP on the loopback interface?",
             required=True,
         )
-    return Part(
-        "discovery", True, f"two nodes met after {format_duration(meeting.met_s)}", required=True
-    )
+    return Part("discovery", True, met, required=True)
