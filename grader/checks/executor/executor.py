@@ -230,7 +230,7 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
             evidence,
         )
     processes = () if process is None else (process,)
-    never_spun = why_never_spun(recording, seen, (group.node,), processes, evidence.moments)
+    never_spun = why_never_spun(recording, seen, (group.node,), processes)
     if never_spun is not None:
         return never_spun
     place = interrupted_place(recording, process.name) if process is not None else None
