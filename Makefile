@@ -41,6 +41,6 @@ docs: setup ## regenerate docs/, and build the site in build/site
 	@NO_MKDOCS_2_WARNING=1 $(run) -m mkdocs build --strict --quiet
 
 clean: ## remove .venv, caches and reports
-	@rm -rf .venv .venv.old .hypothesis .mypy_cache .pytest_cache .ruff_cache build dist rosgrade-report
+	@rm -rf .venv .hypothesis .mypy_cache .pytest_cache .ruff_cache build dist rosgrade-report
 	@rm -f rosgrade-bench*.json
 	@find grader sim tests -name __pycache__ -prune -exec rm -rf {} +

@@ -23,7 +23,6 @@ DISTRO = "jazzy"
 SUPPORTED = ((3, 13), (3, 12), (3, 11), (3, 10))
 WHEELS_PLATFORM = "linux-x86_64"
 VENV = ".venv"
-OLD = ".venv.old"
 STAMP = "rosgrade-setup.json"
 
 # ROS's extensions are built against the system's numpy 1, which numpy 2 breaks, and its message
@@ -90,35 +89,27 @@ def plan(
             f"ROS 2 {distro.title()} is sourced in this shell and rosgrade is for {ours}: use a "
             f"shell that sources nothing (rosgrade then installs its own ROS) or {ours}"
         )
-    if distro and ros_python is None:
-        raise SetupError(
-            f"{ours} is sourced in this shell but holds no rclpy: sudo apt install "
-            f"ros-{DISTRO}-rclpy ros-{DISTRO}-common-interfaces"
-        )
     if distro and ros_python not in SUPPORTED:
         raise SetupError(
-            f"the sourced {ours} is built for Python {_dotted(ros_python)} and rosgrade needs "
-            f"{_supported()}: use a shell that sources nothing"
+            f"{ours} is sourced in this shell but holds no rclpy for Python {_supported()}: use a "
+            f"shell that sources nothing, or sudo apt install ros-{DISTRO}-rclpy "
+            f"ros-{DISTRO}-common-interfaces"
         )
     if not distro and platform != WHEELS_PLATFORM:
         raise SetupError(
             f"{ours} comes as wheels for {WHEELS_PLATFORM} only and this is {platform}: install "
             f"{ours} here, source it and try again"
         )
+    wanted = (ros_python,) if distro else SUPPORTED
     seen: List[str] = []
     for interpreter in interpreters:
-        if interpreter.version == ros_python or (not distro and interpreter.version in SUPPORTED):
+        if interpreter.version in wanted:
             return Plan("system" if distro else "wheels", interpreter)
         seen.append(_dotted(interpreter.version))
-    if distro:
-        raise SetupError(
-            f"the sourced {ours} is built for Python {_dotted(ros_python)}, which is not here: "
-            f"sudo apt install python{_dotted(ros_python)}-venv"
-        )
+    needed = _dotted(ros_python) if distro else _supported()
     raise SetupError(
-        f"rosgrade needs Python {_supported()} and here is only {', '.join(seen) or 'none'}: "
-        f"install Python {_dotted(SUPPORTED[1])} with its venv module and put "
-        f"python{_dotted(SUPPORTED[1])} on PATH"
+        f"rosgrade needs Python {needed} and here is only {', '.join(seen) or 'none'}: sudo apt "
+        f"install python{_dotted(ros_python or SUPPORTED[1])}-venv"
     )
 
 
@@ -182,9 +173,6 @@ def find_interpreters(environ: Mapping[str, str]) -> Iterator[Interpreter]:
 def set_up(root: Path, environ: Mapping[str, str]) -> None:
     """Bring the environment in `root` up to date; quick when it already is.
 
-    An environment that works stays until another one does: a set-up that fails or is interrupted
-    puts it back, and after one that was killed the next one does.
-
     Raises:
         SetupError: It could not be made. Nothing half-made is left, only perhaps a whole
             environment that waits for rosgrade itself.
@@ -196,35 +184,40 @@ def set_up(root: Path, environ: Mapping[str, str]) -> None:
         sysconfig.get_platform(),
         find_ros_python(environ.get("AMENT_PREFIX_PATH", "")),
     )
-    wanted = {
+    without_rosgrade = {
         # A virtual environment does not survive being moved.
         "root": str(root),
         "ros": chosen.ros,
         "python": _dotted(chosen.interpreter.version),
         "lock": _digest(lock_text),
-        "pyproject": _digest((root / "pyproject.toml").read_text(encoding="utf-8")),
+        "pyproject": "",
     }
+    pyproject = _digest((root / "pyproject.toml").read_text(encoding="utf-8"))
+    wanted = {**without_rosgrade, "pyproject": pyproject}
     venv = root / VENV
     with _alone(root):
-        _put_back(venv)
         installed = _read_stamp(venv)
         if installed == wanted:
             return
         if venv.is_symlink() or (venv.exists() and not (venv / "pyvenv.cfg").is_file()):
             raise SetupError(f"{venv} is not a virtual environment: move it away")
-        if {**installed, "pyproject": ""} != {**wanted, "pyproject": ""}:
-            _put_aside(venv, installed)
-        try:
-            # A sandbox runs as another user where rosgrade runs as root; there is no secret in it.
-            os.umask(0o022)
-            if not venv.exists():
-                _make(venv, chosen, lock_text, environ)
-            # Only now, so that an interrupted set-up is not taken for a finished one.
-            _write_stamp(venv, {**wanted, "pyproject": ""})
-            _install_rosgrade(venv, root)
-            _write_stamp(venv, wanted)
-        finally:
-            _put_back(venv)
+        # A sandbox runs as another user where rosgrade runs as root; there is no secret in it.
+        os.umask(0o022)
+        if {**installed, "pyproject": ""} != without_rosgrade:
+            _remove(venv)
+            try:
+                _create(venv, chosen)
+                _install_lock(venv, requirements(lock_text, chosen))
+                _check_imports(venv, environ)
+            except BaseException:
+                _remove(venv)
+                raise
+        # Only now, so that an interrupted set-up is not taken for a finished one.
+        _write_stamp(venv, without_rosgrade)
+        _say("installing rosgrade itself")
+        options = ["--no-deps", "--no-build-isolation", "--editable", str(root)]
+        _pip(venv, options, "rosgrade itself could not be installed")
+        _write_stamp(venv, wanted)
     _say(f"ready: {VENV}/bin/rosgrade --help")
 
 
@@ -238,16 +231,6 @@ def main() -> int:
     except KeyboardInterrupt:
         return 130
     return 0
-
-
-def _make(venv: Path, chosen: Plan, lock_text: str, environ: Mapping[str, str]) -> None:
-    try:
-        _create(venv, chosen)
-        _install_lock(venv, requirements(lock_text, chosen))
-        _check_imports(venv, environ)
-    except BaseException:
-        _remove(venv)
-        raise
 
 
 def _create(venv: Path, chosen: Plan) -> None:
@@ -276,12 +259,6 @@ def _install_lock(venv: Path, lock_text: str) -> None:
         options = ["--no-deps", "--no-build-isolation", "--use-pep517", "--require-hashes"]
         problem = "the packages could not be installed; is the package index reachable?"
         _pip(venv, [*options, "-r", str(path)], problem)
-
-
-def _install_rosgrade(venv: Path, root: Path) -> None:
-    _say("installing rosgrade itself")
-    options = ["--no-deps", "--no-build-isolation", "--editable", str(root)]
-    _pip(venv, options, "rosgrade itself could not be installed")
 
 
 def _check_imports(venv: Path, environ: Mapping[str, str]) -> None:
@@ -360,29 +337,6 @@ def _read_stamp(venv: Path) -> Dict[str, str]:
 
 def _write_stamp(venv: Path, stamp: Mapping[str, str]) -> None:
     (venv / STAMP).write_text(json.dumps(stamp, indent=1) + "\n", encoding="utf-8")
-
-
-def _put_aside(venv: Path, stamp: Mapping[str, str]) -> None:
-    """Make room for another environment; one that works is kept beside it.
-
-    An environment works only in the place that it was made for. So the new one is made there, and
-    the old one moves, and works again when it is moved back.
-    """
-    if stamp:
-        venv.rename(venv.with_name(OLD))
-    _remove(venv)
-
-
-def _put_back(venv: Path) -> None:
-    """Use what was put aside again, unless another environment was finished since."""
-    old = venv.with_name(OLD)
-    if not old.exists():
-        return
-    if _read_stamp(venv).get("pyproject"):
-        _remove(old)
-    else:
-        _remove(venv)
-        old.rename(venv)
 
 
 def _remove(venv: Path) -> None:

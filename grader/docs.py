@@ -21,7 +21,7 @@ from pydantic import BaseModel
 
 from grader import resources
 from grader.assignment import limits, model, mutant
-from grader.assignment.lesson_checks import FOLDER, lesson_checks
+from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.checks import finding
 from grader.checks.catalogue import CATALOGUE

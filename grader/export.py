@@ -34,11 +34,7 @@ class Member:
 
 
 def gradescope(loaded: LoadedAssignment, out: Path) -> Path:
-    """Write the autograder that is uploaded to Gradescope.
-
-    Raises:
-        UsageError: It cannot be written, or this is no checkout of rosgrade.
-    """
+    """Write the autograder that is uploaded to Gradescope."""
     members = {
         "setup.sh": _template("gradescope-setup.sh", loaded, executable=True),
         "run_autograder": _template("gradescope-run_autograder", loaded, executable=True),
@@ -53,11 +49,7 @@ def gradescope(loaded: LoadedAssignment, out: Path) -> Path:
 def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
     """Write the folder that goes into a Classroom 50 classroom's ``autograders/``.
 
-    Its files can be found by whoever knows the classroom's address, so it holds no hidden check.
-
-    Raises:
-        UsageError: It cannot be written, the assignment has hidden checks, or this is no
-            checkout of rosgrade.
+    Everybody who knows the classroom's address can read its files, so it holds no hidden check.
     """
     _refuse_hidden(loaded, "everybody can read the files of a Classroom 50 autograder")
     folder = out / f"classroom50-{loaded.assignment.id}"
@@ -66,7 +58,8 @@ def classroom50(loaded: LoadedAssignment, out: Path) -> Path:
         "autograder.py": _template("classroom50-autograder.py", loaded),
         **_rosgrade(loaded),
     }
-    _write_folder(folder, members)
+    shutil.rmtree(folder, ignore_errors=True)
+    _write_members(folder, members)
     return folder
 
 
@@ -74,10 +67,6 @@ def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
     """Write the workflow that goes into a template repository.
 
     An assignment that is not one of rosgrade's own is copied beside it, without its solution.
-
-    Raises:
-        UsageError: It cannot be written, the action is none, or an assignment that would have
-            to be copied has hidden checks.
     """
     if not _ACTION.fullmatch(action):
         raise UsageError(
@@ -88,14 +77,11 @@ def github(loaded: LoadedAssignment, out: Path, action: str) -> Path:
     if loaded.folder.resolve().parent != resources.assignments().resolve():
         _refuse_hidden(loaded, "students can read the files of their repository")
         name = f".github/rosgrade/{loaded.assignment.id}"
-        members = {
-            f"{name}/{inside}": Member(path.read_bytes())
-            for inside, path in _assignment(loaded).items()
-        }
-        _write_members(out, members)
-    text = _read_template("github-workflow.yml")
+        for inside, path in _assignment(loaded).items():
+            write_whole(out / name / inside, path.read_bytes())
+    text = _read_template("github-workflow.yml", name)
     file = out / ".github" / "workflows" / "rosgrade.yml"
-    write_whole(file, text.replace("@ACTION@", action).replace("@ASSIGNMENT@", name))
+    write_whole(file, text.replace("@ACTION@", action))
     return file
 
 
@@ -149,12 +135,12 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _template(name: str, loaded: LoadedAssignment, *, executable: bool = False) -> Member:
-    text = _read_template(name).replace("@ASSIGNMENT@", loaded.assignment.id)
-    return Member(text.replace("@SLUG@", loaded.assignment.id).encode(), executable)
+    return Member(_read_template(name, loaded.assignment.id).encode(), executable)
 
 
-def _read_template(name: str) -> str:
-    return (resources.templates() / "export" / name).read_text(encoding="utf-8")
+def _read_template(name: str, assignment: str) -> str:
+    text = (resources.templates() / "export" / name).read_text(encoding="utf-8")
+    return text.replace("@ASSIGNMENT@", assignment)
 
 
 def _zipped(members: Mapping[str, Member]) -> bytes:
@@ -166,20 +152,6 @@ def _zipped(members: Mapping[str, Member]) -> bytes:
             info.external_attr = (0o100755 if member.executable else 0o100644) << 16
             archive.writestr(info, member.content)
     return stream.getvalue()
-
-
-def _write_folder(folder: Path, members: Mapping[str, Member]) -> None:
-    """Write a whole folder; an older one in its place is replaced."""
-    draft = folder.with_name(f".{folder.name}.new")
-    try:
-        shutil.rmtree(draft, ignore_errors=True)
-        _write_members(draft, members)
-        shutil.rmtree(folder, ignore_errors=True)
-        draft.replace(folder)
-    except OSError as error:
-        raise UsageError(f"{folder} cannot be written: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
 
 
 def _write_members(folder: Path, members: Mapping[str, Member]) -> None:

@@ -15,6 +15,7 @@ from grader import ros
 from grader.errors import GraderFault
 from grader.run.host.load import cpu_count
 from grader.spec.unit import format_duration
+from grader.submission.build.toolchain import has_headers, headers_package
 
 
 @dataclass(frozen=True)
@@ -31,35 +32,37 @@ class Part:
 def diagnose() -> Iterator[Part]:
     """Look at every part; the slow ones (discovery) last."""
     yield Part("Python", True, f"{platform.python_version()} on {platform.platform()}")
+    installation = None
     try:
         installation = ros.find()
     except GraderFault as fault:
         yield Part("ROS 2", False, remedy=str(fault), required=True)
-        installation = None
-    if installation is not None:
-        where = ("wheels in " if installation.source == "wheels" else "sourced from ") + ", ".join(
-            str(prefix) for prefix in installation.prefixes
-        )
+    else:
+        where = "wheels in " if installation.source == "wheels" else "sourced from "
+        where += ", ".join(map(str, installation.prefixes))
         yield Part("ROS 2", True, f"{installation.distro}, {where}", required=True)
         yield _rmw(installation)
     yield _colcon()
-    yield _program("C++ compiler", "g++", "for packages with own interfaces", "g++")
-    yield _program("cmake", "cmake", "for ament_cmake packages", "cmake")
-    yield _headers()
+    yield _program("C++ compiler", "g++", "for packages with own interfaces")
+    yield _program("cmake", "cmake", "for ament_cmake packages")
+    remedy = f"sudo apt install {headers_package()} (for packages with own interfaces)"
+    yield Part("Python headers", has_headers(), sysconfig.get_path("include"), remedy)
     yield _sandbox()
-    yield _domain_id()
-    yield _load()
+    chosen = os.environ.get("ROS_DOMAIN_ID")
+    shown = f"{chosen} in this shell" if chosen else "not set in this shell"
+    yield Part("ROS_DOMAIN_ID", True, f"{shown}; every run gets a free one from 1 to 101")
+    load = f"{os.getloadavg()[0]:.2f} on {cpu_count()} CPUs (1 min average)"
+    yield Part("load", True, load)
     if installation is not None:
         yield _discovery(installation)
 
 
 def _rmw(installation: ros.RosInstallation) -> Part:
-    present = "rmw_fastrtps_cpp" in installation.packages
     chosen = os.environ.get("RMW_IMPLEMENTATION", "")
     other = f"; RMW_IMPLEMENTATION={chosen} of this shell is not used" if chosen else ""
     return Part(
         "rmw",
-        present,
+        "rmw_fastrtps_cpp" in installation.packages,
         f"rmw_fastrtps_cpp{other}",
         "install rmw_fastrtps_cpp: sudo apt install ros-jazzy-rmw-fastrtps-cpp",
         required=True,
@@ -74,20 +77,12 @@ def _colcon() -> Part:
     return Part("colcon", True, ", ".join(versions), required=True)
 
 
-def _program(name: str, command: str, purpose: str, package: str) -> Part:
+def _program(name: str, command: str, purpose: str) -> Part:
     path = shutil.which(command)
     if path is None:
-        return Part(name, False, remedy=f"sudo apt install {package} ({purpose})")
+        return Part(name, False, remedy=f"sudo apt install {command} ({purpose})")
     shown = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
     return Part(name, True, shown.stdout.partition("\n")[0] or path)
-
-
-def _headers() -> Part:
-    from grader.submission.build.toolchain import has_headers, headers_package
-
-    include = sysconfig.get_path("include")
-    remedy = f"sudo apt install {headers_package()} (for packages with own interfaces)"
-    return Part("Python headers", has_headers(), include, remedy)
 
 
 def _sandbox() -> Part:
@@ -95,37 +90,19 @@ def _sandbox() -> Part:
     from grader.sandbox.trial import try_sandbox
 
     trial = try_sandbox()
-    return Part(
-        "sandbox",
-        not trial.problem,
-        f"bubblewrap works ({', '.join(LAYERS)})",
-        f"{trial.problem}; {trial.remedy}",
-    )
-
-
-def _domain_id() -> Part:
-    chosen = os.environ.get("ROS_DOMAIN_ID")
-    shown = f"{chosen} in this shell" if chosen else "not set in this shell"
-    return Part("ROS_DOMAIN_ID", True, f"{shown}; every run gets a free one from 1 to 101")
-
-
-def _load() -> Part:
-    one_minute = os.getloadavg()[0]
-    return Part("load", True, f"{one_minute:.2f} on {cpu_count()} CPUs (1 min average)")
+    found = f"bubblewrap works ({', '.join(LAYERS)})"
+    return Part("sandbox", not trial.problem, found, f"{trial.problem}; {trial.remedy}")
 
 
 def _discovery(installation: ros.RosInstallation) -> Part:
-    from grader.run.cell.discovery_probe import meet
+    from grader.run.cell.discovery_probe import discovery_time_s
 
-    meeting = meet(installation)
-    if meeting.met_s is None:
-        return Part(
-            "discovery",
-            False,
-            remedy=f"two nodes on this machine do not meet: {meeting.error}. Is a firewall "
-            "closing UDP on the loopback interface?",
-            required=True,
+    try:
+        found = f"two nodes met after {format_duration(discovery_time_s(installation))}"
+    except GraderFault as error:
+        remedy = (
+            f"two nodes on this machine do not meet: {error}. Is a firewall closing UDP on the "
+            "loopback interface?"
         )
-    return Part(
-        "discovery", True, f"two nodes met after {format_duration(meeting.met_s)}", required=True
-    )
+        return Part("discovery", False, remedy=remedy, required=True)
+    return Part("discovery", True, found, required=True)

@@ -15,11 +15,7 @@ PACKAGE = Path(__file__).resolve().parent
 
 
 def root(package: Path = PACKAGE) -> Path:
-    """The folder that holds ``assignments/``, ``reference/`` and ``templates/``.
-
-    Raises:
-        GraderFault: It is in neither place: the installation is not complete.
-    """
+    """The folder that holds ``assignments/``, ``reference/`` and ``templates/``."""
     for candidate in (package / "_data", package.parent):
         if (candidate / "assignments").is_dir():
             return candidate
@@ -56,11 +52,7 @@ def cache_folder() -> Path:
 
 
 def check_executable(folder: Path) -> None:
-    """See that programs may be started from a folder.
-
-    Raises:
-        GraderFault: It is on a file system that allows none.
-    """
+    """See that programs may be started from a folder; else it is a fault of the machine."""
     if os.statvfs(folder).f_flag & os.ST_NOEXEC:
         raise GraderFault(
             f"no program can be started from {folder}: it is on a file system that is mounted "

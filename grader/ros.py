@@ -16,6 +16,7 @@ from pathlib import Path
 from grader.errors import GraderFault
 
 DISTRO = "jazzy"
+_WHEELS = "ros_*.libs"
 
 _KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "XDG_RUNTIME_DIR", "TMPDIR", "HOME", "USER")
 
@@ -73,49 +74,37 @@ class RosInstallation:
             overlays: Install spaces (merged layout) in front of ROS, as after sourcing
                 their ``local_setup.bash``.
         """
-        result = {name: environ[name] for name in _KEPT if name in environ}
-        result.update(self.inherited)
-        result["PATH"] = os.pathsep.join([str(self.python.parent), "/usr/local/bin:/usr/bin:/bin"])
         overlays = (*overlays, *self.underlays)
-        result["ROS_DISTRO"] = self.distro
-        result["ROS_VERSION"] = "2"
-        result["ROS_PYTHON_VERSION"] = "3"
         prefixes = os.pathsep.join(str(path) for path in (*overlays, *self.prefixes))
-        result["AMENT_PREFIX_PATH"] = prefixes
-        result["CMAKE_PREFIX_PATH"] = prefixes
-        result["PYTHONNOUSERSITE"] = "1"
-        python_path: list[str] = []
-        library_path: list[str] = []
-        for overlay in overlays:
-            python_path.extend(map(str, site_packages(overlay)))
-            library_path.append(str(overlay / "lib"))
+        result = {name: environ[name] for name in _KEPT if name in environ} | {
+            **dict(self.inherited),
+            "PATH": os.pathsep.join([str(self.python.parent), "/usr/local/bin:/usr/bin:/bin"]),
+            "ROS_DISTRO": self.distro,
+            "ROS_VERSION": "2",
+            "ROS_PYTHON_VERSION": "3",
+            "AMENT_PREFIX_PATH": prefixes,
+            "CMAKE_PREFIX_PATH": prefixes,
+            "PYTHONNOUSERSITE": "1",
+        }
+        ahead = {
+            "PYTHONPATH": [path for overlay in overlays for path in site_packages(overlay)],
+            "LD_LIBRARY_PATH": [overlay / "lib" for overlay in overlays],
+        }
         if self.source == "wheels":
-            library_path.extend(self._wheel_libraries())
+            libraries = [path for one in self.site_packages for path in sorted(one.glob(_WHEELS))]
+            ahead["LD_LIBRARY_PATH"] += [*(prefix / "lib" for prefix in self.prefixes), *libraries]
             # The wheels' start-up hook would set LD_LIBRARY_PATH and execute Python again.
             result["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"
-        inherited = dict(self.inherited)
-        _prepend(result, "PYTHONPATH", python_path, inherited)
-        _prepend(result, "LD_LIBRARY_PATH", library_path, inherited)
+        for name, paths in ahead.items():
+            parts = [*map(str, paths), *filter(None, result.get(name, "").split(os.pathsep))]
+            if parts:
+                result[name] = os.pathsep.join(parts)
         return result
-
-    def _wheel_libraries(self) -> list[str]:
-        libraries = [str(prefix / "lib") for prefix in self.prefixes]
-        for site in self.site_packages:
-            libraries.extend(str(path) for path in sorted(site.glob("ros_*.libs")))
-        return libraries
 
 
 def site_packages(prefix: Path) -> list[Path]:
     """Folders of an install space that Python imports from."""
     return sorted(prefix.glob("lib/python3*/site-packages"))
-
-
-def _prepend(
-    result: dict[str, str], name: str, paths: list[str], inherited: Mapping[str, str]
-) -> None:
-    parts = paths + [part for part in inherited.get(name, "").split(os.pathsep) if part]
-    if parts:
-        result[name] = os.pathsep.join(parts)
 
 
 def is_sourced(environ: Mapping[str, str]) -> bool:

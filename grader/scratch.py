@@ -1,4 +1,4 @@
-"""Scratch folders: gone with whoever made them, and where that was killed, with the next one."""
+"""Scratch folders: gone with the process that made them, or with the next one if it was killed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import os
 import tempfile
 import time
 from pathlib import Path
-from types import TracebackType
 
 from grader.tree import remove_tree
 
@@ -43,12 +42,7 @@ class Scratch:
         """Use it for a block."""
         return self.path
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Remove it."""
         self.remove()
 
@@ -65,11 +59,7 @@ class Scratch:
 
 
 def remove_stale(folder: Path, age_s: float = _STALE_S) -> None:
-    """Remove scratch folders that nobody holds.
-
-    Args:
-        age_s: How long ago the last thing must have been made in one.
-    """
+    """Remove scratch folders without a lock in which nothing was made for this time."""
     now_s = time.time()
     for path in folder.glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError):

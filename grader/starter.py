@@ -22,22 +22,10 @@ from grader.report.files import write_folders
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-_SEPARATORS = {"msg": 0, "srv": 1, "action": 2}
-_PARTS = {
-    "msg": "fields",
-    "srv": "fields of the request, and then of the response",
-    "action": "fields of the goal, of the result, and of the feedback",
-}
-
 
 @dataclass(frozen=True)
 class Program:
-    """An executable that runs one node.
-
-    Attributes:
-        executable: As `ros2 run` calls it.
-        module: Python module that holds it; also the name of its node, if no check asks for one.
-    """
+    """An executable that runs one node, in a module that is named like the node."""
 
     executable: str
     module: str
@@ -50,11 +38,7 @@ class Program:
 
 @dataclass(frozen=True)
 class Interface:
-    """A definition that the student writes.
-
-    Attributes:
-        name: Such as ``BotStatus``.
-    """
+    """A definition that the student writes, such as ``BotStatus``."""
 
     kind: str
     name: str
@@ -64,16 +48,6 @@ class Interface:
         """Its place in the package."""
         return f"{self.kind}/{self.name}.{self.kind}"
 
-    @property
-    def parts(self) -> str:
-        """What stands in it, in words."""
-        return _PARTS[self.kind]
-
-    @property
-    def separators(self) -> int:
-        """How many lines of dashes part it."""
-        return _SEPARATORS[self.kind]
-
 
 def write_starter(loaded: LoadedAssignment, folder: Path) -> tuple[Path, ...]:
     """Write the starter packages of an assignment.
@@ -82,15 +56,15 @@ def write_starter(loaded: LoadedAssignment, folder: Path) -> tuple[Path, ...]:
         UsageError: A folder of that name is there already, or it cannot be written.
     """
     packages = loaded.assignment.packages
-    there = [folder / package.name for package in packages if (folder / package.name).exists()]
-    if there:
-        raise UsageError(
-            f"{there[0]} is there already, and is left as it is: go on with it, or name another "
-            "folder"
-        )
-    files = starter_files(loaded)
-    write_folders(folder, files)
-    return tuple(folder / package.name for package in packages)
+    places = tuple(folder / package.name for package in packages)
+    for place in places:
+        if place.exists():
+            raise UsageError(
+                f"{place} is there already, and is left as it is: go on with it, or name another "
+                "folder"
+            )
+    write_folders(folder, starter_files(loaded))
+    return places
 
 
 def starter_files(loaded: LoadedAssignment) -> dict[str, str]:
@@ -102,8 +76,7 @@ def starter_files(loaded: LoadedAssignment) -> dict[str, str]:
     assignment = loaded.assignment
     files: dict[str, str] = {}
     for package in assignment.packages:
-        interfaces = tuple(_interfaces(assignment, package))
-        files.update(_package(assignment, package, interfaces))
+        files.update(_package(assignment, package))
     first = assignment.packages[0].name
     places = sorted(path for path, text in files.items() if "TODO" in text)
     files[f"{first}/README.md"] = rendered(
@@ -119,22 +92,23 @@ def package_files(
     cpp = is_cpp(package)
     if cpp and "rclcpp" not in package.depends:
         package = package.model_copy(update={"depends": ("rclcpp", *package.depends)})
-    known = {
-        "package": package,
-        "description": description,
-        "programs": programs(package),
-        "cpp": cpp,
-    }
-    files = {"package.xml": rendered("starter/package.xml", interfaces=interfaces, **known)}
     if package.build_type == "ament_cmake":
-        files["CMakeLists.txt"] = rendered("starter/CMakeLists.txt", interfaces=interfaces, **known)
+        names = ["package.xml", "CMakeLists.txt"]
+        files = {}
         code = "src" if cpp else "scripts"
     else:
-        files["setup.py"] = rendered("starter/setup.py", **known)
-        files["setup.cfg"] = rendered("starter/setup.cfg", **known)
-        files[f"resource/{package.name}"] = ""
-        files[f"{package.name}/__init__.py"] = ""
+        names = ["package.xml", "setup.py", "setup.cfg"]
+        files = {f"resource/{package.name}": "", f"{package.name}/__init__.py": ""}
         code = package.name
+    for name in names:
+        files[name] = rendered(
+            f"starter/{name}",
+            package=package,
+            description=description,
+            programs=programs(package),
+            cpp=cpp,
+            interfaces=interfaces,
+        )
     for program in programs(package):
         files[f"{code}/{program.module}.{'cpp' if cpp else 'py'}"] = nodes[program.executable]
     return files
@@ -158,9 +132,8 @@ def programs(package: Package) -> tuple[Program, ...]:
     )
 
 
-def _package(
-    assignment: Assignment, package: Package, interfaces: tuple[Interface, ...]
-) -> Iterator[tuple[str, str]]:
+def _package(assignment: Assignment, package: Package) -> Iterator[tuple[str, str]]:
+    interfaces = tuple(_interfaces(assignment, package))
     nodes = {
         program.executable: rendered(
             f"starter/node.{'cpp' if is_cpp(package) else 'py'}",

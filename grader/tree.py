@@ -1,7 +1,7 @@
-"""Folders that programs of others have filled, perhaps with folders in folders without end.
+"""Folders that students' programs have filled, perhaps with folders in folders without end.
 
-What walks through a tree by recursion stops with a RecursionError in one that is deep enough, and
-a path may be too long for the system. So what lies too deep is taken away before anybody looks.
+Recursion ends with a RecursionError in a tree that is deep enough, and a path may be too long for
+the system. So what lies too deep is removed before anything looks.
 """
 
 from __future__ import annotations
@@ -49,10 +49,7 @@ def listing(folder: Path) -> frozenset[str]:
 
 
 def cut_deep(folder: Path) -> bool:
-    """Remove what lies too deep in a folder, and let its owner read all else.
-
-    Whoever filled it may have taken the right to do so from himself, and so from us.
-    """
+    """Remove what lies too deep in a folder, and let its owner read all else."""
     found = False
     ahead = [(os.fsencode(folder), 0)]
     while ahead:

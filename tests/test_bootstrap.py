@@ -68,13 +68,13 @@ def pythons(*versions: str) -> Iterator[Interpreter]:
         yield Interpreter((int(major), int(minor)), f"python{version}")
 
 
-@pytest.mark.parametrize("version", ["3.10", "3.11", "3.12", "3.13"])
+@pytest.mark.parametrize("version", ["3.10", "3.13"])
 def test_without_ros_the_wheels_go_into_the_running_python(version: str) -> None:
     running = next(pythons(version))
     assert bootstrap.plan({}, [running, WHEELS.interpreter], LINUX) == Plan("wheels", running)
 
 
-@pytest.mark.parametrize("version", ["3.6", "3.9", "3.14"])
+@pytest.mark.parametrize("version", ["3.9", "3.14"])
 def test_an_unsupported_python_gives_way_to_a_supported_one(version: str) -> None:
     chosen = bootstrap.plan({}, pythons(version, "3.13", "3.11"), LINUX)
     assert chosen.interpreter == Interpreter((3, 13), "python3.13")
@@ -87,7 +87,7 @@ def test_interpreters_are_looked_for_only_as_far_as_needed() -> None:
 
 
 def test_no_supported_python_names_what_to_install() -> None:
-    expected = r"needs Python 3\.10 to 3\.13 and here is only 3\.9, 3\.14: install Python 3\.12"
+    expected = r"needs Python 3\.10 to 3\.13 and here is only 3\.9, 3\.14: sudo apt install"
     with pytest.raises(SetupError, match=expected):
         bootstrap.plan({}, pythons("3.9", "3.14"), LINUX)
 
@@ -120,14 +120,12 @@ def test_another_distribution_is_refused_by_name() -> None:
         bootstrap.plan(humble, pythons("3.10"), LINUX, ros_python=(3, 10))
 
 
-def test_a_sourced_jazzy_without_rclpy_is_refused() -> None:
-    with pytest.raises(SetupError, match="no rclpy: sudo apt install ros-jazzy-rclpy"):
-        bootstrap.plan(SOURCED, pythons("3.12"), LINUX)
-
-
-def test_a_sourced_jazzy_for_an_unsupported_python_is_refused() -> None:
-    with pytest.raises(SetupError, match=r"built for Python 3\.9 and rosgrade needs 3\.10 to"):
-        bootstrap.plan(SOURCED, pythons("3.9"), LINUX, ros_python=(3, 9))
+@pytest.mark.parametrize("built_for", [None, (3, 9)])
+def test_a_sourced_jazzy_without_a_usable_rclpy_is_refused(
+    built_for: tuple[int, int] | None,
+) -> None:
+    with pytest.raises(SetupError, match="or sudo apt install ros-jazzy-rclpy"):
+        bootstrap.plan(SOURCED, pythons("3.12"), LINUX, ros_python=built_for)
 
 
 def test_the_missing_python_of_a_sourced_jazzy_is_named() -> None:
@@ -138,12 +136,6 @@ def test_the_missing_python_of_a_sourced_jazzy_is_named() -> None:
 def test_a_platform_without_wheels_needs_a_sourced_ros() -> None:
     with pytest.raises(SetupError, match="this is linux-aarch64: install ROS 2 Jazzy"):
         bootstrap.plan({}, pythons("3.11"), "linux-aarch64")
-
-
-def test_every_message_is_one_line() -> None:
-    with pytest.raises(SetupError) as caught:
-        bootstrap.plan({}, [], LINUX)
-    assert "\n" not in str(caught.value)
 
 
 def test_wheels_take_the_whole_lock() -> None:
@@ -222,29 +214,22 @@ def create(venv, chosen):
     (venv / "pyvenv.cfg").touch()
     (venv / "made_for").write_text((venv.parent / "requirements.lock").read_text())
 
-def nothing(*arguments):
-    pass
-
 bootstrap._create = create
-bootstrap._install_lock = bootstrap._check_imports = bootstrap._install_rosgrade = nothing
-bootstrap._say = print
+bootstrap._install_lock = bootstrap._check_imports = bootstrap._pip = lambda *_: None
 {change}
-try:
-    bootstrap.set_up(Path(sys.argv[1]), {{}})
-except bootstrap.SetupError as error:
-    sys.exit(str(error))
+bootstrap.set_up(Path(sys.argv[1]), {{}})
 """
 """A set-up of an environment with nothing in it."""
 
 
-def set_up(root: Path, lock: str, change: str = "") -> "subprocess.CompletedProcess[str]":
+def set_up(root: Path, lock: str, change: str = "") -> int:
     (root / "requirements.lock").write_text(lock, encoding="utf-8")
     (root / "pyproject.toml").touch()
     command = [sys.executable, "-c", PRETENDED.format(change=change), str(root)]
     environ = {k: v for k, v in os.environ.items() if k != "AMENT_PREFIX_PATH"}
     return subprocess.run(
-        command, cwd=ROOT, env=environ, capture_output=True, text=True, check=False
-    )
+        command, cwd=ROOT, env=environ, capture_output=True, check=False
+    ).returncode
 
 
 def made_for(root: Path) -> str:
@@ -254,42 +239,23 @@ def made_for(root: Path) -> str:
     return (root / ".venv" / "made_for").read_text(encoding="utf-8")
 
 
-FAILS = "def fail(*arguments):\n    raise {}\nbootstrap.{} = fail"
-STEPS = ["_create", "_install_lock", "_check_imports", "_install_rosgrade"]
-
-
-def test_other_requirements_make_another_environment(tmp_path: Path) -> None:
-    assert set_up(tmp_path, "one").returncode == 0
-    assert set_up(tmp_path, "two").returncode == 0
+def test_other_requirements_make_another_environment_and_the_same_none(tmp_path: Path) -> None:
+    assert set_up(tmp_path, "one") == 0
+    assert set_up(tmp_path, "one", "bootstrap._create = None") == 0
+    assert set_up(tmp_path, "two") == 0
     assert made_for(tmp_path) == "two"
-    assert not (tmp_path / bootstrap.OLD).exists()
 
 
-@pytest.mark.parametrize("step", STEPS)
-def test_a_set_up_that_fails_leaves_the_environment_that_worked(tmp_path: Path, step: str) -> None:
-    set_up(tmp_path, "one")
-    failed = set_up(tmp_path, "two", FAILS.format("bootstrap.SetupError('no index')", step))
-    assert failed.stderr.strip() == "no index"
-    assert made_for(tmp_path) == "one"
-    assert not (tmp_path / bootstrap.OLD).exists()
-
-
-@pytest.mark.parametrize("step", STEPS)
-def test_after_one_that_was_killed_the_next_one_goes_on_from_what_worked(
+@pytest.mark.parametrize("step", ["_create", "_install_lock", "_check_imports", "_pip"])
+def test_after_a_set_up_that_was_killed_the_next_one_makes_it_whole(
     tmp_path: Path, step: str
 ) -> None:
-    set_up(tmp_path, "one")
     kill = f"bootstrap.{step} = lambda *_: os.kill(os.getpid(), 9)"
-    assert set_up(tmp_path, "two", kill).returncode == -signal.SIGKILL
-    # The old requirements again: nothing has to be made, as the moved environment is back.
-    assert set_up(tmp_path, "one", FAILS.format("AssertionError", "_create")).returncode == 0
+    assert set_up(tmp_path, "one", kill) == -signal.SIGKILL
+    assert set_up(tmp_path, "one") == 0
     assert made_for(tmp_path) == "one"
-    assert set_up(tmp_path, "two").returncode == 0
-    assert made_for(tmp_path) == "two"
-    assert not (tmp_path / bootstrap.OLD).exists()
 
 
-def test_a_first_set_up_that_fails_leaves_nothing(tmp_path: Path) -> None:
-    assert set_up(tmp_path, "one", FAILS.format("KeyboardInterrupt", "_install_lock")).returncode
+def test_a_set_up_that_fails_leaves_nothing_half_made(tmp_path: Path) -> None:
+    assert set_up(tmp_path, "one", "bootstrap._install_lock = None") != 0
     assert not (tmp_path / ".venv").exists()
-    assert not (tmp_path / bootstrap.OLD).exists()

@@ -12,8 +12,8 @@ from grader import resources
 from grader.assignment import expected, rules, simulation
 from grader.assignment.binding import BoundCheck, bind, tell_apart
 from grader.assignment.interfaces import Interfaces, interface_problems
-from grader.assignment.lesson_checks import lesson_checks
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
+from grader.assignment.own_check import lesson_checks
 from grader.checks.catalogue import CATALOGUE
 from grader.checks.check import Check, Subject
 from grader.errors import AssignmentError, UsageError

@@ -1,13 +1,14 @@
-"""Python of an author in a file beside assignment.yaml: own checks, and messages of stimuli.
+"""Python of an author beside assignment.yaml; every error in it is a ValueError for the author.
 
-.. code-block:: python
+The package ``checks/`` defines checks as rosgrade's own do; its modules import each other
+(``from .conversion import ...``). A file has functions: of messages for stimuli, and checks::
 
     def straight(recording, topic: str, tolerance: Ratio = 0.01) -> Finding:
         ...
 
 The first argument is the :class:`~grader.recording.model.Recording`; the others are the keys
-of ``with``, validated by their annotations. The file runs in the grader's own process: its
-author is trusted, a student never is. Every error is a ValueError for the author.
+of ``with``, validated by their annotations. All of it runs in the grader's own process: its
+author is trusted, a student never is.
 """
 
 from __future__ import annotations
@@ -16,20 +17,26 @@ import inspect
 import re
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
-from types import ModuleType
+from threading import Lock
+from types import MappingProxyType, ModuleType
 from typing import Any, get_type_hints
 
 from pydantic import ConfigDict, create_model
 from pydantic.errors import PydanticUserError
 
+from grader import resources
+from grader.checks.catalogue import CATALOGUE, gather
 from grader.checks.check import Check, Parameters, Subject
 from grader.checks.finding import Finding
 from grader.spec.nearest_name import did_you_mean
 
+FOLDER = "checks"
+_IMPORTING = Lock()
 _FORM = re.compile(r"([A-Za-z_]\w*\.py):([A-Za-z_]\w*)")
 
 
@@ -129,3 +136,46 @@ def _parameters(
     if isinstance(returned, type) and not issubclass(returned, Finding):
         raise ValueError(f"{name}: it returns {returned.__name__}: a check returns a Finding")
     return model
+
+
+def lesson_checks(assignment: Path) -> Mapping[str, Check]:
+    """The checks in the package of an assignment's folder, by name.
+
+    Raises:
+        ValueError: A module cannot be imported, or a name is taken; the text says where.
+    """
+    folder = assignment / FOLDER
+    files = sorted(folder.glob("*.py"))
+    if not files:
+        return MappingProxyType({})
+    content = b"".join(file.name.encode() + file.read_bytes() for file in files)
+    name = f"rosgrade_lesson_{sha256(str(folder.resolve()).encode() + content).hexdigest()[:16]}"
+    with _IMPORTING:
+        found = gather(_modules(name, folder, files))
+    for taken in sorted(set(found) & set(CATALOGUE)):
+        raise ValueError(f"{FOLDER}/: rosgrade has a check {taken!r} too: choose another name")
+    return found
+
+
+def _modules(package: str, folder: Path, files: list[Path]) -> list[ModuleType]:
+    """Import the modules of a package that stands in no ``sys.path``."""
+    if package not in sys.modules:
+        module = ModuleType(package)
+        module.__path__ = [str(folder)]
+        sys.modules[package] = module
+    # Bytecode goes to the cache, so that the assignment's folder and its hash stay as they are.
+    before, sys.pycache_prefix = sys.pycache_prefix, str(resources.cache_folder() / "bytecode")
+    try:
+        with naming_place(folder, f"{FOLDER}/"):
+            names = [one.stem for one in files if one.stem != "__init__"]
+            return [import_module(f"{package}.{name}") for name in names]
+    finally:
+        sys.pycache_prefix = before
+
+
+def all_checks() -> Mapping[str, Check]:
+    """The catalogue with the checks of rosgrade's own lessons."""
+    found = dict(CATALOGUE)
+    for folder in sorted(resources.assignments().glob(f"*/{FOLDER}")):
+        found.update(lesson_checks(folder.parent))
+    return MappingProxyType(found)

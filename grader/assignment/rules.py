@@ -14,7 +14,6 @@ from grader.errors import Problem
 from grader.spec.document import Place
 from grader.spec.nearest_name import nearest_or_all
 from grader.spec.source import Source
-from grader.spec.unit import format_duration
 
 
 def problems(
@@ -53,11 +52,6 @@ def _scenario(assignment: Assignment, scenario: Scenario) -> Iterator[tuple[Plac
             if any(getattr(one, key) is not None for one in (until, *until.any)):
                 text = f"{key!r} is about the simulated robot: 'world' is missing"
                 yield ("until",), text
-    for key, limit in (("quiet", until.quiet), ("elapsed", until.elapsed)):
-        if limit is not None and limit >= scenario.timeout:
-            shown, timeout = format_duration(limit), format_duration(scenario.timeout)
-            text = f"{shown} can never pass before the timeout of {timeout} ends the scenario"
-            yield ("until", key), text
 
 
 def _launch(assignment: Assignment, launch: Launch) -> Iterator[tuple[Place, str]]:

@@ -18,7 +18,7 @@ from grader.batch.handed_in import HandedIn
 from grader.batch.ledger import Entry, Ledger
 from grader.batch.regrading import find, regrade, regrade_command
 from grader.errors import GraderFault, RosgradeError, UsageError, machine_fault
-from grader.recording.fact import to_json
+from grader.recording.model import to_json
 from grader.report.files import write_whole
 from grader.report.model.facts import Clock
 from grader.report.model.grade_part import grade_json

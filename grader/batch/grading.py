@@ -17,9 +17,8 @@ from grader.batch.type_support import TypeSupport
 from grader.checks.finding import Status
 from grader.errors import GraderFault, UsageError, machine_fault
 from grader.grade import Grade, grade
-from grader.recording.fact import to_json
 from grader.recording.mcap_reader import read_recording
-from grader.recording.model import Recording
+from grader.recording.model import Recording, to_json
 from grader.report.files import write_whole
 from grader.report.html.replay import Replay
 from grader.run.host.load import cpu_count

@@ -62,7 +62,7 @@ def schema(
     document: Annotated[Document, typer.Argument(help="Which schema.")] = Document.ASSIGNMENT,
 ) -> None:
     """Print the JSON Schema of a file, for editors."""
-    from grader.assignment.lesson_checks import all_checks
+    from grader.assignment.own_check import all_checks
     from grader.assignment.schema import assignment_schema, mutants_schema
     from grader.report.model.result import result_schema
 
@@ -84,7 +84,7 @@ def checks(
     from rich.markdown import Markdown
     from rich.table import Table
 
-    from grader.assignment.lesson_checks import all_checks
+    from grader.assignment.own_check import all_checks
     from grader.docs import check_markdown, explanations_markdown
     from grader.errors import UsageError
     from grader.spec.nearest_name import did_you_mean

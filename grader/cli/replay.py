@@ -10,7 +10,6 @@ import typer
 from grader.cli.options import Quiet
 from grader.cli.screen.progress import Progress
 from grader.resources import cache_folder
-from grader.scratch import Scratch
 
 
 def replay(
@@ -39,7 +38,7 @@ def replay(
     from grader.errors import UsageError
     from grader.grade.judge import why_not_run
     from grader.recording.mcap_reader import read_recording
-    from grader.run.replay import make_order, play
+    from grader.run.replay import replay as replay_recording
     from grader.submission.intake.locate import check_path
     from grader.submission.prepare import prepare
 
@@ -59,15 +58,13 @@ def replay(
     if prepared.install is None or reason is not None:
         told = reason.observed if reason else prepared.record.problem
         raise UsageError(f"{submission}: {told}")
-    with Scratch("replay-home") as scratch:
-        installation = replace(installation, underlays=prepared.underlays or installation.underlays)
-        order = make_order(
-            recording,
-            recorded,
-            loaded.assignment,
-            installation,
-            prepared.install,
-            scratch,
-            type_support,
-        )
-        raise typer.Exit(play(order, installation))
+    status = replay_recording(
+        recording,
+        recorded,
+        loaded.assignment,
+        prepared.record,
+        replace(installation, underlays=prepared.underlays or installation.underlays),
+        prepared.install,
+        type_support,
+    )
+    raise typer.Exit(status)

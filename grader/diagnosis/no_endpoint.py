@@ -264,29 +264,15 @@ def exchanged_kind(symptom: NoEndpoint) -> Cause | None:
     )
 
 
-@explanation(NoEndpoint)
-def other_name(symptom: NoEndpoint) -> Cause | None:
-    """The type is right, but the name is another one."""
-    same = [item.name for item in symptom.there if item.type in symptom.types]
-    if not same:
-        return None
-    return Cause(
-        f"the type is right, but the name is another one: the node {symptom.word.does} "
-        f"{codes(same)}",
-        f"Write the name as '{symptom.name.lstrip('/')}': {symptom.create}.",
-        symptom.evidence,
-    )
-
-
 @explanation(NoEndpoint, general=True)
-def nothing_of_that_name(symptom: NoEndpoint) -> Cause:
-    """The node has others only, or none."""
-    nodes = codes(node.name for node in symptom.recording.student_nodes)
+def others_only(symptom: NoEndpoint) -> Cause:
+    """The node has others only, perhaps of the right type, or none."""
+    word, nodes = symptom.word, codes(node.name for node in symptom.recording.student_nodes)
     there = codes(item.name for item in symptom.there)
-    word = symptom.word
+    same = codes(item.name for item in symptom.there if item.type in symptom.types)
     has = f"{word.does} {there} only" if there else f"has no {word.noun} of its own"
     return Cause(
-        f"the node {nodes} {has}",
+        f"the node {nodes} {has}" + (f"; the type is right on {same}" if same else ""),
         f"Call {symptom.create} in the node's constructor.",
         symptom.evidence,
     )

@@ -20,8 +20,7 @@ from grader.checks.doubt import is_doubtful
 from grader.checks.finding import Finding, Status
 from grader.checks.package.runtime_imports import with_runtime_imports
 from grader.diagnosis.not_built import why_lacking, why_not_built
-from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding
-from grader.grade.points import points_for
+from grader.grade.model import SEVERITY, CheckResult, Grade, ScenarioFinding, points_for
 from grader.recording.model import Ending, Recording
 from grader.submission.record import SubmissionRecord
 
@@ -193,10 +192,9 @@ def _recording_fault(
         return "; ".join(recording.faults)
     if recording.ending is Ending.FAULT:
         return "the run was ended by a fault that left no message"
-    if recording.scenario != scenario:
-        return f"the recording is of another scenario, {recording.scenario!r}"
-    if recording.submission.sha256 != submission.sha256:
-        return f"the recording is of another submission, {recording.submission.id!r}"
+    if (recording.scenario, recording.submission.sha256) != (scenario, submission.sha256):
+        told = f"{recording.scenario!r} of {recording.submission.id!r}"
+        return f"the recording is of another run, {told}"
     return None
 
 

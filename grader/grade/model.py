@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
+from typing import Any
 
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Visibility, Withheld
 from grader.checks.finding import Finding, Status
-from grader.grade.first import every_point_judged, first_to_fix, reason
-from grader.grade.points import total
 from grader.submission.record import SubmissionRecord
+
+STEP = Decimal("0.01")
+"""What partial credit is rounded to; sums are exact: 0.1 + 0.2 is 0.3."""
 
 SEVERITY = (Status.ERROR, Status.FAILED, Status.SKIPPED, Status.PASSED)
 """Worst first: the status of a check is the worst of its findings."""
@@ -177,3 +180,86 @@ class Grade:
         return tuple(
             scenario.id for scenario in self.assignment.scenarios if scenario.id in disturbed
         )
+
+
+def reason(check: str, scenario: str | None, observed: str, evidence: Any) -> Hashable:
+    """Why a check failed: equal for those that name the same mistake.
+
+    That is the same line of the student's code, in whichever run, or the same said of the same
+    moment of a run. What names neither, or only a file, is a mistake of its own.
+
+    Args:
+        evidence: Of a finding, or of a result that was read from a file.
+    """
+    if evidence.places and all(one.line is not None for one in evidence.places):
+        return tuple((one.file, one.line, one.message) for one in evidence.places)
+    if evidence.moments:
+        return scenario, observed, tuple(moment.time_s for moment in evidence.moments)
+    return check
+
+
+def first_to_fix(
+    reasons: Mapping[str, Hashable],
+    waits: Sequence[Sequence[str]],
+    without_points: Collection[str] = (),
+) -> str | None:
+    """Find the failed check on which most others depend; of equals, the author's first.
+
+    A node that crashed does not stay alive, and has no publisher either: of checks that failed
+    for the same reason the first stands for all, with whatever waits for any of them. What is
+    shown without points, and keeps nothing else waiting, is nothing that must be mended.
+
+    Args:
+        reasons: Why each check failed, in the author's order; for the same reason, equal.
+        waits: Of every check the failed ones that it waits for.
+        without_points: Checks that are worth none.
+
+    Returns:
+        The check, or None where none failed that must be mended.
+    """
+
+    def others(check: str) -> int:
+        same = {name for name, reason in reasons.items() if reason == reasons[check]}
+        return len(same) - 1 + sum(not same.isdisjoint(one) for one in waits)
+
+    shown = only_shown(without_points, waits)
+    return max((check for check in reasons if check not in shown), key=others, default=None)
+
+
+def every_point_judged(checks: Iterable[Any]) -> bool:
+    """Whether no check with points ended as an error, or waits for one that did."""
+    checks = tuple(checks)
+    errors = {check.id for check in checks if check.status is Status.ERROR}
+    return not any(
+        check.max_points and not errors.isdisjoint((check.id, *check.waits_for)) for check in checks
+    )
+
+
+def only_shown(without_points: Collection[str], waits: Iterable[Sequence[str]]) -> frozenset[str]:
+    """Those of the checks without points that nothing else waits for."""
+    return frozenset(without_points).difference(*waits)
+
+
+def points_for(max_points: float, credit: float) -> float:
+    """Points of one check: the only place where points are rounded.
+
+    A passed check has its full points, exactly as the author wrote them. Partial credit is
+    rounded half up, and stays below, so that only what passes everything has the full score.
+
+    Args:
+        credit: Share in [0, 1]; only a passed check has 1.
+    """
+    if credit >= 1.0:
+        return max_points
+    full = _exact(max_points)
+    earned = (full * _exact(credit)).quantize(STEP, ROUND_HALF_UP)
+    return float(max(Decimal(0), min(earned, full - STEP)))
+
+
+def total(points: Iterable[float]) -> float:
+    """Sum without the errors of binary fractions."""
+    return float(sum((_exact(value) for value in points), Decimal(0)))
+
+
+def _exact(value: float) -> Decimal:
+    return Decimal(repr(float(value)))

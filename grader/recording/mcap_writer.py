@@ -16,8 +16,7 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
-from grader.recording.fact import to_json
-from grader.recording.model import Recording
+from grader.recording.model import Recording, to_json
 
 # Metadata of a channel of messages.
 JOIN, TOPIC, SENT = "rosgrade_join", "rosgrade_topic", "rosgrade_sent"

@@ -6,6 +6,8 @@ cell, the clock that DDS stamps messages with. Names are fully qualified (``/bot
 
 from __future__ import annotations
 
+import dataclasses
+import json
 from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -412,6 +414,18 @@ class Recording:
         waited = sum(sample.waited_ns for sample in samples)
         late = max((sample.late_ns for sample in samples), default=0)
         return (waited + late) / NS
+
+
+def to_json(fact: Any) -> bytes:
+    """A dataclass of the model as compact JSON."""
+    plain = dataclasses.asdict(fact)
+    return json.dumps(plain, default=_plain, separators=(",", ":"), sort_keys=True).encode()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    raise TypeError(f"{type(value).__name__} is not a plain value")
 
 
 def _time_ns(sample: Disturbance) -> int:

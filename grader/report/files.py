@@ -57,9 +57,6 @@ def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None])
         outputs: Files and folders that the command writes; None for an option that is not used.
         inputs: Files and folders that it reads. A new file may be written into a folder among
             them, and one that an earlier run wrote there may be replaced.
-
-    Raises:
-        UsageError: One does.
     """
     written: list[Path] = []
     read = [one for one in inputs if one is not None]
@@ -78,11 +75,7 @@ def refuse_inputs(outputs: Iterable[Path | None], inputs: Iterable[Path | None])
 
 
 def refuse_part(output: Path, folder: Path, what: str) -> None:
-    """See that nothing is written into a folder that is read as a whole: it would be a part of it.
-
-    Raises:
-        UsageError: It would.
-    """
+    """See that nothing is written into a folder that is read as a whole."""
     if Path(os.path.realpath(output)).is_relative_to(os.path.realpath(folder)):
         raise UsageError(f"{output}: would be a part of {what}; name another folder")
 
@@ -108,11 +101,7 @@ def _is_of(file: Path, folder: Path) -> bool:
 
 
 def check_folder(folder: Path) -> None:
-    """See that a folder is there, or that nothing is in its place.
-
-    Raises:
-        UsageError: Something else is.
-    """
+    """See that a folder is there, or that nothing is in its place."""
     other = _in_the_way(folder)
     if other is not None:
         named = "" if other == folder else f"{other} "
@@ -120,12 +109,9 @@ def check_folder(folder: Path) -> None:
 
 
 def _in_the_way(folder: Path) -> Path | None:
-    """What is where a folder is needed; None where that cannot be told either."""
+    """What is where a folder is needed."""
     there = next((one for one in (folder, *folder.parents) if os.path.lexists(one)), None)
-    try:
-        return None if there is None or there.is_dir() else there
-    except OSError:
-        return None
+    return None if there is None or there.is_dir() else there
 
 
 def _why(file: Path, error: OSError) -> str:
@@ -142,9 +128,6 @@ def write_folders(place: Path, files: Mapping[str, str]) -> None:
         place: Where the folders go; made where it is missing.
         files: Contents by path, with forward slashes; the first part of each is a folder that
             is not there yet.
-
-    Raises:
-        UsageError: They cannot be written there, or one of the folders is there already.
     """
     check_folder(place)
     draft = place / f".rosgrade-{secrets.token_hex(4)}"

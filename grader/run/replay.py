@@ -1,147 +1,207 @@
 """A node on a domain of its own, given again what it was given in a recording.
 
 For students at home: the node runs as they would run it, without a sandbox, and nothing is
-judged. The player is a process of its own, as a cell is.
+judged. It is a run like any other, whose only stimuli are the messages of the recording.
 """
 
 from __future__ import annotations
 
-import pickle
-import subprocess
+import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from grader.errors import UsageError
-from grader.recording.mcap_reader import read_inputs
-from grader.recording.model import NS, Kind, Owner, Qos, Recording
+from grader.recording.mcap_reader import read_inputs, read_recording
+from grader.recording.mcap_writer import RawMessage
+from grader.recording.model import NS, Ending, Kind, Owner, Qos, Recording
 from grader.ros import RosInstallation
-from grader.run.environment import cell_environment, student_environment
-from grader.run.order import ProcessCommand
-from grader.run.runner import process_command
+from grader.run.runner import Runner
+from grader.safe_text import clean, one_line
 from grader.scratch import Scratch
+from grader.submission.record import SubmissionRecord
 
 if TYPE_CHECKING:
-    from grader.assignment.model import Assignment
+    from grader.assignment.model import Assignment, Scenario
 
-ORDER_FILE = "replay.pickle"
-_ENDING_LIMIT_S = 20.0
 _DEFAULT = Qos("reliable", "volatile")
+_DEPTH = 1000
+_MOST_SHOWN = 10
+"""Messages of a topic within a second; a burst is worth reading, a stream is not."""
+# The observation may have ended with the very answer to the last input.
+_AFTERMATH_S = 0.5
+_ENDING_LIMIT_S = 20.0
 
 
 @dataclass(frozen=True)
 class Input:
-    """A topic that is given, with the QoS that it was given with."""
+    """The messages of one topic, in the place of a stimulus that publishes them."""
 
-    topic: str
-    type: str
-    reliability: str
-    durability: str
+    messages: Sequence[RawMessage]
+    qos: Qos
+    recording: Recording
+    key = "publish"
+
+    @property
+    def exchanged(self) -> tuple[str, str]:
+        """The topic and its type."""
+        return self.messages[0].topic, self.messages[0].type
+
+    def order(self, _making: Any) -> dict[str, Any]:
+        """The messages with their times; what a late joiner gets goes out before the launch."""
+        recording = self.recording
+        latched = self.qos.durability == "transient_local"
+        early = [one for one in self.messages if latched and one.stamp_ns < recording.launched_ns]
+        later = self.messages[len(early) :]
+        after_s = (later[0].stamp_ns - began_ns(recording)) / NS if later else 0.0
+        return {
+            "kind": "PublishOrder",
+            "topic": self.exchanged[0],
+            "type": self.exchanged[1],
+            "reliability": self.qos.reliability,
+            "durability": self.qos.durability,
+            "depth": _DEPTH,
+            "messages": [one.cdr for one in self.messages],
+            "times_s": [one.stamp_ns / NS for one in self.messages],
+            "before_launch": len(early),
+            "after_s": max(0.0, after_s),
+        }
 
 
-@dataclass(frozen=True)
-class ReplayOrder:
-    """What is replayed."""
-
-    recording: str
-    commands: tuple[ProcessCommand, ...]
-    environment: Mapping[str, str]
-    scratch: str
-    inputs: tuple[Input, ...]
-    outputs: Mapping[str, str]
-    type_support: tuple[str, ...]
-    launched_ns: int
-    matched_ns: int
-    duration_s: float
-    discovery_s: float
-    shutdown_s: float
+def began_ns(recording: Recording) -> int:
+    """When the clock of a run started."""
+    return recording.matched_ns or recording.launched_ns
 
 
-def make_order(
-    file: Path,
-    recording: Recording,
-    assignment: Assignment,
-    ros: RosInstallation,
-    install: Path,
-    scratch: Path,
-    type_support: Sequence[Path] = (),
-) -> ReplayOrder:
-    """What to replay."""
+def replay_scenario(file: Path, recording: Recording, assignment: Assignment) -> Scenario:
+    """The scenario of a recording, with its messages in the place of world and stimuli."""
+    from grader.assignment.model import RecordedTopic, Until
+
     scenario = next((s for s in assignment.scenarios if s.id == recording.scenario), None)
     if scenario is None:
         raise UsageError(
             f"{file}: the assignment {assignment.id!r} has no scenario {recording.scenario!r}"
         )
-    inputs = _inputs(file, recording)
-    if not inputs:
+    messages: dict[str, list[RawMessage]] = {}
+    for message in read_inputs(file, recording):
+        messages.setdefault(message.topic, []).append(message)
+    if not messages:
         raise UsageError(
             f"{file}: nothing was published to the node in this run, so there is nothing to "
             "replay: run it with `ros2 run`"
         )
-    began_ns = recording.matched_ns or recording.launched_ns
-    return ReplayOrder(
-        recording=str(file.resolve()),
-        commands=tuple(
-            process_command(ros, launch, assignment, install, dict(recording.values))
-            for launch in scenario.launch
-        ),
-        environment=student_environment(ros, install, scratch),
-        scratch=str(scratch),
-        inputs=inputs,
-        outputs={
-            endpoint.topic: endpoint.type
-            for endpoint in recording.student_endpoints(Kind.PUBLISHER)
-        },
-        type_support=tuple(map(str, type_support)),
-        launched_ns=recording.launched_ns,
-        matched_ns=began_ns,
-        duration_s=(recording.stop_ns - began_ns) / NS,
-        discovery_s=scenario.discovery,
-        shutdown_s=scenario.shutdown,
+    offered = {
+        endpoint.topic: endpoint.qos
+        for endpoint in recording.endpoints
+        if endpoint.owner is Owner.PROBE and endpoint.kind is Kind.PUBLISHER
+    }
+    published = {one.topic: one.type for one in recording.student_endpoints(Kind.PUBLISHER)}
+    # Every publisher meets the weakest request.
+    elapsed_s = (recording.stop_ns - began_ns(recording)) / NS + _AFTERMATH_S
+    return scenario.model_copy(
+        update={
+            "world": None,
+            "stimuli": tuple(
+                Input(messages[topic], offered.get(topic, _DEFAULT), recording)
+                for topic in sorted(messages)
+            ),
+            "record": tuple(
+                RecordedTopic(topic=topic, type=type, reliability="best_effort", depth=_DEPTH)
+                for topic, type in published.items()
+            ),
+            "until": Until.model_construct(elapsed=elapsed_s, stimuli="done"),
+            "timeout": elapsed_s + _ENDING_LIMIT_S,
+        }
     )
 
 
-def play(order: ReplayOrder, ros: RosInstallation) -> int:
+def replay(
+    file: Path,
+    recording: Recording,
+    assignment: Assignment,
+    submission: SubmissionRecord,
+    ros: RosInstallation,
+    install: Path,
+    type_support: Sequence[Path] = (),
+) -> int:
     """Replay, with everything that happens on standard output.
 
     Returns:
         0 when it was played to its end, 1 when the node ended or never listened, 130 when it
         was interrupted; nothing of it runs any more.
     """
-    with Scratch("replay") as folder:
-        (folder / ORDER_FILE).write_bytes(pickle.dumps(order))
-        player = subprocess.Popen(
-            [str(ros.python), "-m", "grader.run.replay_player", str(folder)],
-            env=cell_environment(ros),
-            # Its end tells the player to end; so does Ctrl-C, in here.
-            stdin=subprocess.PIPE,
-            start_new_session=True,
-        )
+    scenario = replay_scenario(file, recording, assignment)
+    shown, known = [], {*ros.packages}
+    known |= {path.name for prefix in type_support for path in prefix.glob("share/*")}
+    for topic in scenario.record:
+        if topic.type.partition("/")[0] in known:
+            shown.append(topic)
+        else:
+            _say("rosgrade", f"{topic.topic} is not shown: no {topic.type} here")
+    scenario = scenario.model_copy(update={"record": tuple(shown)})
+    with Scratch("replay") as folder, Runner(ros, progress=_Screen(), verbose=True) as runner:
+        again = folder / "run.mcap"
         try:
-            return player.wait()
+            runner.run(
+                assignment,
+                scenario,
+                submission,
+                install,
+                again,
+                seed=recording.seed,
+                type_support=tuple(type_support),
+            )
         except KeyboardInterrupt:
-            assert player.stdin is not None
-            player.stdin.close()
-            player.wait(_ENDING_LIMIT_S)
             return 130
-        finally:
-            if player.poll() is None:
-                player.kill()
-                player.wait()
-            if player.stdin is not None:
-                player.stdin.close()
+        return _tell(read_recording(again))
 
 
-def _inputs(file: Path, recording: Recording) -> tuple[Input, ...]:
-    types = {message.topic: message.type for message in read_inputs(file, recording)}
-    offered = {
-        endpoint.topic: endpoint.qos
-        for endpoint in recording.endpoints
-        if endpoint.owner is Owner.PROBE and endpoint.kind is Kind.PUBLISHER
-    }
-    found = []
-    for topic, interface in sorted(types.items()):
-        qos = offered.get(topic, _DEFAULT)
-        found.append(Input(topic, interface, qos.reliability, qos.durability))
-    return tuple(found)
+class _Screen:
+    """Prints what the processes print, with the time since the first match."""
+
+    def __init__(self) -> None:
+        self._began_s: float | None = None
+
+    def __call__(self, _scenario: str, event: Mapping[str, Any]) -> None:
+        """Print an event of the run."""
+        if event["event"] == "launching":
+            _say("rosgrade", f"starting {event['process']}")
+        elif event["event"] == "matched":
+            self._began_s = time.monotonic()
+        elif event["event"] == "printed":
+            at_s = None if self._began_s is None else time.monotonic() - self._began_s
+            _say(event["process"].rpartition("/")[2], clean(event["text"]), at_s)
+
+
+def _tell(recording: Recording) -> int:
+    """Print the messages and how it ended; the exit code."""
+    for topic in sorted({one.topic for one in recording.student_endpoints(Kind.PUBLISHER)}):
+        messages = recording.on(topic)
+        seconds: Counter[int] = Counter()
+        for message in messages:
+            at_s = (message.stamp_ns - began_ns(recording)) / NS
+            seconds[int(at_s)] += 1
+            if seconds[int(at_s)] <= _MOST_SHOWN:
+                _say(topic, _written(message.value), at_s)
+        _say("rosgrade", f"{len(messages)} messages on {topic}")
+    if recording.ending is Ending.EXITED:
+        codes = ", ".join(str(process.exit_code) for process in recording.processes)
+        _say("rosgrade", f"the node has ended by itself (exit code {codes})")
+    missed = [wait.what for wait in recording.waits if wait.met_ns is None]
+    for what in missed:
+        _say("rosgrade", f"waited in vain for {what}")
+    return 0 if recording.ending is Ending.UNTIL and not missed else 1
+
+
+def _say(source: str, text: str, at_s: float | None = None) -> None:
+    at = "" if at_s is None else f"{at_s:.3f} s"
+    print(f"{at:>10}  {source}  {text}", flush=True)
+
+
+def _written(value: Any) -> str:
+    """A message in one line, as YAML writes it."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{name}: {_written(item)}" for name, item in value.items()) + "}"
+    return f"{value:.6g}" if isinstance(value, float) else one_line(str(value))

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from grader.errors import GraderFault
-from grader.recording.fact import to_json
 from grader.recording.interface import definition_finder
 from grader.recording.mcap_writer import write_recording
+from grader.recording.model import to_json
 from grader.ros import RosInstallation
 from grader.run.admission import Admission
 from grader.run.cell.cell_process import SCRATCH, CellProcess

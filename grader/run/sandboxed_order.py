@@ -25,7 +25,7 @@ from grader.sandbox.seccomp import guard_filter, guarded_calls, student_filter
 
 _UID = 1000
 _PASSWD = f"student:x:{_UID}:{_UID}::{HOME}:/bin/sh\n"
-_FILTER, _GUARD, _UNHEARD = "student.bpf", "guard.bpf", "unheard.bpf"
+_FILTER, _UNGUARDED, _GUARD = "student.bpf", "unguarded.bpf", "guard.bpf"
 _WORLD, _PASSWD_FILE = "world.yaml", "passwd"
 _SYSTEM = "system"
 
@@ -50,8 +50,8 @@ def sandboxed(
             seen[str(path)] = f"{WORKSPACE}/{place}"
     for program, name in (
         (student_filter(guarded=True), _FILTER),
+        (student_filter(), _UNGUARDED),
         (guard_filter(), _GUARD),
-        (guard_filter(heard=False), _UNHEARD),
     ):
         shutil.copyfile(sandbox.filter_file(program), folder / name)
     (folder / _PASSWD_FILE).write_text(_PASSWD, encoding="utf-8")
@@ -75,8 +75,8 @@ def sandboxed(
         process_sandbox=ProcessSandbox(
             arguments=(*_arguments(sandbox, ros, binds), "--chdir", HOME),
             filter=str(CELL / _FILTER),
+            unguarded=str(CELL / _UNGUARDED),
             guard=str(CELL / _GUARD),
-            unheard=str(CELL / _UNHEARD),
             calls=guarded_calls(),
             limits=limits,
             folders={inside: in_cell[outside] for outside, inside in seen.items()},

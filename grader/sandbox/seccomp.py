@@ -141,7 +141,7 @@ def student_filter(*, one_session: bool = False, guarded: bool = False) -> bytes
 
 
 @cache
-def guard_filter(*, heard: bool = True) -> bytes:
+def guard_filter() -> bytes:
     """Assemble the filter around a student's sandbox, which asks a guard before it refuses.
 
     It is in force while bubblewrap makes the sandbox, so it holds only calls that bubblewrap
@@ -157,11 +157,10 @@ def guard_filter(*, heard: bool = True) -> bytes:
         # Signal 0 only asks whether the process is there.
         _add(rules, seccomp.NOTIFY, name, at_init, seccomp.Arg(place, seccomp.NE, 0))
     _add(rules, seccomp.NOTIFY, "pidfd_open", at_init)
-    if heard:
-        for name, place, values, mask in _WAYS:
-            for value in values:
-                argument = seccomp.Arg(place, seccomp.MASKED_EQ, mask, value)
-                _add(rules, seccomp.NOTIFY, name, argument)
+    for name, place, values, mask in _WAYS:
+        for value in values:
+            argument = seccomp.Arg(place, seccomp.MASKED_EQ, mask, value)
+            _add(rules, seccomp.NOTIFY, name, argument)
     return _program(rules)
 
 

@@ -17,11 +17,7 @@ from grader.submission.read.code_facts import Lint, SourceFile
 
 @dataclass(frozen=True)
 class SourceError:
-    """A mistake at a place in the student's files.
-
-    Attributes:
-        line: Line from 1, or None where none is known.
-    """
+    """A mistake at a place in the student's files; lines count from 1."""
 
     file: str
     line: int | None
@@ -38,8 +34,7 @@ class Import:
     """A Python module that a package's code imports.
 
     Attributes:
-        module: Top-level module name, such as ``geometry_msgs``.
-        line: Line from 1.
+        module: Top-level name, such as ``geometry_msgs``.
         optional: Guarded by ``try`` or ``if TYPE_CHECKING``: the code runs without it.
     """
 
@@ -70,8 +65,7 @@ class Dependency:
 class Definition:
     """The definition of an interface, or a file that seems to be meant as one.
 
-    Attributes:
-        file: Path in the submission; of a generated one below ``share/<package>``.
+    The file of a generated one is relative to ``share/<package>``.
     """
 
     file: str
@@ -87,23 +81,20 @@ class PackageRecord:
         build_type: ``ament_python``, ``ament_cmake``, ...
         manifest_error: Why package.xml cannot be used (broken XML, invalid e-mail), or None.
         imports: What its Python code imports; tests, launch files and setup.py left aside.
-        ros_imports: Those of ``imports`` that belong to a ROS package, with that package's
-            name in ``module``; of several that provide a module the one that is declared.
-        newer_syntax: Other files, that the Python here cannot parse, but that of ROS 2 Jazzy can.
-        entry_points: console_scripts of setup.py or setup.cfg: executable -> ``module:function``.
+        ros_imports: Those that belong to a ROS package, with its name in ``module``.
+        newer_syntax: Other files, that only the Python of ROS 2 Jazzy can parse.
+        entry_points: console_scripts: executable -> ``module:function``.
         executables: What the build installed for ``ros2 run``, in ``lib/<package>/``.
-        misplaced_executables: What it installed in ``bin/`` instead, where ``ros2 run`` does
-            not look (a missing or wrong setup.cfg).
-        missing_targets: Executables whose ``module:function`` does not exist in the package,
-            with what is wrong.
+        misplaced_executables: What it installed in ``bin/`` instead (a wrong setup.cfg).
+        missing_targets: Executables whose ``module:function`` does not exist, with what is wrong.
         files: Python files as installed -> path in the submission; relative to site-packages
             (``bot_publisher/node.py``), or ``lib/<package>/...`` for scripts.
         groups: Groups that package.xml makes it a member of (REP-149).
-        cmake: Its CMakeLists.txt, or None where it has none.
+        cmake: Its CMakeLists.txt, or None.
         definitions: Its ``.msg``, ``.srv`` and ``.action`` files, and others beside them.
         registered: Whether ROS finds what was installed, in ament's index of packages.
         sources: What its Python code says; tests, launch files and setup.py left aside.
-        lint: What ruff said of the same files, or None where it was not asked.
+        lint: What ruff says of the same files, or None where it did not run.
     """
 
     name: str
@@ -138,12 +129,10 @@ class BuildRecord:
     """What ``colcon build`` did.
 
     Attributes:
-        succeeded: colcon's exit status was 0 and it built every package.
         duration_s: Wall time of the build when it ran, also when taken from the cache now.
         failed_packages: Packages that failed, or that colcon never began.
-        lacking: Packages of ROS 2 Jazzy that CMake did not find, because they are not installed
-            where this was built.
-        culprit: The student's file and line that the log blames first, or None.
+        lacking: Packages that CMake did not find, because this machine does not have them.
+        culprit: The student's file and line that the log names first, or None.
         log: The end of colcon's output, student's paths mapped back, at most 64 KiB.
     """
 

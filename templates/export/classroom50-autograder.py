@@ -1,6 +1,6 @@
 """The autograder of a Classroom 50 assignment; its runner starts this in the student's checkout.
 
-Goes into CLASSROOM/autograders/@SLUG@/ together with the folder rosgrade beside it.
+Goes into CLASSROOM/autograders/@ASSIGNMENT@/ together with the folder rosgrade beside it.
 """
 
 import subprocess

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader import docs, resources
-from grader.assignment.lesson_checks import all_checks
-from grader.assignment.own_check import load_own_check
+from grader.assignment.own_check import all_checks, load_own_check
 from grader.checks.check import Check
 from grader.checks.finding import Evidence, Finding
 from grader.recording.interaction import Goal

@@ -213,24 +213,6 @@ def test_checks_of_the_same_title_say_what_each_is_about(
 
 
 @pytest.mark.parametrize(
-    ("until", "said"),
-    [
-        (
-            "{quiet: 5 s}",
-            "until.quiet: 5 s can never pass before the timeout of 5 s ends the scenario",
-        ),
-        (
-            "{elapsed: 1 min}",
-            "until.elapsed: 60 s can never pass before the timeout of 5 s ends the scenario",
-        ),
-    ],
-)
-def test_an_end_that_never_comes_is_a_mistake(found: Found, until: str, said: str) -> None:
-    text = GOOD.replace("timeout: 5 s", f"timeout: 5 s\n    until: {until}")
-    assert found(text) == [f"12: scenarios[0].{said}"]
-
-
-@pytest.mark.parametrize(
     ("key", "said"),
     [
         ("robot: {pose: [0, 0, 0 deg]}", "robot: there is a simulated robot only in a 'world'"),

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.checks.log.logged import logged
+from grader.checks.log.log_content import logged
 from grader.recording.model import Ending
 from tests.checks.builder import (
     at,

@@ -138,7 +138,7 @@ class TestPublished:
     def test_the_right_type_on_another_topic(self):
         run = with_endpoints(endpoint("/turtle1/drive"))
         found = failing("topic.published", run, topic="/cmd_vel")
-        assert "the type is right, but the name is another one" in found
+        assert "the type is right on `/turtle1/drive`" in found
         assert "`/turtle1/drive`" in found
 
     def test_something_else_altogether(self):

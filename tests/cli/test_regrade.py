@@ -16,8 +16,8 @@ from grader.batch.files import write_graded
 from grader.batch.grading import RECORDINGS_FOLDER, SUBMISSION_FILE, Graded
 from grader.batch.ledger import Entry, Ledger
 from grader.grade import grade
-from grader.recording.fact import to_json
 from grader.recording.mcap_writer import write_recording
+from grader.recording.model import to_json
 from grader.report.model.facts import Clock
 from grader.submission.prepare import Prepared
 from grader.submission.record import SubmissionRecord

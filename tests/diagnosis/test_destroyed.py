@@ -22,7 +22,6 @@ from tests.checks.builder import (
     reader,
     recording,
     sent,
-    silent,
     stimulus,
     taken,
 )
@@ -46,11 +45,6 @@ def deaf(**changes):
     return recording(**{"endpoints": (gone(LISTENER), endpoint(), reader(), stimulus()), **changes})
 
 
-def test_a_subscription_that_was_destroyed_before_anything_was_sent():
-    found = failing("timing.latency", deaf(sent={"/chatter": ()}), **LATENCY)
-    assert f"the subscription to `/chatter` {WORDS}" in found
-
-
 def test_a_subscription_that_was_destroyed_after_the_first_messages():
     # At any load: what was sent after it cannot have been answered.
     slow = taken(0.5, 2.6, waited_s=1.0)
@@ -63,14 +57,6 @@ def test_a_subscription_that_was_destroyed_after_the_first_messages():
 def test_a_subscription_that_was_destroyed_after_what_was_sent_before_the_launch():
     found = failing("log.follows", deaf(sent=FIRST_TEN), **LOGGED)
     assert f"the subscription to `/chatter` {WORDS}" in found
-
-
-def test_a_publisher_that_was_destroyed():
-    ends = (gone(endpoint()), reader())
-    for run in (silent(endpoints=ends), recording(endpoints=ends, messages=messages([0.7, 0.8]))):
-        assert f"the publisher on `/cmd_vel` {WORDS}" in failing(
-            "messages.count", run, topic="/cmd_vel", at_least=5
-        )
 
 
 def test_a_publisher_that_was_destroyed_before_somebody_joined():

@@ -5,17 +5,13 @@ from dataclasses import replace
 import pytest
 
 from grader.diagnosis.exchanged_executables import why_exchanged
-from grader.recording.model import Kind
 from tests.checks.builder import (
     BOT,
-    endpoint,
     failing,
     node,
     package,
     process,
-    reader,
     recording,
-    silent,
     submission,
 )
 
@@ -35,17 +31,6 @@ def test_a_node_of_the_other_executable():
     assert "super().__init__" not in said
 
 
-def test_an_endpoint_of_the_other_executable():
-    other = silent(
-        endpoints=(endpoint(kind=Kind.SUBSCRIPTION), reader()),
-        declarations=(),
-        processes=(process(BOT),),
-    )
-    said = failing("topic.published", with_entries(other, **EXCHANGED), topic="/cmd_vel")
-    assert "the executable `bot_pub` runs `bot_publisher.bot_sub:main`" in said
-    assert "create_subscription" not in said
-
-
 @pytest.mark.parametrize(
     "entries",
     [
@@ -62,12 +47,6 @@ def test_what_runs_its_own_is_not_blamed(entries):
 def test_where_both_run_neither_is_blamed():
     both = recording(processes=(process(BOT), process("bot_publisher/bot_sub")))
     assert why_exchanged(with_entries(both, **EXCHANGED)) is None
-
-
-def test_a_service_of_the_other_executable():
-    run = with_entries(recording(nodes=(node("/bot_sub"),), declarations=(), calls=()), **EXCHANGED)
-    said = failing("service.exists", run, service="/enable")
-    assert "the executable `bot_pub` runs `bot_publisher.bot_sub:main`" in said
 
 
 def test_one_function_for_two_executables():

@@ -6,9 +6,16 @@ from dataclasses import replace
 
 import pytest
 
-from grader.diagnosis.process.missing_library import lacking_package, library_hint
+from grader.diagnosis.process import missing_library
+from grader.diagnosis.process.missing_library import library_hint
+from grader.diagnosis.process.raised import Failure
 from grader.recording.model import Ending, Recording
 from grader.submission.record import PackageRecord, SubmissionRecord
+
+
+def lacking_package(message: str, recording: Recording) -> str | None:
+    failure = Failure("ModuleNotFoundError", message, ())
+    return missing_library.lacking_package(failure, recording)
 
 
 def run(libraries: str | None = "numpy scipy") -> Recording:

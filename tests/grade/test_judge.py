@@ -226,11 +226,11 @@ class TestOurFaults:
             ({"ending": Ending.FAULT}, "the run was ended by a fault that left no message"),
             (
                 {"scenario": "renamed"},
-                "the recording is of another scenario, 'renamed'",
+                "the recording is of another run, 'renamed' of 'ada_lovelace'",
             ),
             (
                 {"submission": make_submission(id="eve", sha256="00" * 32)},
-                "the recording is of another submission, 'eve'",
+                "the recording is of another run, 'listen' of 'eve'",
             ),
         ],
     )

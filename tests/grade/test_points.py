@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.grade.points import points_for, total
+from grader.grade.model import points_for, total
 
 
 @pytest.mark.parametrize(

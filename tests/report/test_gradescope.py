@@ -10,7 +10,8 @@ import pytest
 from grader.checks.finding import Finding
 from grader.errors import UsageError
 from grader.recording.event import Breach
-from grader.report.formats.gradescope import late_s, read_metadata, render_gradescope, unfinished
+from grader.report.formats.gradescope import read_metadata, render, unfinished
+from grader.report.formats.options import FormatOptions
 from tests.assignment.validator import valid
 from tests.grade.sample import Told
 from tests.report.sample import (
@@ -68,8 +69,8 @@ SCHEMA = {
 }
 
 
-def rendered(make, metadata=None):
-    return json.loads(render_gradescope(make().result, metadata))
+def rendered(make, **options):
+    return json.loads(render(make().result, FormatOptions(**options)))
 
 
 @pytest.mark.parametrize(
@@ -153,7 +154,7 @@ def test_limits_of_a_run_that_only_hidden_checks_judge_are_not_told():
     }
     result = judged_runs(checks, recordings).result
     assert "zq" in result.scenarios[1].breaches[0]
-    assert "zq" not in render_gradescope(result)
+    assert "zq" not in render(result)
 
 
 def test_what_is_not_graded_is_no_silent_zero():
@@ -165,41 +166,37 @@ def test_what_is_not_graded_is_no_silent_zero():
 
 
 DUE = "2026-03-04T23:59:00.000000-08:00"
+EXTENSION = [{"assignment": {"due_date": "2026-03-06T23:59:00-08:00"}}]
 
 
 @pytest.mark.parametrize(
-    ("created", "late"),
+    ("created", "due", "users", "late"),
     [
-        ("2026-03-04T23:58:59.000000-08:00", 0.0),
-        ("2026-03-05T08:59:00.000000+00:00", 3600.0),
-        ("2026-03-05T08:59:00Z", 3600.0),
+        ("2026-03-04T23:58:59.000000-08:00", DUE, [{"name": "Ada"}], 0.0),
+        ("2026-03-05T08:59:00.000000+00:00", DUE, [{"name": "Ada"}], 3600.0),
+        ("2026-03-05T08:59:00Z", DUE, [], 3600.0),
+        ("2026-03-05T12:00:00-08:00", DUE, EXTENSION, 0.0),
+        (DUE, None, [], None),
     ],
 )
-def test_lateness_is_counted_from_the_submission_and_never_from_now(created, late):
-    metadata = {"created_at": created, "assignment": {"due_date": DUE}, "users": [{"name": "Ada"}]}
-    assert late_s(metadata) == late
-    assert rendered(full_points, metadata)["extra_data"]["late_s"] == late
+def test_lateness_is_counted_from_the_submission_and_never_from_now(
+    created, due, users, late, tmp_path
+):
+    metadata = {"created_at": created, "assignment": {"due_date": due}, "users": users}
+    file = tmp_path / "submission_metadata.json"
+    file.write_text(json.dumps(metadata))
+    extra = rendered(full_points, gradescope_metadata=file)["extra_data"]
+    assert extra["late_s"] == late and extra["created_at"][:10] == created[:10]
 
 
-def test_an_extension_goes_before_the_due_date():
-    metadata = {
-        "created_at": "2026-03-05T12:00:00-08:00",
-        "assignment": {"due_date": DUE},
-        "users": [{"assignment": {"due_date": "2026-03-06T23:59:00-08:00"}}],
-    }
-    assert late_s(metadata) == 0.0
-
-
-def test_without_a_due_date_nothing_is_late():
-    assert late_s({"created_at": DUE, "assignment": {"due_date": None}}) is None
-
-
-def test_a_time_that_is_none_is_named():
-    with pytest.raises(UsageError, match="created_at 'soon' and due_date"):
-        late_s({"created_at": "soon", "assignment": {"due_date": DUE}})
-
-
-@pytest.mark.parametrize(("text", "said"), [("{", "is not JSON"), ("[]", "no object in it")])
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "is not JSON"),
+        ("[]", "is not Gradescope's submission_metadata.json"),
+        ('{"created_at": "soon"}', "created_at"),
+    ],
+)
 def test_metadata_that_is_none_is_named(text, said, tmp_path):
     file = tmp_path / "submission_metadata.json"
     file.write_text(text)

@@ -14,9 +14,7 @@ from grader import resources
 from grader.checks.finding import Finding
 from grader.recording.event import Breach
 from grader.recording.model import LogLine
-from grader.report.formats import github
-from grader.report.formats.gradescope import render_gradescope
-from grader.report.formats.junit import render_junit
+from grader.report.formats import github, gradescope, junit
 from grader.report.formats.markdown import render_markdown
 from grader.report.html.page import compiled_templates
 from tests.grade.sample import FAIL, Told
@@ -38,8 +36,8 @@ FORMATS = {
     "terminal": Sample.printed,
     "html": Sample.html,
     "markdown": lambda sample: render_markdown(sample.result),
-    "junit": lambda sample: render_junit(sample.result),
-    "gradescope": lambda sample: render_gradescope(sample.result),
+    "junit": lambda sample: junit.render(sample.result),
+    "gradescope": lambda sample: gradescope.render(sample.result),
     "github": lambda sample: "\n".join(github.annotation_lines(sample.result)),
 }
 ATTACKS = [

@@ -12,7 +12,8 @@ import pytest
 import xmlschema
 
 from grader.checks.finding import Evidence, Finding
-from grader.report.formats.junit import render_junit
+from grader.report.formats.junit import render
+from grader.report.formats.options import FormatOptions
 from tests.grade.sample import FAIL, Told
 from tests.report.sample import (
     everywhere,
@@ -41,7 +42,7 @@ def jenkins() -> xmlschema.XMLSchema:
 
 
 def rendered(make, **options):
-    return render_junit(make().result, **options)
+    return render(make().result, FormatOptions(**options))
 
 
 def cases_of(text):

@@ -20,10 +20,10 @@ from grader.report.drawing.path import Target, draw_path
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import simplified
 from grader.report.drawing.timeline import draw_timeline
-from grader.report.html.comparison import align
+from grader.report.html.comparison import SIGNS, align
 from grader.report.html.qos_table import pairs
 from grader.report.html.report import Gallery, build_lines
-from grader.report.model.result_model import BuildPart, PlacePart, PlotPart
+from grader.submission.record import BuildRecord, SourceError
 from sim.motion import Pose
 from tests.checks.builder import drive, endpoint, node, on_odometry, reader, recording
 from tests.report.gallery import CALLS, CASES, DEFINITION, ahead_until
@@ -217,7 +217,7 @@ class TestCases:
 class TestComparison:
     def test_lines_are_put_beside_each_other_by_what_they_say(self):
         rows = align(DEFINITION)
-        assert [(row.kind, row.sign) for row in rows] == [
+        assert [(row.kind, SIGNS[row.kind]) for row in rows] == [
             ("changed", "≠"),
             ("same", ""),
             ("missing", "−"),
@@ -225,8 +225,8 @@ class TestComparison:
             ("extra", "+"),
         ]
         changed = rows[0]
-        assert [piece.text for piece in changed.expected if piece.differs] == ["1"]
-        assert [piece.text for piece in changed.observed if piece.differs] == ["0"]
+        assert [text for text, differs in changed.expected if differs] == ["1"]
+        assert [text for text, differs in changed.observed if differs] == ["0"]
 
     @given(st.lists(st.text("ab \n", max_size=5)), st.lists(st.text("ab \n", max_size=5)))
     def test_no_line_is_lost(self, expected, observed):
@@ -263,33 +263,17 @@ class TestBuildLog:
             "Failed",
         ]
         log = "\n".join([*(f"noise {i}" for i in range(50)), *told])
-        culprit = PlacePart(
-            file="src/b/setup.py", line=7, message="SyntaxError: '{' was never closed"
-        )
-        found = build_lines(build(culprit, log))
+        culprit = SourceError("src/b/setup.py", 7, "SyntaxError: '{' was never closed")
+        found = build_lines(BuildRecord(False, 1.0, culprit=culprit, log=log))
         hits = [text for text, hit in found if hit]
         assert hits == ['File "src/b/setup.py", line 7', "SyntaxError: '{' was never closed"]
         assert len(found) < 15
 
     def test_a_log_that_does_not_tell_is_shown_as_it_is(self):
-        assert build_lines(build(None, "Failed <<< bot")) == []
+        assert build_lines(BuildRecord(False, 1.0, log="Failed <<< bot")) == []
 
 
-def build(culprit, log):
-    return BuildPart(
-        succeeded=False,
-        duration_s=1.0,
-        cached=False,
-        timed_out=False,
-        failed_packages=("b",),
-        culprit=culprit,
-        log=log,
-    )
-
-
-SPEED = PlotPart(
-    title="Speed", x_label="t (s)", y_label="v (m/s)", x=(0.0, 1.0), y=(0.0, 0.1), band=None
-)
+SPEED = Plot("Speed", "t (s)", "v (m/s)", (0.0, 1.0), (0.0, 0.1))
 
 
 def test_the_same_plot_of_the_same_run_is_drawn_once():

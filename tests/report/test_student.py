@@ -14,12 +14,11 @@ from grader.assignment.selection import visible_part
 from grader.checks.check import Subject
 from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
 from grader.grade import grade
-from grader.report.formats import classroom50, github
+from grader.report.formats import classroom50, github, gradescope, junit
 from grader.report.formats.foxglove import render_layout
 from grader.report.formats.gradebook import grades_csv
-from grader.report.formats.gradescope import render_gradescope
-from grader.report.formats.junit import render_junit
 from grader.report.formats.markdown import render_markdown
+from grader.report.formats.options import FormatOptions
 from grader.report.html.report import render_report
 from grader.report.model.class_row import ClassRow
 from grader.report.model.result import result_json
@@ -117,7 +116,7 @@ def formats_of(result):
     """Every text that is made for students from a whole result."""
     copy = for_student(result)
     yield result_json(copy)
-    yield render_junit(copy, xunit1=True)
+    yield junit.render(copy, FormatOptions(xunit1=True))
     yield render_markdown(copy)
     yield grades_csv([ClassRow(copy.submission.id, result=copy)])
     yield from github.annotation_lines(result)
@@ -126,10 +125,10 @@ def formats_of(result):
     yield classroom50.render_release(result)
     if copy.graded:
         yield classroom50.render_result(result, IDENTITY, "2026-06-01T14:32:01Z")
-    gradescope = json.loads(render_gradescope(result))
-    hidden_by_gradescope = [t for t in gradescope["tests"] if t["visibility"] != "visible"]
-    gradescope["tests"] = [t for t in gradescope["tests"] if t not in hidden_by_gradescope]
-    yield json.dumps(gradescope)
+    data = json.loads(gradescope.render(result))
+    # Gradescope itself hides the others.
+    data["tests"] = [test for test in data["tests"] if test["visibility"] == "visible"]
+    yield json.dumps(data)
 
 
 @settings(max_examples=60, deadline=None)

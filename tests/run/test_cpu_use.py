@@ -15,8 +15,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.run.host.cpu_use import CpuMeter, CpuTimes, Interval, idle_ticks, interval, others_share
-from grader.run.host.disturbance import DisturbanceMeter, run_delays
+from grader.run.host.disturbance import (
+    CpuMeter,
+    CpuTimes,
+    DisturbanceMeter,
+    Interval,
+    idle_ticks,
+    interval,
+    others_share,
+    run_delays,
+)
 from grader.run.process.descendants import descendant_pids
 
 MS = 1_000_000

@@ -19,7 +19,7 @@ INIT, OTHER = 1, 2
 
 @pytest.fixture
 def guard() -> Iterator[Guard]:
-    guard = Guard(guard_filter(), CALLS, guard_filter(heard=False))
+    guard = Guard(guard_filter(), CALLS)
     yield guard
     guard.close()
 

@@ -15,7 +15,7 @@ from grader import ros
 from grader.errors import UsageError
 from grader.recording.mcap_reader import read_inputs, read_recording
 from grader.recording.model import NS
-from grader.run.replay import make_order
+from grader.run.replay import replay_scenario
 from grader.run.runner import Runner
 from grader.scratch import PREFIX
 from tests.recording.written import write_robot_run
@@ -69,11 +69,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return file, place
 
 
-def replay(*arguments: Path) -> subprocess.Popen[str]:
+def replay(file: Path, place: Path, temporary: Path) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "tests.run.one_replay", *map(str, arguments)],
+        [sys.executable, "-m", "tests.run.one_replay", str(file), str(place)],
         cwd=ROOT,
-        env={**os.environ, "TMPDIR": str(arguments[-1].parent)},
+        env={**os.environ, "TMPDIR": str(temporary)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -88,7 +88,7 @@ def test_a_node_hears_the_same_words_never_earlier_than_then(
     recording = read_recording(file)
     given = read_inputs(file, recording)
     assert [message.cdr[8:9].decode() for message in given] == WORDS
-    player = replay(file, place, tmp_path / "home")
+    player = replay(file, place, tmp_path)
     told, _ = player.communicate(timeout=60)
     assert player.returncode == 0, told
     heard = re.findall(r"^ *([\d.]+) s  bot_pub  heard (\w)$", told, re.MULTILINE)
@@ -104,7 +104,7 @@ def test_a_node_hears_the_same_words_never_earlier_than_then(
 @pytest.mark.ros
 def test_ctrl_c_ends_the_node_and_leaves_nothing(run: tuple[Path, Path], tmp_path: Path) -> None:
     file, place = run
-    player = replay(file, place, tmp_path / "home")
+    player = replay(file, place, tmp_path)
     assert player.stdout is not None
     for line in player.stdout:
         if "heard a" in line:
@@ -121,7 +121,7 @@ def test_ctrl_c_ends_the_node_and_leaves_nothing(run: tuple[Path, Path], tmp_pat
 def test_a_node_that_never_listens_is_told(run: tuple[Path, Path], tmp_path: Path) -> None:
     file, _ = run
     place = install(tmp_path, "import time\nprint('no robot today', flush=True)\n")
-    player = replay(file, place, tmp_path / "home")
+    player = replay(file, place, tmp_path)
     told, _ = player.communicate(timeout=60)
     assert player.returncode == 1
     assert "bot_pub  no robot today" in told
@@ -131,13 +131,13 @@ def test_a_node_that_never_listens_is_told(run: tuple[Path, Path], tmp_path: Pat
 def test_without_inputs_there_is_nothing_to_replay(tmp_path: Path) -> None:
     recording = write_robot_run(tmp_path / "run.mcap")
     with pytest.raises(UsageError, match=r"run\.mcap: nothing was published to the node"):
-        make_order(tmp_path / "run.mcap", recording, assignment(), ros.find(), tmp_path, tmp_path)
+        replay_scenario(tmp_path / "run.mcap", recording, assignment())
 
 
 def test_a_scenario_that_is_no_longer_there_is_named(tmp_path: Path) -> None:
     recording = write_robot_run(tmp_path / "run.mcap", scenario="walk")
     with pytest.raises(UsageError, match="the assignment 'test' has no scenario 'walk'"):
-        make_order(tmp_path / "run.mcap", recording, assignment(), ros.find(), tmp_path, tmp_path)
+        replay_scenario(tmp_path / "run.mcap", recording, assignment())
 
 
 def _running(fragment: str) -> list[bytes]:

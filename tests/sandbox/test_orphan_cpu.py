@@ -9,8 +9,7 @@ import sys
 
 import pytest
 
-from grader.sandbox.orphan_cpu import OrphanCpu, Process, Taken
-from grader.sandbox.usage import CpuAccount, usage_of
+from grader.sandbox.usage import CpuAccount, OrphanCpu, Process, Taken, usage_of
 
 PARENT, CHILD, OTHER = Process(10, 1), Process(11, 2), Process(12, 3)
 # Two at a time, each for 100 ms of CPU time.

@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.errors import GraderFault
 from grader.submission.build import bounded
 from grader.submission.build.bounded import CappedOutput, Outcome, OutputLimits, run_bounded
 
@@ -49,7 +48,7 @@ def test_output_and_exit_status_are_told(tmp_path: Path) -> None:
     assert outcome.ended_by_us is None
 
 
-def test_what_is_written_while_nobody_could_read_is_read(
+def test_what_is_written_until_the_end_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on a busy machine, where the reader comes to itself when all has ended."""
@@ -109,39 +108,6 @@ print('done')
 """
 
 
-def test_a_look_that_takes_long_prolongs_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(bounded, "_FROZEN_S", 0.2)
-    outcome = run_bounded(
-        [sys.executable, "-I", "-S", "-c", "import time; time.sleep(10)"],
-        cwd=tmp_path,
-        environment={},
-        wall_s=1.0,
-        excess=lambda _: time.sleep(0.4),
-    )
-    assert outcome.ended_by_us == "time"
-
-
-def test_time_in_which_we_were_stopped_does_not_count(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    real, stopped = time.monotonic, [0.0]
-
-    def on_line(_: str) -> None:
-        stopped[0] = 100.0
-
-    monkeypatch.setattr(time, "monotonic", lambda: real() + stopped[0])
-    outcome = run_bounded(
-        [sys.executable, "-I", "-S", "-c", "import time; print(flush=True); time.sleep(1)"],
-        cwd=tmp_path,
-        environment={},
-        wall_s=20.0,
-        on_line=on_line,
-    )
-    assert (outcome.status, outcome.ended_by_us) == (0, None)
-
-
 def test_a_daemon_that_holds_the_output_is_killed_and_not_waited_for(tmp_path: Path) -> None:
     started = time.monotonic()
     outcome = run(DAEMON, tmp_path)
@@ -172,9 +138,9 @@ def test_lines_are_told_while_it_runs(tmp_path: Path) -> None:
     assert len(lines) == 2
 
 
-def test_a_command_that_kills_who_watches_over_it_is_our_fault_not_a_result(tmp_path: Path) -> None:
-    with pytest.raises(GraderFault, match="watches over"):
-        run("import os, time; os.kill(os.getppid(), 9); time.sleep(0.2)", tmp_path)
+def test_a_command_that_kills_its_supervisor_has_no_success(tmp_path: Path) -> None:
+    outcome = run("import os, time; os.kill(os.getppid(), 9); time.sleep(0.2)", tmp_path)
+    assert outcome.status == -9
 
 
 def test_a_program_that_does_not_exist_says_so(tmp_path: Path) -> None:

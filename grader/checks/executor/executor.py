@@ -1,4 +1,4 @@
-"""Checks of the executor: whether callbacks block it."""
+"""Checks of the executor: whether callbacks block it, and whether a timer calls what publishes."""
 
 from __future__ import annotations
 
@@ -10,19 +10,21 @@ from pydantic import Field, field_validator
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.doubt import was_held_up
 from grader.checks.finding import Evidence, Finding, Moment, Plot
-from grader.checks.first_seen import nodes_seen
+from grader.checks.first_seen import first_seen, nodes_seen
 from grader.checks.need import Doubt
 from grader.checks.node.node import target_nodes
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s, why_never_spun
 from grader.diagnosis.process.process_exit import ended_early, why_ended, why_it_exited
 from grader.diagnosis.process.raised import interrupted_place
+from grader.diagnosis.undeclared import why_undeclared
 from grader.measure import declarations
 from grader.recording.interaction import EXECUTOR_SERVICES, executor_services
 from grader.recording.model import NS, Call, Kind, Recording
-from grader.spec.name import QualifiedNodeName
+from grader.spec.name import QualifiedNodeName, TopicName
 from grader.spec.quantity import Duration, Ratio
 from grader.spec.unit import format_duration
 
@@ -31,6 +33,14 @@ _MOST_MOMENTS = 5
 _LONG_NS = NS
 _MOST_HELD_NS = 3 * NS
 """Longer than the tracer holds a publisher; a process could declare any time."""
+# How the tracer names a callback that is None: create_rate() makes a timer that calls nothing.
+_NOTHING = "NoneType"
+_HINT = (
+    "A thread or a loop that sleeps adds what its work takes to every period, and goes on where "
+    "the executor has stopped. Create a timer in the constructor, "
+    "self.timer = self.create_timer(period, self.callback) with the period in seconds, publish in "
+    "its callback, and call rclpy.spin(node) in main()."
+)
 
 
 class Responsive(Parameters):
@@ -220,7 +230,7 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
             evidence,
         )
     processes = () if process is None else (process,)
-    never_spun = why_never_spun(recording, seen, (group.node,), processes, evidence.moments)
+    never_spun = why_never_spun(recording, seen, (group.node,), processes)
     if never_spun is not None:
         return never_spun
     place = interrupted_place(recording, process.name) if process is not None else None
@@ -311,3 +321,52 @@ def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
         ),
         plots=(plot,) if answered else (),
     )
+
+
+class Timer(Parameters):
+    """Parameters of executor.timer."""
+
+    doubt = Doubt.ANSWER_MISSED
+
+    topic: TopicName = Field(description="Topic on which the callback of a timer publishes.")
+
+
+@check("executor.timer", Subject.RECORDING, Timer)
+def timer(recording: Recording, parameters: Timer) -> Finding:
+    """The process has a timer.
+
+    Messages of a thread that sleeps look like those of a timer, so this is judged by what the
+    process declared: a process that created its publisher on the topic and no timer at all does
+    not publish in the callback of one. Any timer with a callback will do, whatever its period.
+    Where the process did not declare its publisher either, it is an error, which costs no point.
+    """
+    expected = f"a timer, in whose callback the node publishes on {code(parameters.topic)}"
+    messages = recording.on(parameters.topic)
+    if not messages:
+        return why_silent(recording, parameters.topic).finding(expected)
+    if not declarations.declares(recording, "publisher", "topic", parameters.topic):
+        cause = why_undeclared(recording, f"the publisher on {code(parameters.topic)}")
+        return cause.finding(expected)
+    timers = declarations.timers(recording)
+    calling = [item for item in timers if item.callback != _NOTHING]
+    number = f"{counted(len(messages), 'message was', 'messages were')} published"
+    if declarations.not_in_callback(recording, parameters.topic):
+        observed = f"{number}, outside of every callback: a thread or a loop calls publish()"
+    elif calling:
+        name = f", which calls {code(calling[0].callback)}" if calling[0].callback else ""
+        created_s = recording.since_launch_s(calling[0].declared_ns)
+        return Finding.passed(
+            expected,
+            f"the process declared a timer of {format_duration(calling[0].period_s)}{name}",
+            Evidence(moments=(Moment("timer created", created_s),)),
+        )
+    elif declarations.timer_of_zero(recording):
+        return Finding.passed(expected, "the process declared a timer")
+    else:
+        rate = " but that of a rate, which calls nothing" if timers else ""
+        observed = (
+            f"{number}, but the process declared no timer{rate}: something else calls publish(), "
+            "such as a thread or a loop"
+        )
+    evidence = Evidence(moments=first_seen(recording, messages))
+    return Finding.failed(expected, observed, _HINT, evidence)

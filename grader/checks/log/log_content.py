@@ -1,24 +1,24 @@
-"""Checks of what loggers say: at which level, with which words, how often."""
+"""Checks of the records of loggers: at which level, with which words, how often."""
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
 
 from pydantic import AfterValidator, Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment
 from grader.checks.first_seen import until_the_end
-from grader.checks.log.logged import LEVELS, Logged, logged, printed
 from grader.checks.wording import code, counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_node import why_no_node, why_not_node
 from grader.diagnosis.process.blocked_executor import left_s, why_not_called
 from grader.diagnosis.process.process_exit import why_ended
 from grader.diagnosis.wrong_rhythm import why_paused
-from grader.measure.printed import quote
+from grader.measure.printed import logged_text, quote
 from grader.recording.model import NS, Recording
 from grader.spec.name import QualifiedNodeName
 from grader.spec.nearest_name import nearest
@@ -26,10 +26,48 @@ from grader.spec.quantity import Frequency, Ratio
 from grader.spec.unit import format_duration
 
 Level = Literal["DEBUG", "INFO", "WARN", "ERROR", "FATAL"]
+LEVELS = get_args(Level)
 
 _SHOWN = 5
 # At the end of a run one record may be due, and one on its way.
 _SILENT_PERIODS = 2.0
+_LINE = re.compile(
+    r"\[(?P<level>[A-Z]+)\] \[(?P<s>\d{1,12})\.(?P<ns>\d{9})\] \[(?P<logger>[^\]]*)\]: ?"
+)
+
+
+@dataclass(frozen=True)
+class Logged:
+    """One record of a logger.
+
+    Attributes:
+        logger: Name, such as ``bot`` or ``robot.bot``.
+    """
+
+    time_ns: int
+    logger: str
+    level: str
+    text: str
+
+
+def logged(recording: Recording) -> tuple[Logged, ...]:
+    """Every record of a logger until the end of the observation, oldest first."""
+    found = [
+        Logged(line.time_ns, line.process, line.level, line.text)
+        for line in recording.log
+        if line.stream == "rosout"
+    ]
+    known = {(item.time_ns, item.logger) for item in found}
+    for line in recording.log:
+        match = _LINE.match(line.text) if line.stream != "rosout" else None
+        if match is None or match["level"] not in LEVELS:
+            continue
+        time_ns = int(match["s"]) * 10**9 + int(match["ns"])
+        if (time_ns, match["logger"]) not in known:
+            text = line.text[match.end() :]
+            found.append(Logged(time_ns, match["logger"], match["level"], text))
+    kept = (item for item in found if item.time_ns <= recording.stop_ns)
+    return tuple(sorted(kept, key=lambda item: item.time_ns))
 
 
 def _pattern(text: str) -> str:
@@ -154,7 +192,13 @@ def _why_lacking(recording: Recording, parameters: Matching, found: list[Logged]
     cause = cause or why_not_called(recording, seen, nodes)
     if cause is not None:
         return cause
-    lines = [line for line in printed(recording) if parameters.says(line.text)]
+    lines = [
+        line
+        for line in recording.log
+        if line.stream != "rosout"
+        and logged_text(line.text) == line.text
+        and parameters.says(line.text)
+    ]
     if lines and not found:
         moment = Moment("printed", recording.since_launch_s(lines[0].time_ns))
         return Cause(

@@ -161,11 +161,16 @@ def _failure(
         observed = f"the values are of different moments of {source}"
         hint = "Fill all fields from one message: `msg` of the callback."
     else:
-        observed = listing(
+        fields = [
             f"{code(derived.fields[index])} = {sample.values[index]:.4g} instead of "
-            f"{newest[index]:.4g}{_explanation(derived, seen, some, index)}"
+            f"{newest[index]:.4g}"
             for index in bad
-        )
+        ]
+        clauses = [_explanation(derived, seen, some, index) for index in bad]
+        if len(set(clauses)) == 1:
+            observed = listing(fields) + clauses[0]
+        else:
+            observed = listing(map("".join, zip(fields, clauses, strict=True)))
         hint = (
             f"Set {codes(derived.fields[index] for index in bad)} in the callback of {source}, "
             f"from {codes(derived.values[index].text for index in bad)} of its message."
@@ -213,9 +218,9 @@ def _explanation(
     numbers = [sample.values[index] for sample in seen]
     if not all(map(math.isfinite, numbers)):
         short = ", or not there at all: the array is too short"
-        return f": it is not a finite number{short if '[' in derived.fields[index] else ''}"
+        return f": not a finite number{short if '[' in derived.fields[index] else ''}"
     if len(numbers) > 1 and _spread(numbers) <= 0.0:
-        return ": it is always the same" if numbers[0] else ": it is always 0, and perhaps not set"
+        return ": the same number in every message"
     wrong = [sample for sample in wrong if not derived.fitting(sample.errors, index)]
     rows = sorted({row for sample in (*seen, *wrong) for row in sample.window})
     mistakes = [derived.values[index].mistakes(derived.sources[row].value) for row in rows]

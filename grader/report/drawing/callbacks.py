@@ -21,14 +21,9 @@ MOST_BARS = 400
 
 
 def draw_callbacks(spans: Sequence[Span], name: str) -> Figure | None:
-    """Draw spans of time, a row for each name.
+    """Draw spans of time, a row for each name; None where there is nothing to draw.
 
-    Args:
-        spans: In any order; those that end before they begin or beyond a run are left out.
-        name: Unique in the document; letters, digits and hyphens.
-
-    Returns:
-        The drawing, or None where there is nothing to draw.
+    Those that end before they begin or beyond a run are left out.
     """
     rows: dict[str, list[Span]] = {}
     for span in sorted(spans, key=lambda item: item.begin_s):

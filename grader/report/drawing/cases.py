@@ -31,11 +31,7 @@ CEILING = 1e9
 
 
 def draw_cases(cases: Cases, name: str) -> Figure:
-    """Draw the error of each case.
-
-    Args:
-        name: Unique in the document; letters, digits and hyphens.
-    """
+    """Draw the error of each case."""
     errors = [_power_of(case.error) for case in cases.cases if case.error is not None]
     limit = _power_of(cases.limit)
     low = math.floor(min([*errors, limit]))

@@ -17,14 +17,7 @@ APART = 14.0
 
 
 def draw_distribution(scores: Sequence[float], most: float, name: str) -> Figure | None:
-    """Draw a histogram of scores, with full points apart.
-
-    Args:
-        name: Unique in the document; letters, digits and hyphens.
-
-    Returns:
-        The drawing, or None where there is no score.
-    """
+    """Draw a histogram of scores, with full points apart; None where there is no score."""
     if not scores or most <= 0.0:
         return None
     counts = [0] * (BINS + 1)

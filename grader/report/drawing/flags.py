@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from markupsafe import Markup
@@ -33,63 +33,45 @@ class PlacedFlag:
 
     Attributes:
         x: Pixel of its leader.
+        extent: First and last pixel of its text.
         left: Whether its text lies left of the leader, because it would not fit on the right.
     """
 
     flag: Flag
     x: float
-    row: int
+    extent: tuple[float, float]
     left: bool
-
-    @property
-    def extent(self) -> tuple[float, float]:
-        """First and last pixel of its text."""
-        begin = self.x - self.flag.length if self.left else self.x
-        return begin, begin + self.flag.length
+    row: int
 
 
 def place(flags: Sequence[Flag], scale: Scale) -> list[PlacedFlag]:
     """Give every flag a row, so that no text meets another.
 
-    Texts to the right of their leaders go down from row to row as long as they would meet an
-    earlier one: a later leader then begins below the earlier text. Texts to the left mirror
-    this: the latest is on top. Where both kinds meet, all of the second lie above the first,
-    and only there a leader passes behind a text.
+    Each goes below all texts before it that it would meet: so the leader of a later one begins
+    below an earlier text. Texts to the left mirror this, the latest is on top, and they come
+    first: only there a leader passes behind a text.
 
     Args:
         flags: By time.
         scale: Seconds to pixels.
     """
+    placed: list[PlacedFlag] = []
     at = [(scale.clipped(flag.time_s), flag) for flag in flags]
-    fit = [(x, flag) for x, flag in at if x + flag.length <= scale.end]
-    others = [(x, flag) for x, flag in reversed(at) if x + flag.length > scale.end]
-    rights = _rows((x, flag.length) for x, flag in fit)
-    lefts = _rows((-x, flag.length) for x, flag in others)
-    reach = max((x + flag.length for x, flag in fit), default=float("-inf"))
-    begin = min((x - flag.length for x, flag in others), default=float("inf"))
-    offset = 1 + max(lefts) if lefts and begin < reach + GAP else 0
-    placed = [
-        PlacedFlag(flag, x, row + offset, False) for (x, flag), row in zip(fit, rights, strict=True)
-    ]
-    placed += [PlacedFlag(flag, x, row, True) for (x, flag), row in zip(others, lefts, strict=True)]
-    return sorted(placed, key=lambda item: (item.flag.time_s, item.x))
-
-
-def _rows(texts: Iterable[tuple[float, float]]) -> list[int]:
-    """A row for each text, given by begin and length: below all earlier ones that reach it."""
-    rows: list[int] = []
-    ends: list[float] = []
-    for begin, length in texts:
-        met = [row for row, end in zip(rows, ends, strict=True) if end > begin - 1]
-        rows.append(1 + max(met, default=-1))
-        ends.append(begin + length)
-    return rows
+    lefts = [(x, flag) for x, flag in reversed(at) if x + flag.length > scale.end]
+    rights = [(x, flag) for x, flag in at if x + flag.length <= scale.end]
+    for index, (x, flag) in enumerate(lefts + rights):
+        left = index < len(lefts)
+        begin, end = extent = (x - flag.length, x) if left else (x, x + flag.length)
+        met = [one.row for one in placed if one.extent[0] < end + 1 and begin - 1 < one.extent[1]]
+        placed.append(PlacedFlag(flag, x, extent, left, 1 + max(met, default=-1)))
+    return sorted(placed, key=lambda one: (one.flag.time_s, one.x))
 
 
 def draw_flags(flags: Sequence[Flag], scale: Scale, below: float) -> tuple[list[Markup], float]:
     """Draw flags with leaders that go on through what is drawn below.
 
     Args:
+        flags: By time.
         scale: Seconds to pixels.
         below: Height of what is drawn below, in pixels.
 
@@ -97,11 +79,11 @@ def draw_flags(flags: Sequence[Flag], scale: Scale, below: float) -> tuple[list[
         The elements, and the pixel at which to draw what is below.
     """
     placed = place(flags, scale)
-    top = ROW * (1 + max((item.row for item in placed), default=0)) + 6
+    top = ROW * (1 + max((one.row for one in placed), default=0)) + 6
     leaders, labels = [], []
-    for item in placed:
-        y = ROW * item.row
-        leaders.append(line(item.x, y + 4, item.x, top + below, "leader"))
-        anchor, shift = ("end", -4) if item.left else ("start", 4)
-        labels.append(label(item.flag.text, item.x + shift, y + 13, "flag", anchor))
+    for one in placed:
+        y = ROW * one.row
+        leaders.append(line(one.x, y + 4, one.x, top + below, "leader"))
+        anchor, shift = ("end", -4) if one.left else ("start", 4)
+        labels.append(label(one.flag.text, one.x + shift, y + 13, "flag", anchor))
     return leaders + labels, top

@@ -62,14 +62,7 @@ class _Speed:
 
 
 def draw_motion(recording: Recording, name: str) -> Figure | None:
-    """Draw commands and speeds of a run.
-
-    Args:
-        name: Unique in the document; letters, digits and hyphens.
-
-    Returns:
-        The drawing, or None in a scenario without a simulated robot.
-    """
+    """Draw commands and speeds of a run; None in one without a simulated robot."""
     scene = recording.scene
     if scene is None or len(recording.truth) < 2:
         return None

@@ -49,14 +49,7 @@ class Target:
 
 
 def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Figure | None:
-    """Draw the path of the robot.
-
-    Args:
-        name: Unique in the document; letters, digits and hyphens.
-
-    Returns:
-        The drawing, or None in a scenario without a simulated robot.
-    """
+    """Draw the path of the robot; None in a scenario without a simulated robot."""
     scene, truth = recording.scene, recording.truth
     if scene is None or not truth:
         return None

@@ -23,7 +23,6 @@ from grader.report.drawing.svg import (
     label,
     line,
 )
-from grader.report.model.result_model import PlotPart
 from grader.safe_text import one_line
 
 HEIGHT, TOP, BOTTOM = 232, 26, 42
@@ -41,12 +40,11 @@ DOTS = 120
 """Points that are still told apart; more are a line."""
 
 
-def draw_plot(plot: Plot | PlotPart, name: str) -> Figure:
+def draw_plot(plot: Plot, name: str) -> Figure:
     """Draw a plot.
 
     Args:
         plot: Its values; those that are not finite are left out, and the caption says so.
-        name: Unique in the document; letters, digits and hyphens.
     """
     points = [
         (x, y)
@@ -159,7 +157,7 @@ def _span(values: Sequence[float], margin: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _caption(plot: Plot | PlotPart, values: Sequence[float], band: Point | None, lost: int) -> str:
+def _caption(plot: Plot, values: Sequence[float], band: Point | None, lost: int) -> str:
     parts = []
     if not values:
         parts.append("no values")

@@ -25,14 +25,10 @@ _COMPLAINTS = ("Traceback (most recent call last)", "[ERROR]", "[FATAL]")
 
 
 def draw_timeline(recording: Recording, moments_s: Sequence[float], name: str) -> Figure | None:
-    """Draw the time line of a run.
+    """Draw the time line of a run; None where nothing was launched.
 
     Args:
         moments_s: Times that findings point at, in seconds since launch.
-        name: Unique in the document; letters, digits and hyphens.
-
-    Returns:
-        The drawing, or None where nothing was launched.
     """
     end_s = recording.since_launch_s(recording.end_ns)
     if not recording.processes or end_s <= 0.0:

@@ -25,9 +25,6 @@ def render_layout(recordings: Iterable[Recording]) -> str:
 
     Args:
         recordings: All of them; a panel shows nothing where its topic was not recorded.
-
-    Returns:
-        JSON that Foxglove imports; the same input gives the same text.
     """
     panels: dict[str, dict[str, Any]] = {}
     runs = tuple(recordings)

@@ -13,12 +13,13 @@ import io
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 from grader.checks.finding import Status
 from grader.errors import UsageError
 from grader.report.model.class_row import ClassRow, RowStatus
 from grader.report.model.result_model import Result
-from grader.report.text import words
+from grader.report.text.words import number
 from grader.safe_text import one_line
 from grader.spec.nearest_name import did_you_mean
 
@@ -32,7 +33,7 @@ _POINTS_POSSIBLE = "Points Possible"
 _CANVAS_ID = re.compile(r"\((\d+)\)\s*$")
 # How Canvas names what it lets a teacher download: name, perhaps LATE, user, attachment, file.
 _DOWNLOAD = re.compile(r"^[^_]+_(?:LATE_)?(\d+)_\d+_")
-# What `rosgrade batch` calls whoever handed that in: name and user.
+# What `rosgrade batch` calls such a submission: name and user.
 _DOWNLOADED = re.compile(r"^([^_]+)_(\d+)$")
 # Canvas adds it to every course.
 _TEST_STUDENT = "Student, Test"
@@ -45,12 +46,14 @@ class CanvasExport:
     """A gradebook as Canvas exported it.
 
     Attributes:
-        points: What it says of the points of each of them: a number, ``(read only)``, or nothing.
-        excused: For each of these rows, the columns that Canvas excuses the student from.
+        identity: Titles of the first columns, which say who a student is.
+        points: What it says of the points of each other column: a number, ``(read only)``, or
+            nothing.
+        students: The first columns of each student.
+        excused: Of each student, the columns that Canvas excuses from.
     """
 
     identity: tuple[str, ...]
-    columns: tuple[str, ...]
     points: Mapping[str, str]
     students: tuple[tuple[str, ...], ...]
     excused: tuple[frozenset[str], ...]
@@ -61,7 +64,8 @@ class CanvasFile:
     """A gradebook to import into Canvas.
 
     Attributes:
-        problems: What an instructor must know: who could not be matched, who is not graded.
+        problems: Who could not be matched, is not graded, or is left out.
+        doubts: What an instructor should know of the column.
     """
 
     text: str
@@ -71,11 +75,12 @@ class CanvasFile:
 
 
 def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> str:
-    """The gradebook of a class: a row for everybody, a column for each check.
+    """The gradebook of a class as CSV: a row for each submission, a column for each check.
 
-    Returns:
-        CSV. What could not be judged is an empty cell, and so is the score of a row that has no
-        grade.
+    What could not be judged is an empty cell, and so is the score of a row without a grade.
+
+    Args:
+        zero: What gets 0 points of the rows without a grade.
 
     Raises:
         UsageError: The results are of several assignments.
@@ -87,21 +92,16 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
     for result in results:
         for check in result.checks:
             checks.setdefault(check.id, check.max_points)
-    header = [f"{name} ({words.number(most)})" for name, most in checks.items()]
     table = [
         [
             *("submission", "name", "late", "status", "score", "max_score", "graded"),
-            *header,
+            *(f"{name} ({number(most)})" for name, most in checks.items()),
             "note",
         ]
     ]
     for row in rows:
-        judged = row.result.checks if row.result is not None else ()
-        earned = {
-            check.id: words.number(check.points)
-            for check in judged
-            if check.status is not Status.ERROR and row.status is not RowStatus.UNREADABLE
-        }
+        judged = [check for check in row.judged if check.status is not Status.ERROR]
+        earned = {check.id: number(check.points) for check in judged}
         score = _score(row, zero)
         table.append(
             [
@@ -109,8 +109,8 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
                 cell(row.name),
                 "yes" if row.late else "",
                 row.status.value,
-                "" if score is None else words.number(score),
-                words.number(row.result.max_score) if row.result is not None else "",
+                "" if score is None else number(score),
+                number(row.result.max_score) if row.result is not None else "",
                 "yes" if row.graded else "no",
                 *(earned.get(name, "") for name in checks),
                 cell(row.note),
@@ -139,19 +139,36 @@ def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
         raise UsageError(f"{name}: is not CSV: {error}") from error
     header = rows[0] if rows else []
     end = next((n + 1 for n, title in enumerate(header) if "Section" in title), 0)
-    identity = tuple(header[:end])
-    _check_identity(identity, name)
-    columns = tuple(header[end:])
-    said = next((row[end:] for row in rows[1:] if _is_points(row[0])), [])
-    points = {title: text.strip() for title, text in zip(columns, said, strict=False)}
-    body = [row for row in rows[1:] if len(row) >= end and not _is_points(row[0])]
+    identity, columns = tuple(header[:end]), header[end:]
+    middle = identity[2:-1]
+    # The rules of Canvas itself for the first columns.
+    if not (
+        len(identity) >= 3
+        and "Student" in identity[0]
+        and "ID" in identity[1]
+        and middle == tuple(title for title in _OPTIONAL if title in middle)
+        and ("SIS Login ID" in middle or "SIS User ID" not in middle)
+    ):
+        raise UsageError(
+            f"{name}: not a gradebook of Canvas: its first columns must be Student, ID, "
+            "perhaps SIS User ID with SIS Login ID, Integration ID and Root Account, then Section. "
+            "Export it in Canvas with Gradebook, Export"
+        )
+    body = [row for row in rows[1:] if len(row) >= end and _POINTS_POSSIBLE not in row[0]]
+    said = next((row[end:] for row in rows[1:] if _POINTS_POSSIBLE in row[0]), [])
     return CanvasExport(
         identity,
-        columns,
-        points,
+        {title: text.strip() for title, text in zip_longest(columns, said, fillvalue="")},
         students=tuple(tuple(row[:end]) for row in body),
-        excused=tuple(frozenset(_excused(columns, row[end:])) for row in body),
+        excused=tuple(
+            frozenset(title for title, text in zip_longest(columns, row[end:]) if _is_excused(text))
+            for row in body
+        ),
     )
+
+
+def _is_excused(text: str | None) -> bool:
+    return (text or "").strip().casefold() == "ex"
 
 
 def canvas_csv(
@@ -176,54 +193,38 @@ def canvas_csv(
     title = _column(export, column or assignment)
     ours = max(result.max_score for result in results)
     # Canvas takes this row for a change of the assignment, so what it says itself is kept.
-    points = export.points.get(title) or words.number(ours)
+    points = export.points.get(title) or number(ours)
     table = [
         [*export.identity, title],
         [f"    {_POINTS_POSSIBLE}", *[""] * (len(export.identity) - 1), points],
     ]
-    doubts: tuple[str, ...] = ()
-    if _value(points) != ours:
-        doubts = (
-            f"{title} has {points} points in Canvas and {words.number(ours)} here; the scores are "
-            "filled in as they are",
-        )
-    if title not in export.columns:
-        others = [other for other in export.columns if not _DROPPED.search(other)]
-        known = [_CANVAS_ID.sub("", other).strip() for other in others]
-        listed = f" There are: {', '.join(known) or 'none'}."
-        doubts += (
-            f"the gradebook has no column {title!r}: Canvas will offer to make a new assignment of "
-            f"it.{did_you_mean(title, known) or listed}",
-        )
     problems: list[str] = []
-    filled = 0
     taken: dict[int, str] = {}
     for who, row, found in _assigned(rows, export):
         if len(found) != 1:
             why = "no student of that name or number" if not found else "several students"
             problems.append(f"{who}: not matched, {why} in the gradebook")
             continue
-        if found[0] in taken:
-            if row.status is not RowStatus.MISSING:
-                problems.append(f"{who}: the same student as {taken[found[0]]}, left out")
+        (student,) = found
+        score, is_excused = _score(row, zero), title in export.excused[student]
+        # An excused student owes nothing.
+        if row.status is RowStatus.MISSING and (student in taken or is_excused):
             continue
-        score = _score(row, zero)
-        if title in export.excused[found[0]]:
-            # Who is excused owes nothing.
-            if row.status is not RowStatus.MISSING:
-                problems.append(f"{who}: excused in Canvas, so the cell is left as it is")
-                taken[found[0]] = who
-        elif score is None:
-            problems.append(f"{who}: {_why_no_score(row)}, so the cell is left as it is")
+        if student in taken:
+            problems.append(f"{who}: the same student as {taken[student]}, left out")
+        elif is_excused or score is None:
+            why = "excused in Canvas" if is_excused else _why_no_score(row)
+            problems.append(f"{who}: {why}, so the cell is left as it is")
         else:
-            filled += 1
-            taken[found[0]] = who
-            name, *rest = export.students[found[0]]
+            name, *rest = export.students[student]
             # Names are free text; the numbers after them are what Canvas matches by.
-            table.append([cell(name), *rest[:-1], cell(rest[-1]), words.number(score)])
-    if not filled:
+            table.append([cell(name), *rest[:-1], cell(rest[-1]), number(score)])
+        if is_excused or score is not None:
+            taken.setdefault(student, who)
+    if len(table) == 2:
         raise UsageError("\n".join(["no score could be filled in:", *problems]))
-    return CanvasFile(_csv(table), filled, tuple(problems), doubts)
+    doubts = tuple(_doubts(export, title, points, ours))
+    return CanvasFile(_csv(table), len(table) - 2, tuple(problems), doubts)
 
 
 def cell(text: str) -> str:
@@ -235,6 +236,31 @@ def cell(text: str) -> str:
     return f"'{shown}" if shown.lstrip().startswith(_FORMULA) else shown
 
 
+def _doubts(export: CanvasExport, title: str, points: str, ours: float) -> Iterator[str]:
+    if _value(points) != ours:
+        yield (
+            f"{title} has {points} points in Canvas and {number(ours)} here; the scores are "
+            "filled in as they are"
+        )
+    if title not in export.points:
+        others = [other for other in export.points if not _DROPPED.search(other)]
+        known = [_CANVAS_ID.sub("", other).strip() for other in others]
+        listed = f" There are: {', '.join(known) or 'none'}."
+        yield (
+            f"the gradebook has no column {title!r}: Canvas will offer to make a new assignment of "
+            f"it.{did_you_mean(title, known) or listed}"
+        )
+
+
+def _value(text: str) -> float | None:
+    """A number as Canvas reads it: the last mark is the decimal one; None where it is none."""
+    *whole, last = re.split("[.,]", text)
+    try:
+        return float(f"{''.join(whole)}.{last}" if whole else last)
+    except ValueError:
+        return None
+
+
 def _assigned(
     rows: Sequence[ClassRow], export: CanvasExport
 ) -> Iterator[tuple[str, ClassRow, list[int]]]:
@@ -243,15 +269,15 @@ def _assigned(
     Behind them come the students that no row belongs to.
     """
     known: set[int] = set()
-    # A grade goes before what has none, such as what somebody handed in before.
+    # A grade goes before what has none, such as an earlier submission that is unreadable.
     for row in sorted(rows, key=lambda row: row.status in _NEVER_RUN):
         found = _students(export, row.id)
         known.update(found)
         yield one_line(row.id), row, found
-    for number, student in enumerate(export.students):
-        if number not in known and student[0] != _TEST_STUDENT:
+    for index, student in enumerate(export.students):
+        if index not in known and student[0] != _TEST_STUDENT:
             who = f"{one_line(student[0])} ({one_line(student[1])})"
-            yield who, ClassRow(student[1], missing=True), [number]
+            yield who, ClassRow(student[1], missing=True), [index]
 
 
 def _why_no_score(row: ClassRow) -> str:
@@ -259,21 +285,6 @@ def _why_no_score(row: ClassRow) -> str:
         return "handed in nothing"
     problem = row.result.submission.problem if row.result is not None else None
     return "not graded" if problem is None else f"unreadable ({one_line(problem)})"
-
-
-def _excused(columns: Sequence[str], cells: Sequence[str]) -> Iterator[str]:
-    for title, text in zip(columns, cells, strict=False):
-        if text.strip().casefold() == "ex":
-            yield title
-
-
-def _value(number: str) -> float | None:
-    """A number as Canvas reads it: the last mark is the decimal one; None where it is none."""
-    *whole, last = re.split("[.,]", number)
-    try:
-        return float(f"{''.join(whole)}.{last}" if whole else last)
-    except ValueError:
-        return None
 
 
 def _one_assignment(results: Sequence[Result]) -> str:
@@ -285,33 +296,9 @@ def _one_assignment(results: Sequence[Result]) -> str:
     return names[0]
 
 
-def _check_identity(identity: Sequence[str], name: str) -> None:
-    """Refuse what Canvas would refuse: its rules for the first columns."""
-    middle = list(identity[2:-1])
-    known = [title for title in _OPTIONAL if title in middle]
-    alone = "SIS User ID" in middle and "SIS Login ID" not in middle
-    fits = (
-        len(identity) >= 3
-        and "Student" in identity[0]
-        and "ID" in identity[1]
-        and middle == known
-        and not alone
-    )
-    if not fits:
-        raise UsageError(
-            f"{name}: not a gradebook of Canvas: its first columns must be Student, ID, "
-            "perhaps SIS User ID with SIS Login ID, Integration ID and Root Account, then Section. "
-            "Export it in Canvas with Gradebook, Export"
-        )
-
-
-def _is_points(first: str) -> bool:
-    return _POINTS_POSSIBLE in first
-
-
 def _column(export: CanvasExport, wanted: str) -> str:
     fitting = [
-        title for title in export.columns if wanted in (title, _CANVAS_ID.sub("", title).strip())
+        title for title in export.points if wanted in (title, _CANVAS_ID.sub("", title).strip())
     ]
     if len(fitting) > 1:
         raise UsageError(
@@ -332,45 +319,40 @@ def _column(export: CanvasExport, wanted: str) -> str:
 def _students(export: CanvasExport, submission: str) -> list[int]:
     """Rows that a submission may belong to, by the best of what identifies it."""
     download = _DOWNLOAD.match(submission)
-    keys = [(1, download[1])] if download else []
-    keys += [
-        (export.identity.index(title), submission)
-        for title in ("ID", "SIS User ID", "SIS Login ID", "Student")
-        if title in export.identity
-    ]
-    for index, value in keys:
-        found = [
-            number
-            for number, row in enumerate(export.students)
-            if value.casefold() in _forms(row[index], name=index == 0)
-        ]
-        if found:
+    keys = [("ID", download[1])] if download else []
+    keys += [(title, submission) for title in ("ID", *_OPTIONAL[:2], "Student")]
+    for title, value in keys:
+        index = export.identity.index(title) if title in export.identity else None
+        if index is not None and (found := _rows_of(export, index, value)):
             return found
     downloaded = _DOWNLOADED.match(submission)
+    if downloaded is None:
+        return []
     # A login may look like this too, so the name has to fit as well.
-    return [
-        number
-        for number, row in enumerate(export.students)
-        if downloaded
-        and row[1].strip() == downloaded[2]
-        and _letters(downloaded[1]) in map(_letters, _forms(row[0], name=True))
-    ]
+    named = _rows_of(export, 0, downloaded[1])
+    return [row for row in named if export.students[row][1].strip() == downloaded[2]]
+
+
+def _rows_of(export: CanvasExport, index: int, value: str) -> list[int]:
+    """Rows with a value in a column; of a name only the letters count, in either order."""
+    if index:
+        wanted = value.casefold()
+        return [
+            row
+            for row, student in enumerate(export.students)
+            if wanted == student[index].strip().casefold()
+        ]
+    wanted = _letters(value)
+    found = []
+    for row, student in enumerate(export.students):
+        names = student[0].split("," if "," in student[0] else None)
+        if wanted and wanted in (_letters("".join(names)), _letters("".join(reversed(names)))):
+            found.append(row)
+    return found
 
 
 def _letters(name: str) -> str:
     return re.sub(r"[\W_]+", "", name).casefold()
-
-
-def _forms(value: str, *, name: bool) -> set[str]:
-    """How a cell may be written: a name also as ``Ana Lopez``, ``ana_lopez`` and ``lopezana``."""
-    forms = {value.strip().casefold()}
-    if name:
-        last, comma, first = value.casefold().partition(",")
-        parts = [last.strip(), first.strip()] if comma else value.casefold().split()
-        turned = [*reversed(parts)]
-        for order in (parts, turned):
-            forms |= {" ".join(order), "_".join(order), "".join(order)}
-    return forms - {""}
 
 
 def _csv(rows: Iterable[Sequence[str]]) -> str:

@@ -9,15 +9,15 @@ Source: https://gradescope-autograders.readthedocs.io/en/latest/specs/
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import Any
+
+from pydantic import AwareDatetime, BaseModel, ValidationError
 
 from grader.checks.finding import Status
 from grader.errors import UsageError
 from grader.report.formats import markdown
-from grader.report.formats.options import FormatOptions
+from grader.report.formats.options import DEFAULTS, FormatOptions
 from grader.report.model.result import read_json
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
@@ -50,18 +50,8 @@ def unfinished() -> str:
     )
 
 
-def render(result: Result, options: FormatOptions) -> str:
+def render(result: Result, options: FormatOptions = DEFAULTS) -> str:
     """The whole file."""
-    file = options.gradescope_metadata
-    return render_gradescope(result, read_metadata(file) if file is not None else None)
-
-
-def render_gradescope(result: Result, metadata: Mapping[str, Any] | None = None) -> str:
-    """Render a result as ``results.json``.
-
-    Args:
-        metadata: Gradescope's ``submission_metadata.json``, or None.
-    """
     copy = for_student(result)
     extra: dict[str, Any] = {
         "graded": result.graded,
@@ -71,14 +61,15 @@ def render_gradescope(result: Result, metadata: Mapping[str, Any] | None = None)
         # Whether there is one is up to Gradescope's container, and staff see it nowhere else.
         "sandbox": result.environment.get("sandbox"),
     }
-    if metadata is not None:
-        extra["created_at"] = metadata.get("created_at")
-        extra["late_s"] = late_s(metadata)
+    if options.gradescope_metadata is not None:
+        metadata = read_metadata(options.gradescope_metadata)
+        extra["created_at"] = metadata.created_at.isoformat()
+        extra["late_s"] = metadata.late_s
     return _json(
         {
             "score": result.score if result.score is not None else 0,
             "execution_time": round(result.duration_s),
-            "output": _output(result),
+            "output": _output(copy, graded=result.graded),
             "output_format": "md",
             "test_output_format": "md",
             "test_name_format": "text",
@@ -90,67 +81,46 @@ def render_gradescope(result: Result, metadata: Mapping[str, Any] | None = None)
     )
 
 
-def read_metadata(file: Path) -> Mapping[str, Any]:
-    """Read Gradescope's ``submission_metadata.json``.
-
-    Raises:
-        UsageError: It cannot be read, or is not one.
-    """
-    data = read_json(file)
-    if not isinstance(data, dict):
-        raise UsageError(f"{file} is not Gradescope's submission_metadata.json: no object in it")
-    return data
+class _Due(BaseModel):
+    due_date: AwareDatetime | None = None
 
 
-def late_s(metadata: Mapping[str, Any]) -> float | None:
-    """How long after its due date a submission came, by the times in its metadata.
+class _User(BaseModel):
+    assignment: _Due | None = None
 
-    Args:
-        metadata: Gradescope's ``submission_metadata.json``. A due date of the student's own (an
-            extension) goes before the assignment's.
 
-    Returns:
-        Seconds, 0 where it was in time; None where there is no due date.
+class Metadata(BaseModel):
+    """What Gradescope's ``submission_metadata.json`` says of times."""
 
-    Raises:
-        UsageError: A time cannot be read.
-    """
-    due: Any = _mapping(metadata.get("assignment")).get("due_date")
-    for user in metadata.get("users") or ():
-        due = _mapping(_mapping(user).get("assignment")).get("due_date") or due
-    created = metadata.get("created_at")
-    if not due or not created:
-        return None
+    created_at: AwareDatetime
+    assignment: _Due = _Due()
+    users: tuple[_User, ...] = ()
+
+    @property
+    def late_s(self) -> float | None:
+        """Seconds from the due date to the submission, at least 0; None without a due date.
+
+        A due date of the student's own (an extension) goes before the assignment's.
+        """
+        own = [one.assignment.due_date for one in self.users if one.assignment]
+        due = next(filter(None, reversed([self.assignment.due_date, *own])), None)
+        return max(0.0, (self.created_at - due).total_seconds()) if due else None
+
+
+def read_metadata(file: Path) -> Metadata:
+    """Read Gradescope's ``submission_metadata.json``."""
     try:
-        late = datetime.fromisoformat(_offset(created)) - datetime.fromisoformat(_offset(due))
-    except (TypeError, ValueError) as error:
-        raise UsageError(
-            f"submission_metadata.json: created_at {created!r} and due_date {due!r} are not two "
-            "times in ISO 8601 with an offset"
-        ) from error
-    return max(0.0, late.total_seconds())
+        return Metadata.model_validate(read_json(file))
+    except ValidationError as error:
+        raise UsageError(f"{file} is not Gradescope's submission_metadata.json: {error}") from error
 
 
-def _offset(time: str) -> str:
-    # Python 3.10 reads no "Z".
-    return time.removesuffix("Z") + "+00:00" if time.endswith("Z") else time
-
-
-def _mapping(value: Any) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}
-
-
-def _output(result: Result) -> str:
-    copy = for_student(result)
-    if not result.graded:
-        return "\n".join([_NOT_GRADED, *_notes(copy)])
-    lines = [f"**{explanation.score(copy)}.** {explanation.headline(copy)}"]
-    return "\n".join([*lines, *markdown.first_to_fix(copy), *_notes(copy)])
-
-
-def _notes(result: Result) -> Iterator[str]:
-    for block in markdown.notes(result):
-        yield f"\n{block.rstrip()}"
+def _output(copy: Result, *, graded: bool) -> str:
+    lines = [_NOT_GRADED]
+    if graded:
+        score = f"**{explanation.score(copy)}.** {explanation.headline(copy)}"
+        lines = [score, *markdown.first_to_fix(copy)]
+    return "\n".join([*lines, *(f"\n{block.rstrip()}" for block in markdown.notes(copy))])
 
 
 def _test(number: int, check: CheckPart, copy: Result) -> dict[str, Any]:

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
 from grader.checks.finding import Status
-from grader.report.formats.options import FormatOptions
+from grader.report.formats.options import DEFAULTS, FormatOptions
 from grader.report.model.result_model import CheckPart, Result
-from grader.report.text import explanation, words
+from grader.report.text import explanation
+from grader.report.text.words import number
 from grader.safe_text import clean, one_line
 
 _ELEMENT = {Status.FAILED: "failure", Status.ERROR: "error", Status.SKIPPED: "skipped"}
@@ -27,18 +27,14 @@ _TYPE = {Status.FAILED: "check", Status.ERROR: "grader", Status.SKIPPED: "requir
 _WITHOUT_POINTS = "no points"
 
 
-def render(result: Result, options: FormatOptions) -> str:
+def render(result: Result, options: FormatOptions = DEFAULTS) -> str:
     """The whole file."""
-    return render_junit(result, xunit1=options.xunit1)
-
-
-def render_junit(result: Result, *, xunit1: bool = False) -> str:
-    """Render a result as JUnit XML.
-
-    Returns:
-        A whole document; the same input gives the same text.
-    """
-    elements = _elements(result)
+    shown = explanation.only_shown(result)
+    elements = {
+        check.id: _ELEMENT[Status.SKIPPED if check.id in shown else check.status]
+        for check in result.checks
+        if check.status is not Status.PASSED
+    }
     count = Counter(elements.values())
     counts = {
         "tests": str(len(result.checks)),
@@ -57,44 +53,32 @@ def render_junit(result: Result, *, xunit1: bool = False) -> str:
         suite.set("timestamp", result.started[:19])
     _properties(suite, _of_suite(result))
     for check in result.checks:
-        _case(suite, result, check, elements.get(check.id), xunit1=xunit1)
-    if lines := list(_notes(result)):
-        ET.SubElement(suite, "system-out").text = "\n".join(lines)
+        _case(suite, result, check, elements.get(check.id), xunit1=options.xunit1)
+    notes = [
+        line
+        for kind in explanation.notes_of_runs(result)
+        for line in (f"{kind.title}:", *kind.lines)
+    ]
+    if notes:
+        ET.SubElement(suite, "system-out").text = "\n".join(notes)
     ET.indent(root)
     text: str = ET.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'
 
 
-def _elements(result: Result) -> dict[str, str]:
-    """What the test case of a check holds for how it ended, where it did not pass."""
-    shown = explanation.only_shown(result)
-    return {
-        check.id: _ELEMENT[Status.SKIPPED if check.id in shown else check.status]
-        for check in result.checks
-        if check.status is not Status.PASSED
-    }
-
-
 def _of_suite(result: Result) -> dict[str, str]:
     found = {
         "submission": result.submission.id,
-        "score": words.number(result.score) if result.score is not None else "not graded",
-        "max_score": words.number(result.max_score),
+        "score": number(result.score) if result.score is not None else "not graded",
+        "max_score": number(result.max_score),
         "rosgrade": result.rosgrade_version,
     }
     if result.withheld.checks:
         found["hidden_checks"] = str(result.withheld.checks)
-        found["hidden_points"] = words.number(result.withheld.points)
+        found["hidden_points"] = number(result.withheld.points)
     found |= {f"points.{check.id}": explanation.points(check) for check in result.checks}
     found |= {f"environment.{name}": value for name, value in result.environment.items()}
     return found
-
-
-def _notes(result: Result) -> Iterator[str]:
-    """What is worth knowing of the runs; it belongs to no check."""
-    for kind in explanation.notes_of_runs(result):
-        yield f"{kind.title}:"
-        yield from kind.lines
 
 
 def _properties(parent: ET.Element, values: dict[str, str]) -> None:

@@ -43,9 +43,6 @@ def render_markdown(result: Result, most_bytes: int | None = None) -> str:
 
     Args:
         most_bytes: Length as UTF-8 that must not be exceeded; what comes last is left out.
-
-    Returns:
-        Markdown; the same input gives the same text.
     """
     title = f"## {literal(result.assignment.id)}: {explanation.score(result)}"
     head = [title, "", explanation.headline(result), *first_to_fix(result), ""]

@@ -17,3 +17,6 @@ class FormatOptions:
 
     xunit1: bool = False
     gradescope_metadata: Path | None = None
+
+
+DEFAULTS = FormatOptions()

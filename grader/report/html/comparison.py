@@ -11,64 +11,39 @@ from grader.safe_text import one_line
 
 MOST_LINES = 200
 SIGNS = {"same": "", "changed": "≠", "missing": "−", "extra": "+"}
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Part of a line; ``differs`` marks what the other side does not have."""
-
-    text: str
-    differs: bool
+"""Kinds of rows, each with a sign, so that colour is not needed."""
+Line = list[tuple[str, bool]]
+"""Pieces of a line, each with whether the other side lacks it; none where there is no line."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """Two lines beside each other.
-
-    Attributes:
-        kind: ``same``, ``changed``, ``missing`` (only expected) or ``extra`` (only observed).
-        expected: Pieces of the line, none where there is no line.
-        observed: Pieces of the line, none where there is no line.
-    """
+    """Two lines beside each other, of one of the kinds in :data:`SIGNS`."""
 
     kind: str
-    expected: tuple[Piece, ...]
-    observed: tuple[Piece, ...]
-
-    @property
-    def sign(self) -> str:
-        """The kind as a sign, so that colour is not needed."""
-        return SIGNS[self.kind]
+    expected: Line
+    observed: Line
 
 
-def align(comparison: Comparison) -> tuple[Row, ...]:
+def align(comparison: Comparison) -> list[Row]:
     """Put the lines of a comparison beside each other, those first that belong together."""
     left = [one_line(text) for text in comparison.expected[:MOST_LINES]]
     right = [one_line(text) for text in comparison.observed[:MOST_LINES]]
     rows: list[Row] = []
     for what, a1, a2, b1, b2 in SequenceMatcher(None, left, right, autojunk=False).get_opcodes():
-        if what == "equal":
-            rows += [Row("same", _plain(text), _plain(text)) for text in left[a1:a2]]
-            continue
         both = min(a2 - a1, b2 - b1)
-        rows += [_changed(left[a1 + i], right[b1 + i]) for i in range(both)]
-        rows += [Row("missing", _plain(text), ()) for text in left[a1 + both : a2]]
-        rows += [Row("extra", (), _plain(text)) for text in right[b1 + both : b2]]
-    return tuple(rows)
+        for one, other in zip(left[a1 : a1 + both], right[b1 : b1 + both], strict=True):
+            rows.append(Row("same" if what == "equal" else "changed", *_marked(one, other)))
+        rows += [Row("missing", [(text, False)], []) for text in left[a1 + both : a2]]
+        rows += [Row("extra", [], [(text, False)]) for text in right[b1 + both : b2]]
+    return rows
 
 
-def _plain(text: str) -> tuple[Piece, ...]:
-    return (Piece(text, False),)
-
-
-def _changed(left: str, right: str) -> Row:
+def _marked(left: str, right: str) -> tuple[Line, Line]:
     """Mark the words that differ."""
     a, b = re.findall(r"\s+|\w+|[^\w\s]", left), re.findall(r"\s+|\w+|[^\w\s]", right)
-    expected: list[Piece] = []
-    observed: list[Piece] = []
-    for what, a1, a2, b1, b2 in SequenceMatcher(None, a, b, autojunk=False).get_opcodes():
-        if a1 < a2:
-            expected.append(Piece("".join(a[a1:a2]), what != "equal"))
-        if b1 < b2:
-            observed.append(Piece("".join(b[b1:b2]), what != "equal"))
-    return Row("changed", tuple(expected), tuple(observed))
+    codes = SequenceMatcher(None, a, b, autojunk=False).get_opcodes()
+    return (
+        [("".join(a[a1:a2]), what != "equal") for what, a1, a2, _, _ in codes if a1 < a2],
+        [("".join(b[b1:b2]), what != "equal") for what, _, _, b1, b2 in codes if b1 < b2],
+    )

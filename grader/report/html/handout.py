@@ -12,8 +12,9 @@ from markupsafe import Markup
 from grader.assignment.binding import BoundCheck
 from grader.assignment.load import LoadedAssignment
 from grader.assignment.model import Visibility
+from grader.checks.wording import counted
 from grader.errors import UsageError
-from grader.grade.points import total
+from grader.grade.model import total
 from grader.report.html.page import render_page
 from grader.report.text.words import counted_points
 
@@ -26,54 +27,35 @@ class Handout:
 
     Attributes:
         text: The handout in Markdown; empty where the author wrote none.
+        checks: Those that a student gets to see.
+        total: What there is to be earned, in words.
     """
 
     id: str
     title: str
     text: str
     checks: tuple[BoundCheck, ...]
-    hidden: int
-    hidden_points: float
-
-    @property
-    def points(self) -> float:
-        """What the visible checks give."""
-        return total(bound.spec.points for bound in self.checks)
-
-    @property
-    def total(self) -> str:
-        """What there is to be earned, in words."""
-        all_points = counted_points(total((self.points, self.hidden_points)))
-        if not self.hidden:
-            return f"{all_points} in all."
-        checks = "1 more check" if self.hidden == 1 else f"{self.hidden} more checks"
-        return (
-            f"{all_points} in all: {counted_points(self.points)} here, and "
-            f"{counted_points(self.hidden_points)} for {checks} at grading."
-        )
+    total: str
 
 
 def make_handout(loaded: LoadedAssignment) -> Handout:
-    """Collect what a student is given.
-
-    Raises:
-        UsageError: Its handout cannot be read.
-    """
-    visible = [b for b in loaded.checks if b.spec.visibility is Visibility.VISIBLE]
-    hidden = [b for b in loaded.checks if b.spec.visibility is not Visibility.VISIBLE]
+    """Collect what a student is given."""
+    visible = tuple(b for b in loaded.checks if b.spec.visibility is Visibility.VISIBLE)
     file = loaded.folder / HANDOUT_FILE
     try:
         text = file.read_text(encoding="utf-8") if file.is_file() else ""
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"{file} cannot be read: {error}") from error
-    return Handout(
-        id=loaded.assignment.id,
-        title=loaded.assignment.title,
-        text=text,
-        checks=tuple(visible),
-        hidden=len(hidden),
-        hidden_points=total(bound.spec.points for bound in hidden),
-    )
+    all_points = total(bound.spec.points for bound in loaded.checks)
+    here = total(bound.spec.points for bound in visible)
+    hidden = len(loaded.checks) - len(visible)
+    words = f"{counted_points(all_points)} in all"
+    if hidden:
+        more = counted_points(total((all_points, -here)))
+        checks = counted(hidden, "more check")
+        words += f": {counted_points(here)} here, and {more} for {checks} at grading"
+    assignment = loaded.assignment
+    return Handout(assignment.id, assignment.title, text, visible, f"{words}.")
 
 
 def render_handout(handout: Handout) -> str:

@@ -36,9 +36,6 @@ def render_page(
         script: A page without one runs none.
         policy: What it may do besides, as in a Content-Security-Policy.
         values: What the template prints.
-
-    Returns:
-        A whole HTML document; the same input gives the same text.
     """
     style, code = "".join(map(_asset, styles)), _asset(script) if script else ""
     return (

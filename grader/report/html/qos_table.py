@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from grader.diagnosis.no_endpoint import OWN_TOPICS
 from grader.measure.compatibility import STRENGTH, duration_words, refusals
-from grader.recording.model import Endpoint, Kind, Owner, Recording
+from grader.recording.model import Endpoint, Kind, Owner, Qos, Recording
 
 MOST_ROWS = 40
 POLICIES = ("reliability", "durability", "deadline", "liveliness")
@@ -14,11 +14,11 @@ POLICIES = ("reliability", "durability", "deadline", "liveliness")
 
 @dataclass(frozen=True)
 class Pair:
-    """A publisher and a subscription on one topic.
+    """A publisher and a subscription on one topic, each its node or ``the grader``.
 
     Attributes:
-        publisher: Its node, or ``the grader``.
-        subscription: Its node, or ``the grader``.
+        cells: Policy, what is offered, what is requested.
+        refused: Policies that keep messages from passing.
     """
 
     topic: str
@@ -55,7 +55,7 @@ def _pair(publisher: Endpoint, subscription: Endpoint) -> Pair:
         publisher.topic,
         _whose(publisher),
         _whose(subscription),
-        tuple((name, _words(publisher, name), _words(subscription, name)) for name in POLICIES),
+        tuple((p, _words(publisher.qos, p), _words(subscription.qos, p)) for p in POLICIES),
         frozenset(name for name in POLICIES if any(text.startswith(name) for text in reasons)),
         publisher.type != subscription.type,
     )
@@ -65,9 +65,8 @@ def _whose(endpoint: Endpoint) -> str:
     return endpoint.node if endpoint.owner is Owner.STUDENT else "the grader"
 
 
-def _words(endpoint: Endpoint, policy: str) -> str:
-    if policy in STRENGTH:
-        text = str(getattr(endpoint.qos, policy))
-        lease_s = endpoint.qos.liveliness_lease_s
-        return f"{text}, {duration_words(lease_s)}" if policy == "liveliness" and lease_s else text
-    return duration_words(endpoint.qos.deadline_s)
+def _words(qos: Qos, policy: str) -> str:
+    if policy not in STRENGTH:
+        return duration_words(qos.deadline_s)
+    lease = f", {duration_words(qos.liveliness_lease_s)}" if qos.liveliness_lease_s else ""
+    return f"{getattr(qos, policy)}{lease if policy == 'liveliness' else ''}"

@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from grader.assignment.model import Assignment, Scenario
 from grader.measure.motion.quantities import metres
-from grader.recording.model import NS, Message, Recording
+from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.report.drawing.ground_plan import places
 from grader.report.model.output import printed
@@ -52,14 +52,17 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
         return None
     samples = truth[::STEP]
     since = recording.since_launch_s
-    until_s = (truth[-1].time_ns - scene.began_ns) / NS
+    lidar = scene.lidar
+    given = {
+        name: value for name, value in sorted(recording.values.items()) if name in scenario.random
+    }
     return {
         "began": round(since(samples[0].time_ns), 3),
         "step": round((samples[1].time_ns - samples[0].time_ns) / NS, 3) if samples[1:] else 0.1,
         "radius": _milli(scene.radius_m),
-        "limits": [_milli(scene.max_linear_m_s), _milli(scene.max_angular_rad_s)],
-        "walls": [[_milli(value) for value in capsule] for capsule in _capsules(scene)],
-        "moving": _moving(scene, until_s),
+        "limits": _millis(scene.max_linear_m_s, scene.max_angular_rad_s),
+        "walls": [_millis(*one) for capsules in scene.outlines.values() for one in capsules],
+        "moving": _moving(scene, (truth[-1].time_ns - scene.began_ns) / NS),
         "x": _differences(step.x_m for step in samples),
         "y": _differences(step.y_m for step in samples),
         "yaw": _differences(_turns(samples)),
@@ -68,7 +71,7 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
         "cv": _differences(step.command_m_s for step in samples),
         "cw": _differences(step.command_rad_s for step in samples),
         "touches": _touches(recording),
-        "lidar": [_milli(v) for v in (scene.lidar.x_m, scene.lidar.y_m, scene.lidar.yaw_rad)],
+        "lidar": _millis(lidar.x_m, lidar.y_m, lidar.yaw_rad),
         "scans": _scans(recording, scene),
         "log": [
             [round(since(entry.time_ns), 2), one_line(entry.text)[:MOST_CHARACTERS]]
@@ -76,29 +79,22 @@ def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
         ],
         "values": [
             f"{name} = {value:.3g} {scenario.random[name].unit}".strip()
-            for name, value in sorted(recording.values.items())
-            if name in scenario.random
+            for name, value in given.items()
         ],
-        "given": {
-            name: round(value, 6)
-            for name, value in sorted(recording.values.items())
-            if name in scenario.random
-        },
+        "given": {name: round(value, 6) for name, value in given.items()},
     }
 
 
 def with_goals(replay: Replay, assignment: Assignment, scenario: str) -> Replay:
     """Add where the robot should end, as the checks say it now."""
-    return {
-        **replay,
-        "goals": [
-            [
-                *map(_milli, (one.pose.x_m, one.pose.y_m, one.pose.yaw_rad, one.radius_m)),
-                metres(one.radius_m),
-            ]
-            for one in targets(assignment, scenario, replay.get("given", {}))
-        ],
-    }
+    goals = [
+        [
+            *_millis(one.pose.x_m, one.pose.y_m, one.pose.yaw_rad, one.radius_m),
+            metres(one.radius_m),
+        ]
+        for one in targets(assignment, scenario, replay.get("given", {}))
+    ]
+    return {**replay, "goals": goals}
 
 
 def embedded(data: Any) -> Markup:
@@ -113,8 +109,12 @@ def _milli(value: float) -> int:
     return round(_finite(value) * 1e3)
 
 
+def _millis(*values: float) -> list[int]:
+    return list(map(_milli, values))
+
+
 def _finite(value: float) -> float:
-    """Something that JSON can say: a scan may be of a submission that publishes its own."""
+    """A number for JSON: a scan may be of a submission that publishes its own."""
     return min(max(value, -MOST), MOST) if not math.isnan(value) else 0.0
 
 
@@ -131,18 +131,13 @@ def _turns(truth: Sequence[Truth]) -> Iterable[float]:
         yield heading
 
 
-def _capsules(scene: Scene) -> Iterable[tuple[float, ...]]:
-    for capsules in scene.outlines.values():
-        yield from capsules
-
-
 def _moving(scene: Scene, until_s: float) -> list[dict[str, Any]]:
     return [
         {
             "radius": _milli(obstacle.radius_m) if obstacle.radius_m is not None else None,
-            "size": [_milli(value) for value in obstacle.size_m or ()],
+            "size": _millis(*(obstacle.size_m or ())),
             "places": [
-                [_milli(place.x_m), _milli(place.y_m), _milli(place.yaw_rad)] if place else 0
+                _millis(place.x_m, place.y_m, place.yaw_rad) if place else 0
                 for place in places(obstacle, until_s)
             ],
         }
@@ -177,17 +172,14 @@ def _scans(recording: Recording, scene: Scene) -> dict[str, Any] | None:
         "from": _milli(first.get("angle_min", 0.0)),
         "by": round(_finite(first.get("angle_increment", 0.0)) * every * 1e3, 4),
         "beams": len(range(0, count, every)),
-        "ranges": "".join(_ranges(scan, every) for scan in scans),
+        "ranges": "".join(
+            _digits(range_m) for scan in scans for range_m in scan.value["ranges"][::every]
+        ),
     }
 
 
-def _ranges(scan: Message, every: int) -> str:
-    farthest_m = NOTHING / 100.0
-    return "".join(
-        [
-            _NUMBERS[min(round(range_m * 100.0), NOTHING - 1)]
-            if 0.0 < range_m < farthest_m
-            else _NUMBERS[NOTHING]
-            for range_m in scan.value["ranges"][::every]
-        ]
-    )
+def _digits(range_m: float) -> str:
+    """A range in centimetres."""
+    if not 0.0 < range_m < NOTHING / 100.0:
+        return _NUMBERS[NOTHING]
+    return _NUMBERS[min(round(range_m * 100.0), NOTHING - 1)]

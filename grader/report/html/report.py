@@ -7,7 +7,7 @@ from itertools import accumulate
 
 from markupsafe import Markup
 
-from grader.checks.finding import Status
+from grader.checks.finding import Plot, Status
 from grader.grade.model import Grade
 from grader.recording.event import Breach
 from grader.recording.model import Recording
@@ -15,12 +15,13 @@ from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import Figure
-from grader.report.html.comparison import align
+from grader.report.html.comparison import SIGNS, align
 from grader.report.html.page import render_page
 from grader.report.html.replay import Replay, embedded, make_replay, with_goals
 from grader.report.html.sections import Section, draw_run, make_sections
 from grader.report.model.output import shorten
-from grader.report.model.result_model import BuildPart, PlotPart, Result
+from grader.report.model.result_model import Result
+from grader.submission.record import BuildRecord
 
 NO_REFERENCE: Mapping[str, Replay] = {}
 NO_POINTS = 0.15
@@ -68,6 +69,7 @@ def render_report(
         files={run.id: run.recording for run in result.scenarios},
         remarks={run.id: run.remarks for run in result.scenarios},
         gallery=Gallery(),
+        SIGNS=SIGNS,
         align=align,
         build_lines=build_lines,
         draw_callbacks=draw_callbacks,
@@ -82,11 +84,11 @@ class Gallery:
 
     def __init__(self) -> None:
         """Start empty."""
-        self._names: dict[tuple[PlotPart, str | None], str] = {}
+        self._names: dict[tuple[Plot, str | None], str] = {}
         self._folded: set[str] = set()
 
     def plot(
-        self, plot: PlotPart, name: str, scenario: str | None, *, folded: bool = False
+        self, plot: Plot, name: str, scenario: str | None, *, folded: bool = False
     ) -> tuple[str, Figure | None]:
         """Draw a plot, or only name the figure that shows it already.
 
@@ -139,7 +141,7 @@ def _replays(
     return found
 
 
-def build_lines(build: BuildPart) -> list[tuple[str, bool]]:
+def build_lines(build: BuildRecord) -> list[tuple[str, bool]]:
     """The lines of a build log around the student's own mistake, each with whether it names it.
 
     The first lines that name the file (and the line, if one is known) or repeat the message;

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from grader.assignment.model import Assignment, Scenario
 from grader.checks.finding import Status
-from grader.grade.model import Grade
-from grader.grade.points import total
+from grader.grade.model import Grade, total
 from grader.recording.model import Recording
 from grader.report.drawing.motion import draw_motion
 from grader.report.drawing.path import draw_path

@@ -19,18 +19,10 @@ def remarks(recording: Recording) -> tuple[str, ...]:
 
     A limit of the sandbox that was reached is told elsewhere (``Recording.breaches``).
     """
-    return (
-        *_put_right(recording),
-        *_posing(recording),
-        *_elsewhere(recording),
-        *_flooding(recording),
-        *_talking(recording),
-        *_forging(recording),
-        *_borrowing(recording),
-    )
+    return (*_renaming(recording), *_posing(recording), *_excess(recording), *_tricks(recording))
 
 
-def _put_right(recording: Recording) -> Iterator[str]:
+def _renaming(recording: Recording) -> Iterator[str]:
     if recording.remaps:
         yield (
             f"wrong names were put right in this run, so that everything else could be judged: "
@@ -56,17 +48,19 @@ def _posing(recording: Recording) -> Iterator[str]:
         yield f"the node {code(node_name)} publishes on {codes(sorted(topics))}, as a robot does"
 
 
-def _elsewhere(recording: Recording) -> Iterator[str]:
+def _excess(recording: Recording) -> Iterator[str]:
+    """Another domain, and more messages or output than a robot needs."""
     others = recording.environment.get("other_domains")
     if others:
         yield f"the submission joined another ROS domain: {others}"
-
-
-def _flooding(recording: Recording) -> Iterator[str]:
     for topic, messages in recording.messages.items():
         most = _most_within_a_second(recording, topic, messages)
         if most > _FLOOD:
             yield f"{most} messages were sent on {code(topic)} within 1 s"
+    for process in recording.processes:
+        if process.dropped_bytes:
+            left_out = counted(process.dropped_bytes, "byte")
+            yield f"{code(process.name)} printed more than is kept, by {left_out}"
 
 
 def _most_within_a_second(recording: Recording, topic: str, messages: Sequence[Message]) -> int:
@@ -84,25 +78,14 @@ def _most_within_a_second(recording: Recording, topic: str, messages: Sequence[M
     )
 
 
-def _talking(recording: Recording) -> Iterator[str]:
-    for process in recording.processes:
-        if process.dropped_bytes:
-            left_out = counted(process.dropped_bytes, "byte")
-            yield f"{code(process.name)} printed more than is kept, by {left_out}"
-
-
-def _forging(recording: Recording) -> Iterator[str]:
-    if any(breach.what == "forged report" for breach in recording.breaches):
-        return
-    for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
-        yield (
-            f"{code(process)} wrote into the channel through which rosgrade reports from inside a "
-            "process; what is said there is never proof"
-        )
-
-
-def _borrowing(recording: Recording) -> Iterator[str]:
-    """Without a sandbox there are libraries that are missing where a class is graded."""
+def _tricks(recording: Recording) -> Iterator[str]:
+    if not any(breach.what == "forged report" for breach in recording.breaches):
+        for process in dict.fromkeys(item.process for item in recording.declared("foreign")):
+            yield (
+                f"{code(process)} wrote into the channel through which rosgrade reports from "
+                "inside a process; what is said there is never proof"
+            )
+    # Without a sandbox there are libraries that are missing where a class is graded.
     modules = recording.environment.get("unlisted", "").split()
     if modules:
         yield (

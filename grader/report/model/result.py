@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +18,15 @@ from grader.report.model.remarks import remarks
 from grader.report.model.result_model import (
     SCHEMA,
     AssignmentPart,
-    BuildPart,
     CheckPart,
     DisturbancePart,
-    EvidencePart,
     FindingPart,
     Result,
+    ResultSchema,
     ScenarioPart,
     SubmissionPart,
     WithheldPart,
+    jsonable,
 )
 
 
@@ -61,7 +60,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
             for scenario in grade.assignment.scenarios
             if scenario.id in recordings
         ),
-        build=BuildPart.model_validate(asdict(submission.build)) if submission.build else None,
+        build=submission.build,
         environment=dict(sorted(facts.environment.items())),
         started=facts.started,
         duration_s=facts.duration_s,
@@ -70,7 +69,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
 
 def result_json(result: Result) -> str:
     """Write a result as JSON; keys are always in the same order."""
-    data = result.model_dump(mode="json", by_alias=True)
+    data = jsonable(result.model_dump(mode="json", by_alias=True))
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -111,14 +110,14 @@ def read_json(file: Path) -> Any:
 
 def result_schema() -> dict[str, Any]:
     """The JSON Schema of ``result.json``."""
-    return Result.model_json_schema(by_alias=True, mode="serialization")
+    return Result.model_json_schema(schema_generator=ResultSchema, mode="serialization")
 
 
 def _check(result: CheckResult) -> CheckPart:
     decisive = result.decisive
     missed = result.status in (Status.FAILED, Status.SKIPPED)
     return CheckPart(
-        **dict(_finding(decisive)),
+        **_finding(decisive),
         id=result.id,
         title=result.title,
         points=result.points,
@@ -126,22 +125,21 @@ def _check(result: CheckResult) -> CheckPart:
         visibility=result.visibility.value,
         author_hint=result.hint if missed else "",
         waits_for=result.waits_for,
-        other_scenarios=tuple(_finding(item) for item in result.findings if item is not decisive),
+        other_scenarios=tuple(
+            FindingPart(**_finding(item)) for item in result.findings if item is not decisive
+        ),
     )
 
 
-def _finding(item: ScenarioFinding) -> FindingPart:
-    finding = item.finding
-    return FindingPart(
-        scenario=item.scenario,
-        status=finding.status,
-        expected=finding.expected,
-        observed=finding.observed,
-        hint=finding.hint,
-        disturbed=finding.disturbed,
-        traceback=item.traceback,
-        evidence=EvidencePart.model_validate(finding.evidence, from_attributes=True),
-    )
+def _finding(item: ScenarioFinding) -> dict[str, Any]:
+    return {
+        "scenario": item.scenario,
+        "traceback": item.traceback,
+        **{
+            name: getattr(item.finding, name)
+            for name in ("status", "expected", "observed", "hint", "disturbed", "evidence")
+        },
+    }
 
 
 def _scenario(recording: Recording, facts: RunFacts) -> ScenarioPart:

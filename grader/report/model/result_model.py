@@ -4,166 +4,96 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable
-from typing import Annotated, Any, Literal
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from typing import Any, Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    PlainSerializer,
-    WithJsonSchema,
-)
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
 
-from grader.checks.finding import Status
-from grader.grade.first import reason
+from grader.checks.finding import Evidence, Status
+from grader.grade.model import reason
 from grader.safe_text import encodable
+from grader.submission.record import BuildRecord
 
 SCHEMA: Literal[1] = 1
 
 
-def _rounded(value: float) -> float:
-    """Nine significant digits: microseconds in a run of minutes, and no noise behind."""
-    return float(f"{value:.9g}")
+def _normal(value: Any) -> Any:
+    """The same, so that it can be written and is read again as it was."""
+    if isinstance(value, float):
+        # Nine significant digits: microseconds in a run of minutes, and no noise behind.
+        return float(f"{value:.9g}")
+    if isinstance(value, str) and not isinstance(value, Enum):
+        return encodable(value)
+    if isinstance(value, tuple | list):
+        return tuple(map(_normal, value))
+    if isinstance(value, dict):
+        return {_normal(name): _normal(item) for name, item in value.items()}
+    if is_dataclass(value):
+        return {one.name: _normal(getattr(value, one.name)) for one in fields(value)}
+    return value
 
 
-def _json_number(value: float) -> float | str:
-    if math.isfinite(value):
+def jsonable(value: Any) -> Any:
+    """The same with numbers that JSON does not know as text."""
+    if isinstance(value, dict):
+        return {name: jsonable(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return list(map(jsonable, value))
+    if not isinstance(value, float) or math.isfinite(value):
         return value
     return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 
-def _encodable(value: Any) -> Any:
-    return encodable(value) if isinstance(value, str) else value
+class ResultSchema(GenerateJsonSchema):
+    """A schema in which a number may be one that JSON does not know."""
 
-
-Text = Annotated[str, BeforeValidator(_encodable)]
-Number = Annotated[
-    float,
-    AfterValidator(_rounded),
-    PlainSerializer(_json_number),
-    WithJsonSchema(
-        {"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]},
-    ),
-]
+    def float_schema(self, schema: core_schema.FloatSchema) -> JsonSchemaValue:
+        """Of a number."""
+        return {"anyOf": [{"type": "number"}, {"enum": ["NaN", "Infinity", "-Infinity"]}]}
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _normal(cls, data: Any) -> Any:
+        return _normal(data)
+
 
 class Identity(_Part):
     """An assignment or a submission: its name, and the hash of its files."""
 
-    id: Text
-    sha256: Text
+    id: str
+    sha256: str
 
 
 class AssignmentPart(Identity):
     """The assignment; ``location`` is its path where it is not one of rosgrade's own."""
 
-    location: Text | None = None
+    location: str | None = None
 
 
 class SubmissionPart(Identity):
     """What was handed in; ``problem`` says why nothing of it could be read."""
 
-    problem: Text | None = None
-
-
-class PlacePart(_Part):
-    """A place in the student's files."""
-
-    file: Text
-    line: int | None
-    message: Text
-
-
-class MomentPart(_Part):
-    """A time in the recording, in seconds since launch."""
-
-    label: Text
-    time_s: Number
-
-
-class PlotPart(_Part):
-    """Values to draw; the labels name the units."""
-
-    title: Text
-    x_label: Text
-    y_label: Text
-    x: tuple[Number, ...]
-    y: tuple[Number, ...]
-    band: tuple[Number, Number] | None
-    histogram: bool = False
-
-
-class TablePart(_Part):
-    """Rows to show."""
-
-    title: Text
-    header: tuple[Text, ...]
-    rows: tuple[tuple[Text, ...], ...]
-
-
-class SpanPart(_Part):
-    """Something that lasted, in seconds since launch."""
-
-    name: Text
-    begin_s: Number
-    end_s: Number
-    wrong: bool
-
-
-class CasePart(_Part):
-    """One case that was tried; ``error`` is null where no answer came."""
-
-    name: Text
-    group: Text
-    error: Number | None
-
-
-class CasesPart(_Part):
-    """Errors of many cases; the label names their unit and that of the limit."""
-
-    title: Text
-    label: Text
-    limit: Number
-    cases: tuple[CasePart, ...]
-
-
-class ComparisonPart(_Part):
-    """Two texts side by side, line by line."""
-
-    title: Text
-    expected: tuple[Text, ...]
-    observed: tuple[Text, ...]
-
-
-class EvidencePart(_Part):
-    """Where a finding can be seen."""
-
-    moments: tuple[MomentPart, ...]
-    places: tuple[PlacePart, ...]
-    log: tuple[Text, ...]
-    plots: tuple[PlotPart, ...]
-    tables: tuple[TablePart, ...]
-    spans: tuple[SpanPart, ...] = ()
-    cases: tuple[CasesPart, ...] = ()
-    comparisons: tuple[ComparisonPart, ...] = ()
+    problem: str | None = None
 
 
 class FindingPart(_Part):
     """What a check said of one scenario, or of the submission (``scenario`` is null)."""
 
-    scenario: Text | None
+    scenario: str | None
     status: Status
-    expected: Text
-    observed: Text
-    hint: Text
+    expected: str
+    observed: str
+    hint: str
     disturbed: bool
-    traceback: Text
-    evidence: EvidencePart
+    traceback: str
+    evidence: Evidence
 
 
 class CheckPart(FindingPart):
@@ -173,13 +103,13 @@ class CheckPart(FindingPart):
     is the instructor's own hint to a check that did not pass.
     """
 
-    id: Text
-    title: Text
-    points: Number
-    max_points: Number
-    visibility: Text
-    author_hint: Text
-    waits_for: tuple[Text, ...]
+    id: str
+    title: str
+    points: float
+    max_points: float
+    visibility: str
+    author_hint: str
+    waits_for: tuple[str, ...]
     other_scenarios: tuple[FindingPart, ...]
 
     @property
@@ -192,14 +122,14 @@ class WithheldPart(_Part):
     """Checks that the reader does not get to see yet; they are not in ``max_score`` either."""
 
     checks: int
-    points: Number
+    points: float
 
 
 class DisturbancePart(_Part):
     """What the host took from a run: in all, and the latest that a clock of ours woke up."""
 
-    taken_s: Number
-    worst_late_s: Number
+    taken_s: float
+    worst_late_s: float
 
 
 class ScenarioPart(_Part):
@@ -210,34 +140,21 @@ class ScenarioPart(_Part):
     machine disturbed it.
     """
 
-    id: Text
+    id: str
     seed: int
-    recording: Text | None
-    ending: Text
-    duration_s: Number
+    recording: str | None
+    ending: str
+    duration_s: float
     disturbance: DisturbancePart
-    faults: tuple[Text, ...]
-    breaches: tuple[Text, ...] = ()
-    remarks: tuple[Text, ...] = ()
+    faults: tuple[str, ...]
+    breaches: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     runs: int = 1
 
     @property
     def disturbed(self) -> bool:
         """Whether it was run again, or could not be used."""
         return self.runs > 1 or bool(self.faults)
-
-
-class BuildPart(_Part):
-    """What ``colcon build`` did."""
-
-    succeeded: bool
-    duration_s: Number
-    cached: bool
-    timed_out: bool
-    failed_packages: tuple[Text, ...]
-    lacking: tuple[Text, ...] = ()
-    culprit: PlacePart | None
-    log: Text
 
 
 class Result(_Part):
@@ -247,28 +164,23 @@ class Result(_Part):
     half a grade for a score.
     """
 
-    schema_: Literal[1]
-    rosgrade_version: Text
+    schema_: Literal[1] = Field(alias="schema")
+    rosgrade_version: str
     assignment: AssignmentPart
     submission: SubmissionPart
-    score: Number | None
-    max_score: Number
+    score: float | None
+    max_score: float
     graded: bool
-    first_to_fix: Text | None
+    first_to_fix: str | None
     checks: tuple[CheckPart, ...]
     withheld: WithheldPart
     scenarios: tuple[ScenarioPart, ...]
-    build: BuildPart | None
-    environment: dict[Text, Text]
-    started: Text
-    duration_s: Number
+    build: BuildRecord | None
+    environment: dict[str, str]
+    started: str
+    duration_s: float
 
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        alias_generator=lambda name: name.rstrip("_"),
-        populate_by_name=True,
-    )
+    model_config = ConfigDict(populate_by_name=True)
 
     def of(self, status: Status) -> tuple[CheckPart, ...]:
         """Checks that ended so, in the author's order."""

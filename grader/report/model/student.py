@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from grader.assignment.model import Visibility
-from grader.grade.first import every_point_judged, first_to_fix
-from grader.grade.points import total
+from grader.grade.model import every_point_judged, first_to_fix, total
 from grader.report.model.result_model import CheckPart, Result, WithheldPart
 
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 from grader.checks.finding import Status
 from grader.checks.wording import counted, listing
-from grader.grade import first
-from grader.grade.points import total
-from grader.report.model.result_model import CheckPart, FindingPart, PlacePart, Result
+from grader.grade import model as grades
+from grader.grade.model import total
+from grader.report.model.result_model import CheckPart, FindingPart, Result
 from grader.report.text.words import ADVICE, STATUS, counted_points, number
 from grader.safe_text import clean, one_line
+from grader.submission.record import SourceError
 
 MOST_NOTES = 20
 """Notes of the runs under one title; a submission can cause any number of them."""
@@ -43,7 +44,9 @@ def explain(check: CheckPart, result: Result) -> list[Row]:
     for texts, items in same_advice.items():
         rows += _seen(items, several=len(check.findings) > 1)
         rows += [Row(ADVICE[min(index, 1)], one_line(text)) for index, text in enumerate(texts)]
-        places = dict.fromkeys(where(place) for item in items for place in item.evidence.places)
+        places = dict.fromkeys(
+            one_line(str(place)) for item in items for place in item.evidence.places
+        )
         rows += [Row("where", place) for place in places]
         log = next((item.evidence.log for item in items if item.evidence.log), ())
         if log:
@@ -74,12 +77,7 @@ def advice(check: CheckPart, finding: FindingPart) -> tuple[str, ...]:
     return tuple(dict.fromkeys(text for text in (finding.hint, own) if text))
 
 
-def where(place: PlacePart) -> str:
-    """``file:line: message`` in one line."""
-    return one_line(f"{spot(place)}: {place.message}")
-
-
-def spot(place: PlacePart) -> str:
+def spot(place: SourceError) -> str:
     """``file:line``, or only the file."""
     return f"{place.file}:{place.line}" if place.line else place.file
 
@@ -158,7 +156,7 @@ def only_shown(result: Result) -> frozenset[str]:
         for check in result.checks
         if check.status in (Status.FAILED, Status.ERROR) and not check.max_points
     ]
-    return first.only_shown(mild, (check.waits_for for check in result.checks))
+    return grades.only_shown(mild, (check.waits_for for check in result.checks))
 
 
 def score(result: Result) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
 
+from grader.errors import GraderFault
 from grader.ros import RosInstallation
 from grader.run.cell.domain import lock_domain
 from grader.run.environment import cell_environment
@@ -14,16 +14,8 @@ from grader.run.environment import cell_environment
 _LIMIT_S = 15.0
 
 
-@dataclass(frozen=True)
-class DiscoveryTime:
-    """Seconds from the second node's creation to its match with the first, or an error."""
-
-    met_s: float | None
-    error: str = ""
-
-
-def meet(ros: RosInstallation) -> DiscoveryTime:
-    """Wait until a publisher and a subscription of two participants match."""
+def discovery_time_s(ros: RosInstallation) -> float:
+    """Seconds from the creation of a publisher to its match with a subscription."""
     with lock_domain() as domain:
         done = subprocess.run(
             [str(ros.python), "-m", "grader.run.cell.discovery_probe"],
@@ -33,10 +25,10 @@ def meet(ros: RosInstallation) -> DiscoveryTime:
             timeout=4 * _LIMIT_S,
             check=False,
         )
-    if done.returncode == 0:
-        return DiscoveryTime(float(done.stdout))
-    lines = done.stderr.strip().splitlines() or ["the nodes did not find each other"]
-    return DiscoveryTime(None, lines[-1])
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines() or ["the nodes did not find each other"]
+        raise GraderFault(lines[-1])
+    return float(done.stdout)
 
 
 def main() -> int:

@@ -8,8 +8,11 @@ is gone, and the cell kills what it started and ends.
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,9 +22,33 @@ from grader.run.cell.cell import Abandoned, Cell
 from grader.run.cell.domain import DomainLock, lock_domain
 from grader.run.cell.probe import Probe
 from grader.run.cell.progress_events import keep_apart, tell
-from grader.run.cell.type_support import add_type_support
 from grader.run.order import GO, ORDER_FILE, RECORDING_FILE, CellOrder
 from grader.run.process.descendants import become_subreaper, kill_descendants
+
+
+def add_type_support(prefixes: Iterable[Path]) -> None:
+    """Make the interfaces of install spaces of ours importable in this process."""
+    for prefix in prefixes:
+        sys.path[:0] = [str(path) for path in sorted(prefix.glob("lib/python3.*/site-packages"))]
+        _load(sorted(prefix.glob("lib/lib*.so")))
+
+
+def _load(libraries: list[Path]) -> None:
+    """Load libraries that need each other: each one again until all that it needs are there.
+
+    A library that is loaded is found by its name afterwards, wherever it lies.
+    """
+    while libraries:
+        errors: dict[Path, OSError] = {}
+        for library in libraries:
+            try:
+                ctypes.CDLL(str(library))
+            except OSError as error:
+                errors[library] = error
+        if len(errors) == len(libraries):
+            raise errors[libraries[0]]
+        libraries = list(errors)
+
 
 if TYPE_CHECKING:
     from grader.recording.model import Recording

@@ -39,11 +39,11 @@ _Started = TypeVar("_Started")
 class Guard:
     """Starts the student's sandboxes, and refuses what is asked of it."""
 
-    def __init__(self, program: bytes, calls: Mapping[str, int], unheard: bytes) -> None:
+    def __init__(self, program: bytes, calls: Mapping[str, int]) -> None:
+        """Begin to listen; an OSError where a container around us listens already."""
         self._names = {number: name for name, number in calls.items()}
         self._starter = ThreadPoolExecutor(1, "starter")
-        listener = self._starter.submit(_install, (program, unheard), calls["seccomp"]).result()
-        self._listener = listener
+        self._listener = self._starter.submit(_install, program, calls["seccomp"]).result()
         self._ending: set[int] = set()
         self._violations: list[str] = []
         self._counted = 0
@@ -55,14 +55,9 @@ class Guard:
         """Start something under guard."""
         return self._starter.submit(start).result()
 
-    @property
-    def is_heard(self) -> bool:
-        """Whether the kernel asks it."""
-        return self._listener is not None
-
     def can_have_ended(self, ours: Collection[int | None]) -> bool:
         """Whether the student's processes may have killed or stopped one of them themselves."""
-        return bool(self._ending.difference(ours)) or not self.is_heard
+        return bool(self._ending.difference(ours))
 
     @property
     def violations(self) -> tuple[str, ...]:
@@ -75,14 +70,12 @@ class Guard:
         self._thread.join()
         self._starter.shutdown()
         os.close(self._wake_read)
-        if self._listener is not None:
-            os.close(self._listener)
+        os.close(self._listener)
 
     def _listen(self) -> None:
         poll = select.poll()
         poll.register(self._wake_read, 0)
-        if self._listener is not None:
-            poll.register(self._listener, select.POLLIN)
+        poll.register(self._listener, select.POLLIN)
         while True:
             for descriptor, events in poll.poll():
                 if descriptor == self._wake_read:
@@ -114,23 +107,18 @@ class Guard:
         fcntl.ioctl(listener, _NOTIF_SEND, _ANSWER.pack(number, 0, *answer))
 
 
-def _install(programs: tuple[bytes, bytes], call: int) -> int | None:
-    """Put this thread under a filter: the first, or the second where we cannot listen.
-
-    Returns:
-        What the kernel asks through. None where a container around us listens already.
-    """
+def _install(program: bytes, call: int) -> int:
+    """Put this thread under a filter; what the kernel asks through."""
     libc = ctypes.CDLL(None, use_errno=True)
 
     class Filter(ctypes.Structure):
         _fields_ = (("count", ctypes.c_ushort), ("code", ctypes.c_void_p))
 
     libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
-    for program, flags in zip(programs, (_NEW_LISTENER, 0), strict=True):
-        code = ctypes.create_string_buffer(program, len(program))
-        given = Filter(len(program) // _INSTRUCTION_BYTES, ctypes.addressof(code))
-        done = libc.syscall(call, _SET_MODE_FILTER, flags, ctypes.byref(given))
-        if done != -1:
-            return done if flags else None
-    number = ctypes.get_errno()
-    raise OSError(number, f"seccomp: {os.strerror(number)}")
+    code = ctypes.create_string_buffer(program, len(program))
+    given = Filter(len(program) // _INSTRUCTION_BYTES, ctypes.addressof(code))
+    listener: int = libc.syscall(call, _SET_MODE_FILTER, _NEW_LISTENER, ctypes.byref(given))
+    if listener == -1:
+        number = ctypes.get_errno()
+        raise OSError(number, f"seccomp: {os.strerror(number)}")
+    return listener

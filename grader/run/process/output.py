@@ -219,7 +219,7 @@ class OutputReader:
         stream.kept = KeptLines(self._limit)
         for line in lines:
             data = _parsed(line.text)
-            if not _is_of_tracer(data):
+            if not data:
                 if line.process not in self._foreign:
                     self._foreign.add(line.process)
                     self._declare(line, "foreign", {})
@@ -239,16 +239,11 @@ def _parsed(text: str) -> dict[str, Any]:
     """What a line of a tracer says; empty if a tracer cannot have written it."""
     try:
         data = json.loads(text, parse_constant=lambda _: None)
-    except (ValueError, RecursionError):
+        is_known = data["kind"] in _KINDS and isinstance(data["pid"], int)
+        is_whole = data["kind"] not in _OF_ENDPOINTS or type(data["depth"]) is int
+    except (ValueError, RecursionError, TypeError, KeyError):
         return {}
-    return data if isinstance(data, dict) else {}
-
-
-def _is_of_tracer(data: dict[str, Any]) -> bool:
-    kind = data.get("kind")
-    if not isinstance(kind, str) or kind not in _KINDS or not isinstance(data.get("pid"), int):
-        return False
-    return kind not in _OF_ENDPOINTS or type(data.get("depth")) is int
+    return data if is_known and is_whole else {}
 
 
 def _is_fit(data: dict[str, Any]) -> bool:

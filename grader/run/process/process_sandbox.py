@@ -40,15 +40,16 @@ class ProcessSandbox:
     Attributes:
         arguments: Of bubblewrap.
         filter: File with the filter of system calls within the sandbox.
-        guard: File with the filter that asks the guard; ``unheard`` where it cannot listen.
+        unguarded: File with that filter where the guard cannot listen.
+        guard: File with the filter that asks the guard.
         calls: Numbers of the calls that the guard knows.
         folders: What a student sees at a path -> where the cell finds it.
     """
 
     arguments: tuple[str, ...]
     filter: str
+    unguarded: str
     guard: str
-    unheard: str
     calls: dict[str, int]
     limits: SandboxLimits
     folders: dict[str, str]

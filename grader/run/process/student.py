@@ -23,11 +23,11 @@ from grader.run.process.descendants import (
     kill_descendants,
     kill_tree,
     reap,
+    remove_orphaned_segments,
 )
 from grader.run.process.guard import Guard
 from grader.run.process.output import OutputReader
 from grader.run.process.process_sandbox import ProcessSandbox, SandboxedProcess
-from grader.run.process.shared_memory import remove_orphaned_segments
 
 _AFTERMATH_S = 0.5
 _STOP_TICK_S = 0.005
@@ -102,10 +102,12 @@ class StudentProcesses:
         self._sandbox = process_sandbox
         self._guard: Guard | None = None
         if process_sandbox is not None:
-            program, unheard = Path(process_sandbox.guard), Path(process_sandbox.unheard)
-            self._guard = Guard(program.read_bytes(), process_sandbox.calls, unheard.read_bytes())
-            if not self._guard.is_heard:
-                self._sandbox = replace(process_sandbox, guard=process_sandbox.unheard)
+            try:
+                program = Path(process_sandbox.guard).read_bytes()
+                self._guard = Guard(program, process_sandbox.calls)
+            except OSError:
+                # A container around us watches system calls: all are refused, and none is seen.
+                self._sandbox = replace(process_sandbox, filter=process_sandbox.unguarded)
         self._running: list[_Running] = []
         self._pids: frozenset[int] = frozenset()
         self._survivors: tuple[str, ...] = ()
@@ -153,10 +155,9 @@ class StudentProcesses:
         folder: Path,
         pass_fds: tuple[int, int],
     ) -> PlainProcess | SandboxedProcess:
-        if self._sandbox is not None and self._guard is not None:
-            return self._guard.start(
-                partial(SandboxedProcess, self._sandbox, argv, variables, pass_fds)
-            )
+        if self._sandbox is not None:
+            start = partial(SandboxedProcess, self._sandbox, argv, variables, pass_fds)
+            return self._guard.start(start) if self._guard is not None else start()
         return PlainProcess(
             argv,
             cwd=folder,

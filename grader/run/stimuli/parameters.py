@@ -1,12 +1,122 @@
-"""Calls services of the student's nodes that answer only while they spin."""
+"""Calls services that answer only while a node spins; reads and sets parameters."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from grader.recording.model import Owner
+from grader.run.stimuli.calling import Requesting
 from grader.run.stimuli.context import Playing, StimulusContext, plays
+from grader.run.stimuli.service_calls import NO_SERVER
+
+_EVERY: Mapping[str, Any] = {"prefixes": [], "depth": 0}
+_TYPES = {
+    "list_parameters": "rcl_interfaces/srv/ListParameters",
+    "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
+    "get_parameters": "rcl_interfaces/srv/GetParameters",
+    "set_parameters": "rcl_interfaces/srv/SetParameters",
+}
+
+
+@dataclass(frozen=True)
+class ParametersOrder:
+    """Read the parameters of a node, and set some of them, or none."""
+
+    node: str
+    values: dict[str, Any]
+    after_s: float = 0.0
+    within_s: float = 2.0
+
+
+@plays(ParametersOrder)
+class SettingParameters(Requesting):
+    """One round of calls to the parameter services of a node; each waits for the one before."""
+
+    def __init__(self, order: ParametersOrder, context: StimulusContext) -> None:
+        what = f"parameter services of {order.node}"
+        super().__init__(order, what, f"{order.node}/list_parameters", context)
+        self._steps: Iterator[int] | None = None
+        self._call: int | None = None
+        self._done = False
+
+    @property
+    def is_done(self) -> bool:
+        """Whether every call was answered, or waited for; or the node has no such services."""
+        return self._done or self._ready.given_up
+
+    def play(self, elapsed_s: float) -> None:
+        """Send the next call, when the one before it was answered."""
+        if self._done:
+            return
+        super().play(elapsed_s)
+        if self._steps is None:
+            there = all(
+                self._context.calls.is_ready(f"{self._order.node}/{service}", interface)
+                for service, interface in _TYPES.items()
+            )
+            if not self._ready.met(there) or not self._is_turn:
+                return
+            self._steps = self._conversation()
+        if self._call is not None and not self._context.calls.is_over(self._call):
+            # A node that does not answer one call gets no more.
+            self._done = not self._waits
+            return
+        self._call = next(self._steps, None)
+        self._wait_for_answer()
+        self._done = self._call is None
+
+    def finish(self) -> None:
+        """Note that nothing could be sent, unless it was not due yet."""
+        service, type = f"{self._order.node}/list_parameters", _TYPES["list_parameters"]
+        note = self._context.calls.note_unsent
+        if self._ready.is_in_vain:
+            note(service, type, _EVERY, NO_SERVER)
+        elif self._ready.never_answered and self._steps is None:
+            note(service, type, _EVERY, "", self._ready.there_ns)
+
+    def _conversation(self) -> Iterator[int]:
+        listed = self._send("list_parameters", _EVERY)
+        yield listed
+        response = self._context.calls.calls[listed].response or {}
+        names = [str(name) for name in response.get("result", {}).get("names", [])]
+        if names:
+            yield self._send("describe_parameters", {"names": names})
+            yield self._send("get_parameters", {"names": names})
+        values = self._order.values
+        if not values:
+            return
+        wanted = [{"name": name, "value": parameter_value(one)} for name, one in values.items()]
+        yield self._send("set_parameters", {"parameters": wanted})
+        known = [name for name in values if name in names]
+        if known:
+            yield self._send("get_parameters", {"names": known})
+
+    def _send(self, service: str, request: Mapping[str, Any]) -> int:
+        name = f"{self._order.node}/{service}"
+        return self._context.calls.send(name, _TYPES[service], request)
+
+
+def parameter_value(value: Any) -> dict[str, Any]:
+    """A bool, number, str, or a list of one kind of these, as rcl_interfaces/msg/ParameterValue."""
+    many = isinstance(value, list)
+    kinds: Sequence[tuple[type, int, str]] = (
+        (bool, 1, "bool"),
+        (int, 2, "integer"),
+        (float, 3, "double"),
+        (str, 4, "string"),
+    )
+    if many and any(isinstance(item, float) for item in value):
+        value = [float(item) for item in value]
+    kind, number, word = next(
+        item for item in kinds if isinstance(value[0] if many else value, item[0])
+    )
+    if not many:
+        return {"type": number, f"{word}_value": kind(value)}
+    # Behind the four scalars come byte_array and then the arrays in the same order.
+    return {"type": number + 5, f"{word}_array_value": value}
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class PublishOrder:
     reliability: str
     durability: str
     depth: int
-    messages: tuple[dict[str, Any], ...]
+    messages: tuple[dict[str, Any] | bytes, ...]
     times_s: tuple[float, ...]
     before_launch: int = 0
     after_s: float = 0.0
@@ -159,8 +159,10 @@ class Publishing(Playing):
     def _publish(self) -> None:
         order = self._order
         value = order.messages[min(self._sent, len(order.messages) - 1)]
-        message = filled(self._class(), value, time.time_ns())
-        cdr = serialize_message(message)
+        if isinstance(value, bytes):
+            cdr = value
+        else:
+            cdr = serialize_message(filled(self._class(), value, time.time_ns()))
         stamp_ns = time.time_ns()
         self._publisher.publish(cdr)
         self._sent += 1

@@ -1,4 +1,4 @@
-"""Run a command of unknown manners: bounded in time and output, nothing left behind."""
+"""Run a command bounded in time and output, and leave nothing of it behind."""
 
 from __future__ import annotations
 
@@ -19,8 +19,6 @@ _SUPERVISOR = Path(__file__).with_name("supervise.py")
 _CHUNK = 64 * 1024
 _KILL_S = 15.0
 _POLL_S = 0.25
-_FROZEN_S = 2.0
-"""Who looks again only after this time was stopped meanwhile, and perhaps everybody else was."""
 _LONGEST_LINE = 4096
 
 
@@ -41,25 +39,33 @@ class OutputLimits:
 class CappedOutput:
     """The beginning and the end of a stream, and how much was left out between them."""
 
-    def __init__(self, limits: OutputLimits) -> None:
-        """Start empty."""
-        self._limits = limits
+    def __init__(self, limits: OutputLimits, on_line: Callable[[str], None] | None = None) -> None:
+        """Start empty; ``on_line`` is called with each complete line."""
+        self.limits = limits
+        self.total = 0
+        self._on_line = on_line
         self._head = bytearray()
         self._tail = bytearray()
-        self.total = 0
+        self._unfinished = b""
 
     def feed(self, data: bytes) -> None:
         """Take the next bytes of the stream."""
         self.total += len(data)
-        room = self._limits.head - len(self._head)
+        room = self.limits.head - len(self._head)
         self._head += data[:room]
         self._tail += data[room:]
-        if len(self._tail) > 2 * self._limits.tail:
-            del self._tail[: -self._limits.tail]
+        if len(self._tail) > 2 * self.limits.tail:
+            del self._tail[: -self.limits.tail]
+        if self._on_line is not None:
+            *complete, last = (self._unfinished + data).split(b"\n")
+            # An endless line must not be kept; its end says most.
+            self._unfinished = last[-_LONGEST_LINE:]
+            for line in complete:
+                self._on_line(line[-_LONGEST_LINE:].decode("utf-8", "replace"))
 
     def text(self) -> str:
         """What was kept, as text; a line in the middle says how much is missing."""
-        tail = self._tail[-self._limits.tail :]
+        tail = self._tail[-self.limits.tail :]
         missing = self.total - len(self._head) - len(tail)
         gap = f"\n[... {missing} bytes left out ...]\n".encode() if missing else b""
         return bytes(self._head + gap + tail).decode("utf-8", "replace")
@@ -71,8 +77,7 @@ class Outcome:
 
     Attributes:
         status: Exit status, or minus the signal's number, or None where we ended it.
-        ended_by_us: ``time``, ``output`` or what ``excess`` said, the limit that it passed, or
-            None.
+        ended_by_us: The limit that it passed: ``time``, ``output`` or what ``excess`` returned.
     """
 
     status: int | None
@@ -101,14 +106,12 @@ def run_bounded(
         GraderFault: It could not be started or supervised.
     """
     limits = output or OutputLimits()
-    kept = CappedOutput(limits)
-    lines = _Lines(on_line)
+    kept = CappedOutput(limits, on_line)
     started = time.monotonic()
-    with _supervised(command, cwd, environment) as (process, status_read):
-        ended_by_us = _drain(process, kept, lines, limits, started + wall_s, excess)
-        status = _finish(process, status_read)
+    with _supervised(command, cwd, environment) as process:
+        ended_by_us = _drain(process, kept, started + wall_s, excess)
     return Outcome(
-        status=None if ended_by_us else status,
+        status=None if ended_by_us else process.returncode,
         ended_by_us=ended_by_us,
         output=kept.text(),
         duration_s=time.monotonic() - started,
@@ -118,115 +121,69 @@ def run_bounded(
 @contextlib.contextmanager
 def _supervised(
     command: Sequence[str], cwd: Path, environment: Mapping[str, str]
-) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    status_read, status_write = os.pipe()
+) -> Iterator[subprocess.Popen[bytes]]:
+    """The process that runs the command; afterwards it is gone, and all that it started."""
     try:
         process = subprocess.Popen(
-            [sys.executable, "-I", "-S", str(_SUPERVISOR), str(status_write), *command],
+            [sys.executable, "-I", "-S", str(_SUPERVISOR), *command],
             cwd=cwd,
             env=dict(environment),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            pass_fds=(status_write,),
             start_new_session=True,
             bufsize=0,
         )
     except OSError as error:
-        os.close(status_read)
         raise GraderFault(f"{command[0]} could not be started: {error}") from error
-    finally:
-        os.close(status_write)
     try:
-        yield process, status_read
+        yield process
     finally:
         # Closing its input makes the supervisor kill everything, also on Ctrl-C here.
         _close(process.stdin)
         try:
             process.wait(_KILL_S)
-        except subprocess.TimeoutExpired:
+        except subprocess.TimeoutExpired as error:
             process.kill()
             process.wait()
-        _close(process.stdout)
-        os.close(status_read)
+            raise GraderFault("processes of a command could not be killed") from error
+        finally:
+            _close(process.stdout)
 
 
 def _drain(
     process: subprocess.Popen[bytes],
     kept: CappedOutput,
-    lines: _Lines,
-    limits: OutputLimits,
     deadline: float,
     excess: Callable[[int], str | None],
 ) -> str | None:
     """Take the output until the supervisor has ended; the limit that was passed, or None."""
     assert process.stdout is not None
-    seen = time.monotonic()
-    next_look = seen + _POLL_S
+    next_look = time.monotonic() + _POLL_S
     with selectors.DefaultSelector() as selector:
         selector.register(process.stdout, selectors.EVENT_READ)
         while True:
+            # Asked first: what was written until its end is there to be read afterwards.
+            is_gone = process.poll() is not None
+            if selector.select(0.0 if is_gone else _POLL_S):
+                block = os.read(process.stdout.fileno(), _CHUNK)
+                if not block:
+                    return None
+                kept.feed(block)
+                if kept.total > kept.limits.total:
+                    return "output"
+            elif is_gone:
+                # A daemon holds the pipe although the supervisor is gone.
+                return None
             now = time.monotonic()
-            if now - seen > _FROZEN_S:
-                # Ctrl-Z, or a container that was paused: nobody knows who could work meanwhile.
-                deadline += now - seen
-            seen = now
-            left = deadline - now
-            if left <= 0:
+            # What has ended was in time, also where this process was stopped meanwhile.
+            if now > deadline and not is_gone:
                 return "time"
             if now >= next_look:
                 passed = excess(process.pid)
                 if passed is not None:
                     return passed
-                # To look may take long where there is much to count; that is not a stop.
-                seen = time.monotonic()
-                next_look = seen + _POLL_S
-            # Asked first: what was written until its end is there to be read afterwards.
-            is_gone = process.poll() is not None
-            if selector.select(0.0 if is_gone else min(left, _POLL_S)):
-                block = os.read(process.stdout.fileno(), _CHUNK)
-                if not block:
-                    return None
-                kept.feed(block)
-                lines.feed(block)
-                if kept.total > limits.total:
-                    return "output"
-            elif is_gone:
-                # Somebody holds the pipe although the supervisor is gone.
-                return None
-
-
-def _finish(process: subprocess.Popen[bytes], status_read: int) -> int | None:
-    """Wait for the supervisor; exit status or minus the signal, None where it was ended."""
-    _close(process.stdin)
-    try:
-        process.wait(_KILL_S)
-    except subprocess.TimeoutExpired as error:
-        process.kill()
-        raise GraderFault("processes of a command could not be killed") from error
-    how, _, number = os.read(status_read, 100).decode().partition(" ")
-    if how == "closed":
-        return None
-    if not number:
-        raise GraderFault("the process that watches over a command was killed")
-    return -int(number) if how == "signal" else int(number)
-
-
-class _Lines:
-    """Hands over complete lines."""
-
-    def __init__(self, on_line: Callable[[str], None] | None) -> None:
-        self._on_line = on_line
-        self._rest = b""
-
-    def feed(self, block: bytes) -> None:
-        if self._on_line is None:
-            return
-        *complete, self._rest = (self._rest + block).split(b"\n")
-        # An endless line must not be kept; who speaks last is heard.
-        self._rest = self._rest[-_LONGEST_LINE:]
-        for line in complete:
-            self._on_line(line[-_LONGEST_LINE:].decode("utf-8", "replace"))
+                next_look = time.monotonic() + _POLL_S
 
 
 def _close(stream: IO[bytes] | None) -> None:

@@ -66,11 +66,7 @@ _ENTRY = TypeAdapter(_Entry)
 
 @dataclass(frozen=True)
 class CachedBuild:
-    """A build that is in the cache.
-
-    Attributes:
-        install: Its install space, or None where nothing was installed.
-    """
+    """A build that is in the cache, with its install space if something was installed."""
 
     build: BuildRecord
     install: Path | None
@@ -81,7 +77,10 @@ BUILDS = "builds"
 
 
 class BuildCache:
-    """The builds in one cache folder; several processes may use it at once."""
+    """The builds in one cache folder; several processes may use it at once.
+
+    A folder that cannot be used is a :class:`GraderFault`.
+    """
 
     def __init__(self, folder: Path, limits: CacheLimits | None = None) -> None:
         """Name the folder; it is made when something is stored."""
@@ -89,14 +88,11 @@ class BuildCache:
         self._limits = limits or CacheLimits()
 
     @contextlib.contextmanager
-    def locked(self, key: str, wait_s: float) -> Iterator[bool]:
+    def locked(self, key: str, wait_s: float) -> Iterator[None]:
         """Hold a build's lock, so that two processes do not both build it.
 
         Args:
             wait_s: Longest wait; without the lock the same work is done twice, nothing worse.
-
-        Raises:
-            GraderFault: The cache folder cannot be used.
         """
         deadline = time.monotonic() + wait_s
         with _usable(self._folder):
@@ -104,11 +100,9 @@ class BuildCache:
             check_executable(self._folder)
             file = os.open(self._folder / f"{key}.lock", os.O_RDWR | os.O_CREAT, 0o600)
         try:
-            held = _lock(file)
-            while not held and time.monotonic() < deadline:
+            while not _lock(file) and time.monotonic() < deadline:
                 time.sleep(_LOCK_POLL_S)
-                held = _lock(file)
-            yield held
+            yield
         finally:
             os.close(file)
 
@@ -125,11 +119,7 @@ class BuildCache:
 
     @contextlib.contextmanager
     def unfinished(self) -> Iterator[Path]:
-        """A folder in which an entry is made; gone at the end, unless it was stored.
-
-        Raises:
-            GraderFault: The cache folder cannot be used.
-        """
+        """A folder in which an entry is made; gone at the end, unless it was stored."""
         with _usable(self._folder):
             self._folder.mkdir(parents=True, exist_ok=True)
             folder = Path(tempfile.mkdtemp(prefix=_UNFINISHED, dir=self._folder))
@@ -142,9 +132,6 @@ class BuildCache:
         """Make an unfinished folder, with what is in its ``install``, the build of that key.
 
         An entry that another process stored meanwhile stays and is returned.
-
-        Raises:
-            GraderFault: The cache folder cannot be written.
         """
         install = unfinished / INSTALL
         installed = install.is_dir()
@@ -198,15 +185,13 @@ def tree_hash(folder: Path) -> str:
     """Hash all files and links below a folder, with what the build compiled of Python."""
     total = hashlib.sha256()
     for path in _files(folder, compiled=True):
-        name = os.fsencode(path.relative_to(folder))
-        status = path.lstat()
+        status, content = path.lstat(), b"special"
         if stat.S_ISLNK(status.st_mode):
             content = os.fsencode(path.readlink())
         elif stat.S_ISREG(status.st_mode):
             content = path.read_bytes()
-        else:
-            content = b"special"
         executable = b"x" if status.st_mode & stat.S_IXUSR else b"-"
+        name = os.fsencode(path.relative_to(folder))
         total.update(executable + name + b"\0" + hashlib.sha256(content).digest())
     return total.hexdigest()
 

@@ -1,20 +1,22 @@
-"""Run one command and leave nothing of it behind: ``supervise.py STATUS_FD COMMAND...``.
+"""Run one command and leave nothing of it behind: ``supervise.py COMMAND...``.
 
-A script of its own that imports nothing of ours, so that it starts in milliseconds. It becomes
-the parent of every orphan below it (``PR_SET_CHILD_SUBREAPER``); so daemons are found whatever
-process group or session they made for themselves, and it kills them when the command has ended,
-or when its own standard input is closed, which also happens when its caller dies.
+A script of its own that imports nothing of ours, so that it starts quickly. It becomes the parent
+of every orphan below it (``PR_SET_CHILD_SUBREAPER``); so daemons are found whatever process group
+or session they made for themselves. It kills them when the command has ended, or when its own
+standard input is closed, which also happens when its caller dies.
 
-It writes how the command ended to STATUS_FD: ``exit N``, ``signal N``, or ``closed``.
+It ends as the command did: with its exit status, or by the same signal.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import resource
 import select
 import signal
+import subprocess
 import sys
 import time
 
@@ -24,59 +26,39 @@ _GIB = 2**30
 
 
 def descendants() -> set[int]:
-    """Process ids of all processes below this one that are not yet reaped."""
+    """Process ids of all processes below this one."""
     children: dict[int, list[int]] = {}
     for name in os.listdir("/proc"):  # noqa: PTH208 - pathlib takes as long to import as this runs
-        if not name.isdigit():
-            continue
-        try:
-            with open(f"/proc/{name}/stat", "rb") as file:  # noqa: PTH123 - as above
+        # A process may be gone by now.
+        with contextlib.suppress(OSError, ValueError):
+            with open(f"/proc/{int(name)}/stat", "rb") as file:  # noqa: PTH123 - as above
                 # The command's name may contain anything, but the last ")" ends it.
-                fields = file.read().rpartition(b")")[2].split()
-        except OSError:
-            continue
-        children.setdefault(int(fields[1]), []).append(int(name))
+                parent = int(file.read().rpartition(b")")[2].split()[1])
+            children.setdefault(parent, []).append(int(name))
     found: set[int] = set()
     pending = [os.getpid()]
     while pending:
-        for child in children.get(pending.pop(), []):
-            if child not in found:
-                found.add(child)
-                pending.append(child)
+        below = set(children.get(pending.pop(), ())) - found
+        found |= below
+        pending += below
     return found
-
-
-def reap(child: int) -> str:
-    """Collect whoever has ended; how the command itself ended, or nothing."""
-    ended = ""
-    while True:
-        try:
-            pid, status = os.waitpid(-1, os.WNOHANG)
-        except ChildProcessError:
-            return ended
-        if pid == 0:
-            return ended
-        if pid == child:
-            signalled = os.WIFSIGNALED(status)
-            number = os.WTERMSIG(status) if signalled else os.WEXITSTATUS(status)
-            ended = f"signal {number}" if signalled else f"exit {number}"
 
 
 def kill_all() -> None:
     """Kill every descendant, and those that they start meanwhile."""
     deadline = time.monotonic() + _KILL_S
     while time.monotonic() < deadline:
-        reap(0)
+        with contextlib.suppress(ChildProcessError):
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                pass
         left = descendants()
         if not left:
             return
         # Stopped first, so that a fork bomb cannot outrun the killing.
         for number in (signal.SIGSTOP, signal.SIGKILL):
             for pid in left:
-                try:
+                with contextlib.suppress(OSError):
                     os.kill(pid, number)
-                except OSError:
-                    continue
         time.sleep(0.002)
 
 
@@ -92,50 +74,33 @@ def limit() -> None:
         resource.setrlimit(what, (allowed, allowed))
 
 
-def start(command: list[str], keep: int) -> int:
-    """Start the command in a session of its own, reading nothing."""
-    child = os.fork()
-    if child:
-        return child
+def run(command: list[str]) -> int:
+    """Run the command until its end or ours; its status, or minus the signal that ended it."""
     try:
-        os.setsid()
-        null = os.open(os.devnull, os.O_RDONLY)
-        os.dup2(null, 0)
-        os.set_inheritable(keep, False)
-        signal.set_wakeup_fd(-1)
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-        limit()
-        os.execvpe(command[0], command, os.environ)
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
     except OSError as error:
         os.write(2, f"{command[0]}: {error}\n".encode(errors="replace"))
-    finally:
-        os._exit(127)
+        return 127
+    ended = os.pidfd_open(process.pid)
+    ready, _, _ = select.select([0, ended], [], [])
+    return process.wait() if ended in ready else -signal.SIGKILL
 
 
-def main(status_fd: int, command: list[str]) -> None:
-    """Run the command, wait for its end or ours, kill what is left, say how it ended."""
+def main(command: list[str]) -> None:
+    """Run the command, kill what is left, end as it did."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    wake_read, wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-    signal.signal(signal.SIGCHLD, lambda *_: None)
-    signal.set_wakeup_fd(wake_write)
+    limit()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         # Ctrl-C in the terminal reaches the caller, who closes our input.
         signal.signal(number, signal.SIG_IGN)
-    child = start(command, status_fd)
-    ended = ""
-    while not ended:
-        ready, _, _ = select.select([0, wake_read], [], [], 1.0)
-        if wake_read in ready:
-            os.read(wake_read, 4096)
-        if 0 in ready and not os.read(0, 4096):
-            ended = "closed"
-        ended = reap(child) or ended
+    status = run(command)
     kill_all()
-    try:
-        os.write(status_fd, ended.encode())
-    except OSError:
-        return
+    if status < 0:
+        if -status not in (signal.SIGKILL, signal.SIGSTOP):
+            signal.signal(-status, signal.SIG_DFL)
+        os.kill(os.getpid(), -status)
+    os._exit(status)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), sys.argv[2:])
+    main(sys.argv[1:])

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import IO
 
 from grader.errors import GraderFault, SubmissionError
-from grader.submission.intake import tars, zips
+from grader.submission.intake.contents import check_directory, tar_members, zip_members
 from grader.submission.intake.members import MIB, ArchiveLimits, Kind, Member, Refused, admit
 from grader.submission.intake.paths import shown
 
@@ -60,7 +60,7 @@ def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> No
     """Unpack a zip or a plain or compressed tar; they are told apart by content.
 
     Args:
-        into: An existing, empty folder that nobody else uses.
+        into: An existing, empty folder.
 
     Raises:
         SubmissionError: It is no archive, broken, encrypted, unsafe or too large; names the
@@ -78,15 +78,15 @@ def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> No
         start = file.read(512)
         file.seek(0)
         if start.startswith((b"PK\x03\x04", b"PK\x05\x06")):
-            zips.check_directory(file, limits)
+            check_directory(file, limits)
             zipped = zipfile.ZipFile(file)
-            infos, found = zipped.infolist(), zips.members(zipped)
+            infos, found = zipped.infolist(), zip_members(zipped)
 
             def content(member: Member) -> IO[bytes]:
                 return zipped.open(infos[member.place])
         else:
             plain = _plain_tar(file, start, name, scratch, limits)
-            found = tars.members(plain)
+            found = tar_members(plain)
 
             def content(member: Member) -> IO[bytes]:
                 plain.seek(member.place)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Collection, Set
 
 from grader.submission.intake.paths import parents
 from grader.submission.read.manifest import MANIFEST
@@ -16,9 +16,10 @@ TOOL_FOLDERS = frozenset(_TOOLS.split())
 """Folders that tools make, wherever they are."""
 
 COLCON_FOLDERS = ("build", "install", "log")
-_COLCON_MARKS = ("COLCON_IGNORE", ".built_by", ".colcon_install_layout", "local_setup.sh")
+_COLCON_MARKS = {"COLCON_IGNORE", ".built_by", ".colcon_install_layout", "local_setup.sh"}
 _VIRTUAL_ENVIRONMENT = "pyvenv.cfg"
-_MARKS = (*_COLCON_MARKS, _VIRTUAL_ENVIRONMENT)
+MARKS = (*_COLCON_MARKS, _VIRTUAL_ENVIRONMENT, MANIFEST)
+"""Files that tell what a folder is."""
 
 _EDITORS = re.compile(
     r"""
@@ -41,22 +42,26 @@ def is_left_out(path: str) -> bool:
     )
 
 
-def is_leftover(name: str, holds: Callable[[str], bool], in_package: bool) -> bool:
-    """Whether a folder is something that a tool left behind."""
-    if name in TOOL_FOLDERS or name.endswith(".egg-info") or holds(_VIRTUAL_ENVIRONMENT):
+def is_leftover(name: str, marks: Set[str], in_package: bool) -> bool:
+    """Whether a folder is something that a tool left behind.
+
+    Args:
+        marks: Those of ``MARKS`` that are in it.
+    """
+    if name in TOOL_FOLDERS or name.endswith(".egg-info") or _VIRTUAL_ENVIRONMENT in marks:
         return True
     if name not in COLCON_FOLDERS:
         return False
     # A package may well have a module called "log"; a workspace has no use for another "log".
-    return any(map(holds, _COLCON_MARKS)) or not (in_package or holds(MANIFEST))
+    return bool(marks & _COLCON_MARKS) or not (in_package or MANIFEST in marks)
 
 
 def is_within_leftover(path: str, present: Collection[str]) -> bool:
     """Whether a path is in a folder that :func:`is_leftover`."""
     in_package = MANIFEST in present
     for folder in reversed(parents(path)):
-        marks = {one for one in (*_MARKS, MANIFEST) if f"{folder}/{one}" in present}
-        if is_leftover(folder.rpartition("/")[2], marks.__contains__, in_package):
+        marks = {one for one in MARKS if f"{folder}/{one}" in present}
+        if is_leftover(folder.rpartition("/")[2], marks, in_package):
             return True
         in_package = in_package or MANIFEST in marks
     return False

@@ -11,11 +11,10 @@ import os
 import stat
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
 from grader.errors import GraderFault, SubmissionError, machine_fault
-from grader.submission.intake.leftovers import COLCON_FOLDERS, is_left_out, is_leftover
+from grader.submission.intake.leftovers import COLCON_FOLDERS, MARKS, is_left_out, is_leftover
 from grader.submission.intake.members import MIB, ArchiveLimits, LeadsOut, links_inside
 from grader.submission.intake.paths import is_within, join, parents, shown
 from grader.submission.read.manifest import MANIFEST
@@ -102,7 +101,11 @@ def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
             if len(listing.files) + len(links) > limits.members:
                 raise SubmissionError(f"the submission holds more than {limits.members} files")
             if total > limits.total_bytes:
-                raise SubmissionError(_too_large(listing.files, limits))
+                largest = max(listing.files, key=lambda file: file.size)
+                raise SubmissionError(
+                    f"the submission holds more than {limits.total_bytes // MIB} MiB (largest file "
+                    f"so far: {shown(largest.path)}, {largest.size / MIB:.1f} MiB)"
+                )
     except OSError as error:
         raise unreadable(str(error.filename), error) from error
     files = [file.path for file in listing.files]
@@ -130,14 +133,12 @@ def _walk(
             linked_leftover = entry.is_symlink() and entry.name in COLCON_FOLDERS
             if not (is_left_out(entry.name) or entry.name.endswith(".pyc") or linked_leftover):
                 yield path, entry
-        elif is_leftover(entry.name, partial(_holds, root / path), in_package):
+            continue
+        marks = {mark for mark in MARKS if (root / path / mark).exists()}
+        if is_leftover(entry.name, marks, in_package):
             skipped.append(path)
         else:
             yield from _walk(root, path, in_package, skipped, depth - 1)
-
-
-def _holds(folder: Path, name: str) -> bool:
-    return (folder / name).exists()
 
 
 def _target(root: Path, path: str) -> str:
@@ -155,14 +156,6 @@ def _target(root: Path, path: str) -> str:
 def _leads_out(which: str) -> SubmissionError:
     return SubmissionError(
         f"{which} leads out of the submission; put what it leads to there instead"
-    )
-
-
-def _too_large(files: list[SubmissionFile], limits: ArchiveLimits) -> str:
-    largest = max(files, key=lambda file: file.size)
-    return (
-        f"the submission holds more than {limits.total_bytes // MIB} MiB "
-        f"(largest file so far: {shown(largest.path)}, {largest.size / MIB:.1f} MiB)"
     )
 
 

@@ -1,8 +1,6 @@
-"""Open a submission: a folder or an archive becomes a snapshot that nobody changes any more.
+"""Open a submission: a folder or an archive becomes a private copy that no longer changes.
 
-Everything that is found out about a submission (hash, manifests, imports, build) is found out
-of one private copy. So the student may go on editing, and nothing of ours can touch the
-original.
+So the student may go on editing, and nothing of ours can touch the original.
 """
 
 from __future__ import annotations
@@ -63,11 +61,7 @@ class Located:
 
 @contextmanager
 def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Located]:
-    """Open a submission for as long as the context lasts.
-
-    Args:
-        path: A folder (package, ``src``, workspace, clone of a repository, with any number of
-            folders around it) or an archive of one.
+    """Open a folder, or an archive of one, for as long as the context lasts.
 
     Raises:
         UsageError: Nothing is there, or it is a URL.
@@ -96,25 +90,19 @@ def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Lo
 
 @contextmanager
 def only(located: Located, folder: str, name: str) -> Iterator[Located]:
-    """Open one package of a submission for as long as the context lasts, without the others.
-
-    Args:
-        folder: The package's folder; not the submission itself.
+    """Open one package of a submission, which lies in a folder of it, without the others.
 
     Raises:
         GraderFault: This machine cannot hold the copy.
     """
-    inside = [
-        replace(file, path=file.path[len(folder) + 1 :])
-        for file in located.files
-        if is_within(file.path, folder)
-    ]
+    files = [file for file in located.files if is_within(file.path, folder)]
+    inside = Listing(files).inside(folder).files
     with tempfile.TemporaryDirectory(prefix="apart-", dir=located.root.parent) as scratch:
         root = Path(scratch, "submission")
         root.mkdir()
         sha256 = _copy(located.root / folder, inside, root / name)
-        files = tuple(replace(file, path=f"{name}/{file.path}") for file in inside)
-        yield Located(located.id, sha256, root, files, (name,))
+        moved = tuple(replace(file, path=f"{name}/{file.path}") for file in inside)
+        yield Located(located.id, sha256, root, moved, (name,))
 
 
 def check_path(path: Path | str) -> Path:

@@ -1,8 +1,6 @@
 """Which members of an archive may be unpacked, and where: decided before a byte is written.
 
-Everything here is a pure function of names, kinds and sizes. Symbolic links are kept only where
-they lead to something inside; :mod:`grader.submission.intake.archive` makes them after all files,
-so that nothing is ever written through one.
+Everything here is a pure function of names, kinds and sizes.
 """
 
 from __future__ import annotations
@@ -26,12 +24,7 @@ _DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 
 @dataclass(frozen=True)
 class ArchiveLimits:
-    """How much a submission may hold; folders are held to the same sizes and numbers.
-
-    Attributes:
-        members: Number of files, folders and links. What tools left behind
-            (``leftovers.TOOL_FOLDERS``) is not unpacked and may be ten times as much.
-    """
+    """How much a submission may hold; folders are held to the same sizes and numbers."""
 
     total_bytes: int = 256 * MIB
     members: int = 20_000
@@ -43,7 +36,7 @@ class ArchiveLimits:
 
     @property
     def members_with_tools(self) -> int:
-        """How many members an archive may list, with everything that is left out."""
+        """How many members an archive may list, with what tools left behind and is left out."""
         return 10 * self.members
 
 
@@ -81,9 +74,6 @@ def admit(
     members: Iterable[Member], *, archive: str, archive_bytes: int, limits: ArchiveLimits
 ) -> list[Member]:
     """Check every member; nothing may be unpacked when one of them is refused.
-
-    Args:
-        members: In the archive's order; read no further than the limits allow.
 
     Returns:
         What to unpack, with safe relative paths as names. Folders above a file are implied. Links

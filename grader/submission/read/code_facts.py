@@ -15,7 +15,6 @@ class SourceClass:
 
     Attributes:
         name: Qualified in its module, such as ``Outer.Inner`` or ``make.<locals>.Bot``.
-        line: Line from 1.
         bases: As written: ``Node``, ``rclpy.node.Node``; of a call such as ``mixed(Node)`` the
             names in it.
     """
@@ -32,7 +31,6 @@ class SourceFunction:
 
     Attributes:
         name: Qualified in its module, such as ``Bot.callback`` or ``main.<locals>.help``.
-        line: Line from 1.
         unannotated: Parameters without a type hint; ``self`` and ``cls`` are left out.
     """
 
@@ -67,12 +65,7 @@ class SourceFile:
 
 @dataclass(frozen=True)
 class LintFinding:
-    """A place that breaks a rule.
-
-    Attributes:
-        code: Of the rule, such as ``F401``.
-        line: Line from 1.
-    """
+    """A place that breaks a rule; its code is such as ``F401``."""
 
     code: str
     file: str
@@ -82,12 +75,7 @@ class LintFinding:
 
 @dataclass(frozen=True)
 class Lint:
-    """What ruff said of a package.
-
-    Attributes:
-        problem: Why it could not say anything, or None.
-        findings: At most 20 of each rule, the first ones.
-    """
+    """What ruff says of a package: at most 20 findings of each rule, or why there are none."""
 
     problem: str | None = None
     findings: tuple[LintFinding, ...] = ()

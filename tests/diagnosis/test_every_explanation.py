@@ -1,0 +1,469 @@
+"""Each explanation of the catalogue answers for a run or a submission of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+
+from grader.diagnosis import explanation
+from grader.diagnosis.explanation import Symptom, explanations
+from grader.diagnosis.process.exceptions import Row
+from grader.recording.event import Breach
+from grader.recording.model import Ending, Kind, Recording
+from grader.submission.record import BuildRecord, SourceError
+from tests.checks import builder
+from tests.checks.builder import (
+    NODE,
+    RELIABLE,
+    call,
+    declarations,
+    declared,
+    died,
+    endpoint,
+    every,
+    judge,
+    messages,
+    node,
+    nodeless,
+    output,
+    package,
+    process,
+    reader,
+    recording,
+    sent,
+    silent,
+    stimulus,
+    submission,
+    taken,
+    traceback,
+    twist,
+)
+from tests.checks.requests import action, asked, service, serving
+from tests.checks.test_interface import CMAKE, INTERFACE, TEXT, handed_in, unbuilt
+from tests.checks.test_package import NEEDS_NAV2
+from tests.diagnosis import motion_cases
+from tests.diagnosis.motion_cases import Group
+
+STRING = "std_msgs/msg/String"
+LATCHED = replace(RELIABLE, durability="transient_local")
+LISTENER = endpoint("/chatter", kind=Kind.SUBSCRIPTION, type=STRING)
+EXITED = {"ending": Ending.EXITED}
+EXCHANGED = {"bot_pub": "bot_publisher.bot_sub:main", "bot_sub": "bot_publisher.bot_pub:main"}
+NOT_STARTED = {"ending": Ending.NOT_STARTED, "processes": ()}
+BUSY = taken(0.1, 4.4, waited_s=4.2)
+FAILED_BUILD = BuildRecord(
+    False, 1.0, failed_packages=("bot_publisher",), log="Starting >>> bot_publisher\n"
+)
+OTHER_DOMAIN = {"environment": {"other_domains": "7"}}
+HANGS = tuple(call(0.5 * n, None) for n in range(2, 6))
+
+
+@contextmanager
+def answers() -> Iterator[set[str]]:
+    """The names of the explanations that answered meanwhile, each with that of its symptom."""
+    names: set[str] = set()
+
+    def recorded(entry: explanation.Explanation) -> explanation.Explanation:
+        def apply(symptom: Symptom[Any]) -> Any:
+            answer = entry.apply(symptom)
+            if answer is not None:
+                names.add(f"{entry.symptom.__name__}.{entry.name}")
+            return answer
+
+        return replace(entry, apply=apply)
+
+    entries = {symptom: tuple(map(recorded, found)) for symptom, found in explanations().items()}
+    with patch.object(explanation, "explanations", lambda: entries):
+        yield names
+
+
+def exchanged(run: Recording) -> Recording:
+    changed = package(entry_points=tuple(EXCHANGED.items()))
+    return replace(run, submission=submission(changed), declarations=())
+
+
+def gone(item: Any, time_s: float = 0.9) -> Any:
+    return replace(item, vanished_ns=recording().launched_ns + round(time_s * 1e9))
+
+
+def answering(*listeners: Any, times_s: Any = (), **changes: Any) -> Recording:
+    """A node that should answer on /cmd_vel what it is sent on /chatter, and does not."""
+    found = {
+        "messages": {},
+        "sent": sent(times_s),
+        "answers": {"/chatter": "/cmd_vel"},
+        "endpoints": (endpoint(), *listeners, reader(), stimulus()),
+        "declarations": declarations(timer_s=None),
+    }
+    return recording(**{**found, **changes})
+
+
+def logging(*lines: str, **changes: Any) -> Recording:
+    """A node that is sent five numbers on /chatter, and writes these lines after each."""
+    times_s = every(0.3, 5, 1.0)
+    log = tuple(one for t in times_s for text in lines for one in output(text, time_s=t + 0.01))
+    values = [{"data": 12.34, "other": 5.67}] * len(times_s)
+    found = {
+        "messages": {},
+        "sent": sent(times_s, values=values),
+        "endpoints": (LISTENER, stimulus()),
+        "log": log,
+    }
+    return recording(**{**found, **changes})
+
+
+def turned(x: float = 1.0, z: float = 0.5, roll: float = 0.0) -> Recording:
+    return recording(messages=messages(every(0.3), twist((x, 0, 0), (roll, 0, z))))
+
+
+def typed(type_: str) -> Recording:
+    return recording(endpoints=(endpoint(type=type_), reader()))
+
+
+def paced(intervals_s: list[float], **changes: Any) -> Recording:
+    """A publisher whose messages come after these intervals."""
+    times_s = builder.after(intervals_s)
+    return recording(messages=messages(times_s), stop_s=max(times_s) + 0.5, **changes)
+
+
+CRASH = {"processes": (died(1),), **EXITED, "log": output(traceback("KeyError: 'x'"))}
+COUNT = {"topic": "/cmd_vel", "at_least": 5}
+EXPECTED = {"topic": "/cmd_vel", "value": {"linear": {"x": 1.0}, "angular": {"z": 0.5}}}
+LOGS = {"topic": "/chatter", "fields": ["data"], "at_least": 4}
+ALIVE: dict[str, Any] = {}
+NAMED = {"name": NODE}
+ENABLE = {"service": "/enable", "within": "1 s"}
+TYPED = {"topic": "/cmd_vel", "type": "geometry_msgs/msg/Twist"}
+EACH = {"topic": "/cmd_vel", "period": "300 ms"}
+PACKAGE = {"package": "bot_publisher"}
+OF_INTERFACE = {"interface": INTERFACE}
+
+
+# A check, its parameters, and what it judges by the explanations that answer.
+CASES: list[Group] = [
+    (
+        "node.exists",
+        NAMED,
+        {
+            "NoNode.process_ended ProcessExit.main_returned": nodeless(
+                processes=(died(0),), **EXITED
+            ),
+            "ProcessExit.limit_exceeded": nodeless(
+                processes=(died(-9),), breaches=(Breach(1, "memory", "much", "little"),), **EXITED
+            ),
+            "ProcessExit.ended_by_signal": nodeless(processes=(died(-11),), **EXITED),
+            "ProcessExit.raised Raised.any_exception": nodeless(**CRASH),
+            "ProcessExit.machine_lacks_it": nodeless(
+                **{
+                    **CRASH,
+                    "log": output(
+                        traceback("ModuleNotFoundError: No module named 'tf_transformations'")
+                    ),
+                }
+            ),
+            "Raised.unknown_library": nodeless(
+                **{
+                    **CRASH,
+                    "environment": {"libraries": "numpy"},
+                    "log": output(traceback("ModuleNotFoundError: No module named 'pandas'")),
+                }
+            ),
+            "Raised.not_imported": nodeless(
+                **{**CRASH, "log": output(traceback("NameError: name 'Twist' is not defined"))}
+            ),
+            "Raised.no_such_attribute": nodeless(
+                **{
+                    **CRASH,
+                    "log": output(
+                        traceback("AttributeError: module 'bot.node' has no attribute 'main'")
+                    ),
+                }
+            ),
+            "NoNode.not_built": nodeless(**NOT_STARTED, submission=submission(build=FAILED_BUILD)),
+            "NoNode.no_executable": nodeless(**NOT_STARTED),
+            "NoNode.other_domain": nodeless(**OTHER_DOMAIN),
+            "NoNode.never_appeared": nodeless(
+                declarations=(declared("started"), declared("node", node=NODE))
+            ),
+            "NoNode.main_does_not_come_to_it": nodeless(),
+            "OtherNode.process_crashed": recording(
+                nodes=(node("/logger"),), **{**CRASH, "processes": (process("b/o"), died(1))}
+            ),
+            "OtherNode.node_never_appeared": recording(
+                nodes=(node("/other"),),
+                declarations=(*declarations(), declared("node", node="/other")),
+            ),
+            "OtherNode.other_name": recording(nodes=(node("/minimal"),), declarations=()),
+        },
+    ),
+    (
+        "node.alive",
+        ALIVE,
+        {
+            "ProcessExit.service_without_response": recording(
+                **{
+                    **CRASH,
+                    "log": output(traceback("TypeError").replace(", in f", ", in send_response")),
+                }
+            ),
+        },
+    ),
+    (
+        "node.exists",
+        {"name": "/bot_pub"},
+        {
+            "OtherNode.exchanged_executables": exchanged(recording(nodes=(node("/bot_sub"),))),
+        },
+    ),
+    (
+        "topic.published",
+        {"topic": "/cmd_vel"},
+        {
+            "NoEndpoint.no_node": nodeless(),
+            "NoEndpoint.misspelt_name": silent(endpoints=(endpoint("/cmdvel"), reader())),
+            "NoEndpoint.process_crashed": silent(endpoints=(reader(),), **CRASH),
+            "NoEndpoint.never_appeared": silent(endpoints=(reader(),)),
+            "NoEndpoint.exchanged_executables": exchanged(silent(endpoints=(reader(),))),
+        },
+    ),
+    (
+        "service.exists",
+        {"service": "/enable", "type": "std_srvs/srv/SetBool"},
+        {
+            "NoEndpoint.other_interface": serving(services=(service(type="std_srvs/srv/Trigger"),)),
+        },
+    ),
+    (
+        "service.exists",
+        {"service": "/enable"},
+        {
+            "NoEndpoint.exchanged_kind": serving(services=(action("/enable"),)),
+            "NoEndpoint.others_only": serving(services=()),
+        },
+    ),
+    (
+        "messages.count",
+        COUNT,
+        {
+            "NoMessages.no_endpoint": silent(endpoints=(reader(),)),
+            "NoMessages.other_type OtherType.similar_name": silent(
+                endpoints=(endpoint(type="geometry_msgs/msg/Twists"), reader())
+            ),
+            "NoMessages.other_definition": silent(
+                endpoints=(endpoint(type_hash="a"), replace(reader(), type_hash="b"))
+            ),
+            "NoMessages.unreadable": silent(unreadable={"/cmd_vel": 3}),
+            "NoMessages.incompatible_qos": silent(endpoints=(endpoint(), reader(qos=LATCHED))),
+            "NoMessages.never_matched": silent(
+                disturbance=taken(0.1, 1.0, waited_s=0.6),
+                declarations=(*declarations(), declared("held", topic="/cmd_vel", matched=False)),
+            ),
+            "NoMessages.process_ended": silent(processes=(died(1),)),
+            "NoMessages.publisher_destroyed": silent(endpoints=(gone(endpoint()), reader())),
+            "NoMessages.nothing_to_answer NotDelivered.no_endpoint": answering(),
+            "NoMessages.slow_timer": silent(declarations=declarations(timer_s=300.0)),
+            "NoMessages.no_cpu_time": silent(calls=(), disturbance=BUSY),
+            "NoMessages.never_spun": silent(declarations=declarations(spin=False)),
+            "NoMessages.blocked_executor": silent(calls=HANGS),
+            "NoMessages.no_answer": answering(LISTENER, times_s=every(0.3, 5)),
+            "NoMessages.no_timer": silent(declarations=declarations(timer_s=None)),
+            "NoMessages.publish_not_reached": silent(),
+            "NotDelivered.other_type": answering(replace(LISTENER, type="std_msgs/msg/Int64")),
+            "NotDelivered.incompatible_qos": answering(replace(LISTENER, qos=LATCHED)),
+            "NotDelivered.nothing_sent": answering(LISTENER),
+            "FewMessages.unreadable": recording(
+                messages=messages([1.0]), unreadable={"/cmd_vel": 3}
+            ),
+            "FewMessages.process_ended": recording(messages=messages([1.0]), processes=(died(1),)),
+            "FewMessages.too_little_cpu_time": recording(
+                messages=messages([1.0]), disturbance=BUSY
+            ),
+            "FewMessages.publisher_destroyed": recording(
+                messages=messages([0.7]), endpoints=(gone(endpoint()), reader())
+            ),
+            "FewMessages.never_spun": recording(
+                messages=messages([1.0]), declarations=declarations(spin=False)
+            ),
+            "FewMessages.publishing_stopped": recording(messages=messages([1.0])),
+        },
+    ),
+    (
+        "service.responds",
+        ENABLE,
+        {
+            "NoAnswer.process_gone": serving(asked(1.0, None), processes=(died(1),)),
+            "NoAnswer.server_destroyed": serving(asked(1.0, None), services=(gone(service()),)),
+            "NoAnswer.no_cpu_time": serving(asked(1.0, None), disturbance=BUSY),
+            "NoAnswer.callback_raised": serving(
+                asked(1.0, None), log=output(traceback("ValueError: no"), time_s=1.5)
+            ),
+            "NoAnswer.never_spun": serving(asked(1.0, None), declarations=declarations(spin=False)),
+            "NoAnswer.blocked_executor": serving(asked(1.0, None), *HANGS),
+            "NoAnswer.callback_does_not_answer": serving(asked(1.0, None)),
+        },
+    ),
+    (
+        "topic.type",
+        TYPED,
+        {
+            "OtherType.other_package_or_case": typed("my_msgs/msg/Twist"),
+            "OtherType.other_variant": typed("geometry_msgs/msg/TwistStamped"),
+            "OtherType.part_or_whole": typed("geometry_msgs/msg/Vector3"),
+        },
+    ),
+    (
+        "messages.equal",
+        EXPECTED,
+        {
+            "WrongValue.integer_in_a_float_field": turned(5e-324),
+            "WrongValue.not_a_number": turned(math.inf),
+            "WrongValue.fields_swapped": turned(0.5, 1.0),
+            "WrongValue.every_number_zero": turned(0.0, 0.0),
+            "WrongValue.in_another_field": turned(1.0, 0.0, 0.5),
+            "WrongValue.wrong_sign_or_unit": turned(-1.0),
+        },
+    ),
+    (
+        "timing.period",
+        EACH,
+        {
+            "WrongRhythm.several_in_each_period": paced([0.15] * 20),
+            "WrongRhythm.some_left_out": paced([0.3, 0.3, 0.6] * 5),
+            "WrongRhythm.irregular": paced([0.3, 0.21, 0.39, 0.3, 0.25, 0.42, 0.3, 0.2, 0.37]),
+            "WrongRhythm.other_timer": paced([3.0, 3.0]),
+            "WrongRhythm.timer_of_zero": paced(
+                [0.0001] * 50, declarations=(declared("timer", period_s=0.0),)
+            ),
+            "WrongRhythm.right_timer_too_late": paced([0.42] * 10),
+            "WrongRhythm.sleeping_loop": paced(
+                [0.405] * 10, declarations=declarations(timer_s=None)
+            ),
+            "WrongRhythm.other_period": paced([0.2] * 20, declarations=()),
+        },
+    ),
+    (
+        "log.follows",
+        LOGS,
+        {
+            "NotLogged.not_delivered": logging(endpoints=(stimulus(),)),
+            "NotLogged.process_ended": logging(processes=(died(1, 3.0),)),
+            "NotLogged.too_few_sent": logging(sent=sent([1.0], values=[{"data": 1.5}])),
+            "NotLogged.no_cpu_time": logging(disturbance=BUSY, calls=()),
+            "NotLogged.subscription_destroyed": logging(
+                endpoints=(gone(LISTENER, 3.0), stimulus())
+            ),
+            "NotLogged.never_spun": logging(declarations=declarations(spin=False)),
+            "NotLogged.blocked_executor": logging(calls=HANGS),
+            "NotLogged.output_dropped": logging(processes=(process(dropped_bytes=9),)),
+            "NotLogged.callbacks_wait": logging("hm", calls=builder.calls(0.9)),
+            "NotLogged.only_some_logged": logging(
+                log=output("12.34", time_s=1.01) + output("12.34", time_s=1.31)
+            ),
+            "NotLogged.logged_late": logging(log=output("12.34", time_s=3.5)),
+            "NotLogged.no_f_string": logging("x = {msg.data}"),
+            "NotLogged.other_values": logging("x = 5.67"),
+            "NotLogged.nothing_logged": logging(),
+        },
+    ),
+    (
+        "log.follows",
+        {**LOGS, "sent": "before_launch"},
+        {
+            "NotLogged.no_history": logging(
+                sent=sent(every(-0.1, 5, -0.1), values=[{"data": 12.34}] * 5)
+            ),
+        },
+    ),
+    (
+        "package.found",
+        PACKAGE,
+        {
+            "NoPackage.no_workspace": submission(problem="it is empty"),
+            "NoPackage.broken_package_xml": submission(
+                package("pub", manifest_error=SourceError("package.xml", 1, "broken"))
+            ),
+            "NoPackage.other_package_name": submission(package("bot_pub")),
+        },
+    ),
+    (
+        "package.builds",
+        PACKAGE,
+        {
+            "NotBuilt.build_takes_too_long": submission(
+                build=replace(FAILED_BUILD, timed_out=True)
+            ),
+            "NotBuilt.machine_lacks_a_package": submission(
+                package(build_type="ament_cmake"),
+                build=replace(
+                    FAILED_BUILD, lacking=("nav2_msgs",), log=NEEDS_NAV2.format("bot_publisher")
+                ),
+            ),
+            "NotBuilt.build_failed": submission(build=FAILED_BUILD),
+            "NotBuilt.depends_on_another": submission(
+                package(),
+                package("other"),
+                build=replace(
+                    FAILED_BUILD,
+                    log="Starting >>> other\n",
+                    failed_packages=("bot_publisher", "other"),
+                ),
+            ),
+        },
+    ),
+    (
+        "interface.found",
+        OF_INTERFACE,
+        {
+            "NoDefinition.near_definition": handed_in(file="msgs/BotStatus.msg"),
+            "NoDefinition.no_definition": handed_in(definitions=(), generated=()),
+        },
+    ),
+    (
+        "interface.generated",
+        OF_INTERFACE,
+        {
+            "NotGenerated.no_cmake": unbuilt(cmake=None),
+            "NotGenerated.generates_nothing": unbuilt(cmake="project(bot_msgs)\nament_package()\n"),
+            "NotGenerated.not_listed": unbuilt(cmake=CMAKE.replace("BotStatus", "Wheel")),
+            "NotGenerated.undeclared_package": unbuilt(
+                cmake=CMAKE.replace("  DEPENDENCIES geometry_msgs\n", "")
+            ),
+            "NotGenerated.no_member_of_group": unbuilt(groups=()),
+            "NotGenerated.unknown_type": unbuilt(TEXT.replace("float64", "float46")),
+        },
+    ),
+]
+
+
+ALL = [
+    pytest.param(names, check, subject, parameters, id=names)
+    for check, parameters, subjects in (*CASES, *motion_cases.CASES)
+    for names, subject in subjects.items()
+]
+
+
+@pytest.mark.parametrize(("names", "check", "subject", "parameters"), ALL)
+def test_it_answers(names: str, check: str, subject: Any, parameters: dict[str, Any]) -> None:
+    judged = subject() if callable(subject) else subject
+    with answers() as found:
+        judge(check, judged, **parameters)
+    assert set(names.split()) <= found
+
+
+def test_every_explanation_has_a_case() -> None:
+    named = {name for case in ALL for name in str(case.id).split()}
+    catalogue = {
+        f"{symptom.__name__}.{entry.name}"
+        for symptom, entries in explanations().items()
+        for entry in entries
+        # Those of the table have an example of their own.
+        if not isinstance(entry.apply, Row)
+    }
+    assert catalogue - named == set()
+    assert named - catalogue == set()
