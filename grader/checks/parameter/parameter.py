@@ -154,8 +154,10 @@ def _evidence(
         ("range", _range_words(found.range) if found.range else "none"),
         ("read-only", value_text(found.read_only)),
         ("description", found.description or "none"),
-        *(("value", value_text(item.value)) for item in values[:20]),
     ]
+    for item in values[:20]:
+        at_s = recording.since_launch_s(item.call.requested_ns)
+        rows.append((f"value at {at_s:.2f} s", value_text(item.value)))
     asked = calls_to(recording, parameters.node, "describe_parameters")
     table = Table(f"The parameter {parameters.name}", ("", ""), tuple(rows))
     return Evidence(moments=answered_at(recording, asked), tables=(table,))
