@@ -26,10 +26,7 @@ def is_doubtful(recording: Recording, doubt: Doubt | None) -> bool:
 
 
 def _was_signalled(recording: Recording) -> bool:
-    """Whether a signal ended a process that somebody else may have sent.
-
-    What a process does to itself it does again.
-    """
+    """Whether a signal ended a process that another process may have sent."""
     return not any(breach.ended for breach in recording.breaches) and any(
         process.stopped_by == "itself" and process.exit_code in (-signal.SIGKILL, -signal.SIGSTOP)
         for process in recording.processes
@@ -37,11 +34,7 @@ def _was_signalled(recording: Recording) -> bool:
 
 
 def _was_out_of_hand(recording: Recording) -> bool:
-    """Whether the machine kept the student from steering for a while at one time.
-
-    A control loop that is held up goes another way from there on, by how much nobody can tell.
-    Many short waits do not add up to that.
-    """
+    """Whether the machine held up the control loop for a while: many short waits do not count."""
     if not recording.truth:
         return False
     begin_ns, end_ns = recording.truth[0].time_ns, recording.truth[-1].time_ns
@@ -53,10 +46,7 @@ def _was_out_of_hand(recording: Recording) -> bool:
 
 
 def _did_not_meet(recording: Recording) -> bool:
-    """Whether somebody never answered, on a machine that may have kept client and server apart.
-
-    What discovery loses on a busy machine comes again after seconds only.
-    """
+    """Whether an answer is missing on a machine so busy that client and server may not have met."""
     answered = {call.service for call in recording.calls if call.answered_ns is not None}
     silent = any(call.service not in answered for call in recording.calls) or any(
         goal.answered_ns is None for goal in recording.goals

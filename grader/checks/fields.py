@@ -45,15 +45,6 @@ def toleranced(
         yield NamedFields(("tolerance", path), endpoint, path, part)
 
 
-def has_fields(value: Mapping[str, Any], wanted: Mapping[str, Any] | None) -> bool:
-    """Whether a value has the wanted fields; other fields do not matter.
-
-    Raises:
-        NoSuchField: It cannot have such a field.
-    """
-    return not wanted or not unlike(value, wanted, EXACT)
-
-
 def unlike(
     value: Mapping[str, Any], wanted: Mapping[str, Any], tolerance: Tolerance
 ) -> tuple[Difference, ...]:

@@ -11,12 +11,11 @@ from grader.checks.fields import (
     difference_table,
     difference_words,
     fields_hint,
-    has_fields,
     unlike,
     words,
 )
 from grader.checks.finding import Evidence, Moment, Table
-from grader.checks.value import Tolerance
+from grader.checks.value import EXACT, Tolerance
 from grader.checks.wording import code
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_answer import why_taken, why_unanswered
@@ -47,12 +46,12 @@ def judged_requests(
         Unmet: There is none, or one could not be sent.
         NoSuchField: A request cannot have such a field.
     """
-    own = [one for one in sent if _server(one) == name]
+    own = [one for one in sent if name == (one.action if isinstance(one, Goal) else one.service)]
     stop_if(why_not_offered(recording, kind, name, own[0].type if own else None))
     failed = next((one.error for one in own if one.error not in ("", NO_SERVER)), None)
     if failed:
         stop_if(Cause(f"{code(name)} could not be asked: {failed}", ours=True))
-    found = tuple(one for one in own if has_fields(_content(one), fields) and is_judged(one))
+    found = tuple(one for one in own if not unlike(_content(one), fields, EXACT) and is_judged(one))
     if not found:
         request = "call" if kind is SERVICE else "goal"
         which = f" with {words(fields)}" if fields else ""
@@ -62,10 +61,6 @@ def judged_requests(
         if one.error:
             stop_if(why_not_met(recording, kind, name, "could not be asked", _sent_ns(one)))
     return found
-
-
-def _server(one: Call | Goal) -> str:
-    return one.action if isinstance(one, Goal) else one.service
 
 
 def _content(one: Call | Goal) -> Mapping[str, Any]:
@@ -109,6 +104,7 @@ def why_other_fields(
     wanted: Mapping[str, Any],
     tolerance: Tolerance,
     evidence: Evidence,
+    hint: str = "",
 ) -> Cause | None:
     """Which fields of an answer are not as expected, or None if all are.
 
@@ -120,7 +116,7 @@ def why_other_fields(
         return None
     return Cause(
         f"{seen} {difference_words(found)}",
-        fields_hint(part, value or {}, [item.field for item in found]),
+        hint or fields_hint(part, value or {}, [item.field for item in found]),
         replace(evidence, tables=(difference_table(part.capitalize(), found), *evidence.tables)),
     )
 

@@ -124,7 +124,10 @@ class TestFeedback:
 
     def test_another_last_one(self):
         found = failing("action.feedback", acting(goal()), **FEEDBACK, last={"sequence": [1]})
-        assert "the last feedback has sequence = [0, 1, 1, 2, 3] instead of [1]" in found
+        assert (
+            "the last feedback of the goal (order = 4) has sequence = [0, 1, 1, 2, 3] instead of [1]"
+            in found
+        )
 
     def test_a_rate_needs_some_feedback(self):
         with pytest.raises(ValueError, match="a rate needs at_least: 3"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any
 
 from pydantic import Field, model_validator
@@ -11,10 +10,7 @@ from pydantic import Field, model_validator
 from grader.checks.check import NamedFields, Parameters, Subject, check, stop_if
 from grader.checks.fields import (
     FieldTolerance,
-    difference_table,
-    difference_words,
     toleranced,
-    unlike,
     words,
 )
 from grader.checks.finding import Evidence, Finding
@@ -246,14 +242,10 @@ def _why_other_rate(recording: Recording, goal: Goal, parameters: FeedbackOf) ->
 
 
 def _why_other_feedback(recording: Recording, goal: Goal, parameters: FeedbackOf) -> Cause | None:
-    wrong = unlike(goal.feedback[-1].value, parameters.last, EXACT)
-    if not wrong:
-        return None
-    return Cause(
-        f"the last feedback has {difference_words(wrong)}",
-        "Set the fields of the feedback before each publish_feedback(feedback).",
-        replace(evidence(recording, goal), tables=(difference_table("Last feedback", wrong),)),
-    )
+    seen, shown = f"the last feedback of {the_goal(goal)} has", evidence(recording, goal)
+    hint = "Set the fields of the feedback before each publish_feedback(feedback)."
+    value, wanted = goal.feedback[-1].value, parameters.last
+    return why_other_fields(seen, "last feedback", value, wanted, EXACT, shown, hint)
 
 
 class Result(OfGoals):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check, stop_if
-from grader.checks.finding import Evidence, Finding, Moment, Status
+from grader.checks.finding import Evidence, Finding, Status
 from grader.checks.first_seen import endpoints_seen, nodes_seen
 from grader.checks.need import Recorded
 from grader.checks.wording import code, codes
@@ -17,7 +16,7 @@ from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.type_confusion import OtherType
-from grader.recording.model import Endpoint, Kind, Recording
+from grader.recording.model import Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
 
 PROBE = "rosgrade_probe"
@@ -83,12 +82,13 @@ def _absence(recording: Recording, kind: Kind, parameters: Topic, expected: str)
     for remap in recording.remaps if parameters.remap else ():
         found, _, name = remap.partition(":=")
         if name == topic:
+            endpoints = recording.student_endpoints(kind, name)
             failed = Finding.failed(
                 expected,
                 f"one on {code(found)} instead; everything else was judged in a run with "
                 f"`--ros-args -r {remap}`, which puts the name right",
                 f"Write the topic's name as '{name.lstrip('/')}'.",
-                _types_seen(recording, recording.student_endpoints(kind, name)),
+                Evidence(moments=endpoints_seen(recording, endpoints)),
             )
             return replace(failed, remap=remap)
     return None
@@ -129,16 +129,8 @@ def type_(recording: Recording, parameters: Type) -> Finding:
         f"{which} has the type {code(wrong[0])}" + (f": {explanation}" if explanation else ""),
         "A publisher and a subscription meet only if their types are the same: "
         f"`from {package}.msg import {short}`.",
-        _types_seen(recording, endpoints),
+        Evidence(moments=endpoints_seen(recording, endpoints)),
     )
-
-
-def _types_seen(recording: Recording, endpoints: Iterable[Endpoint]) -> Evidence:
-    moments = [
-        Moment(f"{item.type} on {item.topic}", recording.since_launch_s(item.appeared_ns))
-        for item in endpoints
-    ]
-    return Evidence(moments=tuple(moments[:5]))
 
 
 class Untouched(Parameters):
