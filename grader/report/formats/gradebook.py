@@ -81,9 +81,6 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
 
     Args:
         zero: What gets 0 points of the rows without a grade.
-
-    Raises:
-        UsageError: The results are of several assignments.
     """
     results = [row.result for row in rows if row.result is not None]
     if results:
@@ -125,11 +122,7 @@ def _score(row: ClassRow, zero: Collection[RowStatus]) -> float | None:
 
 
 def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
-    """Read a gradebook as Canvas exports it, with commas or with semicolons.
-
-    Raises:
-        UsageError: It is not one.
-    """
+    """Read a gradebook as Canvas exports it, with commas or with semicolons."""
     text = text.removeprefix("\N{BYTE ORDER MARK}")
     first = text.partition("\n")[0]
     delimiter = ";" if first.count(";") > first.count(",") else ","
@@ -184,9 +177,6 @@ def canvas_csv(
             title of the column that the export has for the assignment's id.
         zero: What gets 0 points of the rows without a grade. Students of the gradebook that no
             row fits handed in nothing too.
-
-    Raises:
-        UsageError: Canvas would drop the column or skip it, or no row fits a student.
     """
     results = [row.result for row in rows if row.result is not None]
     assignment = _one_assignment(results)

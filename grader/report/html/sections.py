@@ -21,12 +21,7 @@ from grader.report.model.target import targets
 
 @dataclass(frozen=True)
 class Section:
-    """Checks that belong together.
-
-    Attributes:
-        scenario: The scenario, or None.
-        recording: Its recording, or None where there is none.
-    """
+    """Checks that belong together; those of one scenario, with its recording if there is one."""
 
     id: str
     title: str
@@ -47,11 +42,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Pictures:
-    """What is shown of a run; None or nothing where there is nothing to show.
-
-    Attributes:
-        open: Whether they are shown at once: something was lost in this run, or a limit reached.
-    """
+    """What is shown of a run, and whether at once: something was lost, or a limit reached."""
 
     open: bool
     path: Figure | None

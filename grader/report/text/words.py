@@ -59,3 +59,8 @@ def number(value: float) -> str:
 def counted_points(points: float) -> str:
     """``1 point``, ``2.5 points``."""
     return f"{number(points)} point{'' if points == 1 else 's'}"
+
+
+def cut(text: str, most: int) -> str:
+    """The beginning of a text that is too long."""
+    return text if len(text) <= most else f"{text[: most - 1]}…"
