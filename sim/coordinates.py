@@ -13,8 +13,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic import (
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    PlainValidator,
+    WithJsonSchema,
+)
+from pydantic_core import CoreSchema
 
 from grader.spec.quantity import refusal, written_as_read
 from grader.spec.unit import Dimension, parse_quantity
@@ -52,31 +57,6 @@ def metres(value: Any, *, positive: bool = False) -> float:
         least = "more than 0" if number <= 0.0 else f"at least {MIN_SIZE_M:g} m"
         raise ValueError(f"{value!r} is too small: it must be {least}")
     return number
-
-
-@dataclass(frozen=True)
-class Metres:
-    """Pydantic annotation: a length in metres, a bare number is allowed."""
-
-    positive: bool = False
-
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Validate by :func:`metres`."""
-        return core_schema.no_info_plain_validator_function(
-            lambda value: _refused(partial(metres, positive=self.positive), value)
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Describe the length to an editor."""
-        return {
-            "type": ["number", "string"],
-            "description": "Metres, or a length with its unit.",
-            "x-words": "length, such as `0.2 m`; a bare number is in metres",
-        }
 
 
 @dataclass(frozen=True)
@@ -175,7 +155,17 @@ def _pose(x_m: float, y_m: float, yaw_rad: float) -> Pose:
     return Pose(x_m, y_m, math.remainder(yaw_rad, math.tau))
 
 
-PositiveMetres = Annotated[float, Metres(positive=True)]
+_LENGTH = WithJsonSchema(
+    {
+        "type": ["number", "string"],
+        "description": "Metres, or a length with its unit.",
+        "x-words": "length, such as `0.2 m`; a bare number is in metres",
+    }
+)
+Metres = Annotated[float, PlainValidator(lambda value: _refused(metres, value)), _LENGTH]
+PositiveMetres = Annotated[
+    float, PlainValidator(lambda value: _refused(partial(metres, positive=True), value)), _LENGTH
+]
 Point = Annotated[tuple[float, float], Entries(("x", "y"), _tuple)]
 Size = Annotated[tuple[float, float], Entries(("length", "width"), _tuple, positive=True)]
 Ends = Annotated[tuple[float, float, float, float], Entries(("x1", "y1", "x2", "y2"), _ends)]

@@ -93,9 +93,7 @@ class Push(Model):
     """
 
     after: PositiveMetres = Field(description="Way along its path after which it begins.")
-    ahead: Annotated[float, Metres()] = Field(
-        0.0, description="How far it is pushed ahead; backwards is negative."
-    )
+    ahead: Metres = Field(0.0, description="How far it is pushed ahead; backwards is negative.")
     turn: Angle = Field(0.0, description="How far it is turned, counter-clockwise.")
     lasts: Duration = Field(0.3, description="How long the push takes.", validate_default=False)
 

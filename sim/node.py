@@ -58,13 +58,6 @@ class PolledGroup(CallbackGroup):
         """Never."""
         return False
 
-    def beginning_execution(self, entity: Any) -> bool:
-        """Never."""
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        """There is nothing to end."""
-
 
 class RosSimulator:
     """A simulation whose robot listens and whose sensors publish.

@@ -26,9 +26,6 @@ from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, Duration, PositiveLength, Ratio
 from grader.spec.unit import format_duration
 
-# A robot that looks at the goal comes nearer by most of what it drives.
-_ASTRAY_RAD = math.radians(45.0)
-
 
 class Reaches(GoalParameters):
     """Parameters of motion.reaches."""
@@ -177,22 +174,11 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
         )
     return Finding.failed(
         expected,
-        f"{seen}; {metres(_astray_m(run, parameters.position))} of it with the goal more than "
-        f"{degrees(_ASTRAY_RAD)} to the side",
+        seen,
         "Look at its heading on the way: does it turn to the goal at once, and by the short way? "
         "The error atan2(dy, dx) - yaw is wrapped, and its gain is large against that of the "
         "distance.",
         Evidence(moments=(_farthest(run),), plots=evidence.plots),
-    )
-
-
-def _astray_m(run: Approach, position_m: float) -> float:
-    """Way that was driven before the arrival while the robot did not look at the goal."""
-    before = run.truth[: run.arrival(position_m)]
-    return sum(
-        math.hypot(b.x_m - a.x_m, b.y_m - a.y_m)
-        for a, b in pairwise(before)
-        if abs(run.bearing_error_rad(a)) > _ASTRAY_RAD
     )
 
 

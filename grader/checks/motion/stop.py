@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Literal
 
 from pydantic import Field
@@ -17,7 +16,7 @@ from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
-from grader.measure.motion.command import commands, scans, stolen_s
+from grader.measure.motion.command import scans, stolen_s
 from grader.measure.motion.ground import Sight, ahead
 from grader.measure.motion.quantities import metres, speed
 from grader.measure.motion.scan import misreading
@@ -26,9 +25,6 @@ from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import Length, PositiveLength, Speed
 from grader.spec.unit import format_duration
-
-# A callback that sleeps, or a slow timer, answers fewer scans than come.
-_ANSWERED = 3
 
 
 class Stops(RobotParameters):
@@ -129,22 +125,13 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
             "which may explain it"
         )
     shown = [one.stamp_ns for one in scans(recording) if begin_ns <= one.stamp_ns <= end_ns]
-    driving = [item.time_ns for item in commands(recording) if item.twist.linear_m_s > 0.0]
-    answered = sum(
-        any(before_ns <= time_ns < after_ns for time_ns in driving)
-        for before_ns, after_ns in pairwise(shown)
-    )
-    drove_on = answered >= _ANSWERED and answered == len(shown) - 1
     within = f"; {counted(len(shown), 'scan')} showed it meanwhile" if shown else ""
     return Cause(
         f"{seen}: it came to rest {format_duration((end_ns - begin_ns) / NS)} after that distance "
-        f"was reached, at up to {speed(fastest)}{within}"
-        f"{', and commands to drive on followed them' if drove_on else ''}",
-        "Which number does the callback compare the front range with? Ranges are in metres, -inf "
-        "is nearer than the LiDAR can measure, and an average of several scans comes late."
-        if drove_on
-        else "Publish the stop in the scan callback itself, from the newest scan: a sleep, a slow "
-        "timer or an old stored value costs way.",
+        f"was reached, at up to {speed(fastest)}{within}",
+        "Which number does the callback compare the front range with? Ranges are in metres, and "
+        "-inf is nearer than the LiDAR can measure. Publish the stop in the scan callback itself, "
+        "from the newest scan: a sleep, a slow timer or an average of several scans costs way.",
         _evidence(recording, scene, rest, parameters),
     )
 

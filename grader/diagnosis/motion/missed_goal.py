@@ -130,21 +130,6 @@ def wrong_place(symptom: GoalMissed) -> Cause | None:
 
 
 @explanation(GoalMissed)
-def pushed_away(symptom: GoalMissed) -> Cause | None:
-    """It was pushed on its way, and did not look where it was afterwards."""
-    incidents = symptom.recording.incidents
-    pushed = next((item for item in incidents if item.kind == "pushed"), None)
-    if pushed is None or not symptom.is_at_rest:
-        return None
-    when_s = symptom.recording.since_launch_s(pushed.time_ns)
-    return symptom.cause(
-        f": it was pushed {when_s:.2f} s after launch, and its commands since then lead elsewhere",
-        "Compute every command from the newest odometry: earlier commands do not tell where the "
-        "robot is.",
-    )
-
-
-@explanation(GoalMissed)
 def loop_in_a_callback(symptom: GoalMissed) -> Cause | None:
     """A callback does not return: its loop never sees newer odometry."""
     stuck = None if symptom.is_at_rest else stuck_callback(symptom.recording)
@@ -207,7 +192,7 @@ def stopped_elsewhere(symptom: GoalMissed) -> Cause | None:
     return symptom.cause(
         "",
         "Print the goal that your node reads, and drive on until math.hypot(goal's x - x, "
-        "goal's y - y), in metres, is smaller than the tolerance.",
+        "goal's y - y), in metres and from the newest odometry, is smaller than the tolerance.",
     )
 
 

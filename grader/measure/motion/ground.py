@@ -63,12 +63,6 @@ def nearest(scene: Scene, step: Truth) -> Sight | None:
     return found
 
 
-def edge_m(scene: Scene) -> float:
-    """Distance from the LiDAR straight ahead to the robot's own edge."""
-    x_m, y_m = scene.lidar.x_m, scene.lidar.y_m
-    return math.sqrt(max(scene.radius_m**2 - y_m**2, 0.0)) - x_m
-
-
 def _eye(scene: Scene, step: Truth) -> Pose:
     """Where the LiDAR is."""
     return compose(Pose(step.x_m, step.y_m, step.yaw_rad), scene.lidar)
