@@ -140,8 +140,6 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     driving = [item for item in commands(recording) if _size(item) > NO_SPEED_M_S]
     if not driving:
         topic = command_topic(recording)
-        if not recording.on(topic):
-            return why_silent(recording, topic).finding(expected)
         return Finding.failed(
             expected,
             f"no command on {code(topic)} has a linear.x other than 0",

@@ -139,8 +139,6 @@ def _wrong_speed(
         return "the robot turns on the spot instead of driving", _FIELDS_HINT
     if number:
         return f"the robot paused in between, {counted(number, 'time')}", _IN_BETWEEN_HINT
-    if middle * wanted < 0.0:
-        return "the robot drives backwards", _FIELDS_HINT
     if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
         words = f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}"
         return words, _FIELDS_HINT

@@ -1,4 +1,4 @@
-"""Checks of stopping in front of an obstacle, and of staying there."""
+"""Checks of stopping in front of an obstacle, of staying there, and of touching nothing."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.no_node import why_no_node
@@ -20,7 +21,14 @@ from grader.measure.motion.command import scans, stolen_s
 from grader.measure.motion.ground import Sight, ahead
 from grader.measure.motion.quantities import metres, speed
 from grader.measure.motion.scan import misreading
-from grader.measure.motion.track import REST_M_S, first_rest, over_time, speed_plot, way_m
+from grader.measure.motion.track import (
+    REST_M_S,
+    first_rest,
+    has_moved,
+    over_time,
+    speed_plot,
+    way_m,
+)
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import Length, PositiveLength, Speed
@@ -205,7 +213,7 @@ def _set_off(
 ) -> Cause:
     """How a robot that was at rest began to move."""
     when_s = recording.since_launch_s(step.time_ns)
-    sight = None if recording.scene is None else ahead(recording.scene, step)
+    sight = ahead(recording.scene, step)
     words = "set off" if is_start else "set off again"
     if abs(step.linear_m_s) < REST_M_S:
         words = "turned on the spot"
@@ -226,3 +234,36 @@ def _set_off(
         "two places that publish contradict each other.",
         Evidence(moments=(Moment("the robot set off", when_s),), plots=(speed_plot(recording),)),
     )
+
+
+class NoContact(RobotParameters):
+    """Parameters of motion.no_contact."""
+
+    moving: bool = Field(
+        True,
+        description="Whether the robot must also have moved: a robot that always stands touches "
+        "nothing.",
+    )
+
+
+@check("motion.no_contact", Subject.RECORDING, NoContact)
+def no_contact(recording: Recording, parameters: NoContact) -> Finding:
+    """The robot touches nothing.
+
+    Judged by the simulator. Something that runs into a robot at rest does not count.
+    A robot that never moved does not pass, unless `moving` is false.
+    """
+    expected = "touches nothing"
+    touched = why_touched(recording)
+    if touched is not None:
+        cause = why_cut_short(recording)
+        return (cause.after(touched.observed) if cause else touched).finding(expected)
+    cause = why_not_moved(recording) if parameters.moving else why_not_judged(recording)
+    if cause is None and not parameters.moving:
+        cause = why_no_node(recording)
+        if cause is None and not has_moved(recording.truth):
+            cause = why_cut_short(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    evidence = Evidence(plots=(speed_plot(recording),))
+    return Finding.passed(expected, f"no contact on {metres(way_m(recording.truth))}", evidence)

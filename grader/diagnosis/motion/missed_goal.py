@@ -46,14 +46,14 @@ class GoalMissed(Symptom[Cause]):
         return min(self.run.truth, key=self.run.distance_m)
 
     @property
-    def watched_s(self) -> float:
-        """How long the run was observed."""
-        return (self.last.time_ns - self.run.truth[0].time_ns) / NS
-
-    @property
     def is_at_rest(self) -> bool:
         """Whether the robot stands in the end."""
         return is_at_rest(self.last)
+
+    @property
+    def watched_s(self) -> float:
+        """How long the run was observed."""
+        return (self.last.time_ns - self.run.truth[0].time_ns) / NS
 
     @property
     def seen(self) -> str:

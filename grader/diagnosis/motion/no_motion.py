@@ -58,9 +58,17 @@ class NotMoved(Symptom[Cause]):
         """The velocity commands."""
         return commands(self.recording)
 
-    def moment(self, label: str, command: VelocityCommand) -> Evidence:
-        """Evidence at a command."""
-        return Evidence(moments=(Moment(label, self.recording.since_launch_s(command.time_ns)),))
+    @cached_property
+    def first(self) -> VelocityCommand:
+        """The first command to move, or else the first of all."""
+        moving = (item for item in self.sent if not is_zero(item.twist))
+        return next(moving, self.sent[0])
+
+    @property
+    def evidence(self) -> Evidence:
+        """When that command came."""
+        when_s = self.recording.since_launch_s(self.first.time_ns)
+        return Evidence(moments=(Moment("first command to move", when_s),))
 
 
 def why_not_moved(recording: Recording) -> Cause | None:
@@ -180,35 +188,33 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
     recording, sent = symptom.recording, symptom.sent
     if not all(is_zero(item.twist) for item in sent):
         return None
-    evidence = symptom.moment("first command", sent[0])
     topic = code(command_topic(recording))
     seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
     last = recording.truth[-1]
     misread = misreading(recording, last)
     if misread is not None:
-        return Cause(f"{seen}; {misread.words}", misread.hint, evidence)
-    sight = None if recording.scene is None else ahead(recording.scene, last)
+        return Cause(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
+    sight = ahead(recording.scene, last)
     where = f"; {code(sight.name)} is {metres(sight.distance_m)} straight ahead" if sight else ""
     return Cause(
         f"{seen}{where}",
         "Which branch of the callback publishes? Log what it compares. The speed ahead is "
         "linear.x, the turn is angular.z.",
-        evidence,
+        symptom.evidence,
     )
 
 
 @explanation(NotMoved)
 def integer_in_command(symptom: NotMoved) -> Cause | None:
     """A field of floats was given an integer, which ROS misreads."""
-    first, evidence = _first_to_move(symptom)
-    fields = {"linear.x": first.twist.linear_m_s, "angular.z": first.twist.angular_rad_s}
-    for field, number in fields.items():
+    twist = symptom.first.twist
+    for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
         if was_integer(number):
             return Cause(
                 f"{_STILL}: {what_was_put(number)} was put into {code(field)}, a float field, "
                 "which ROS misreads",
                 "A number in a message must be a float: write 1.0 instead of 1, or float(value).",
-                evidence,
+                symptom.evidence,
             )
     return None
 
@@ -216,8 +222,7 @@ def integer_in_command(symptom: NotMoved) -> Cause | None:
 @explanation(NotMoved, general=True)
 def moves_too_late(symptom: NotMoved) -> Cause:
     """The first command to move came at the very end, or was too slow."""
-    recording = symptom.recording
-    first, evidence = _first_to_move(symptom)
+    recording, first = symptom.recording, symptom.first
     left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
     begin_ns = recording.truth[0].time_ns
     lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
@@ -229,10 +234,5 @@ def moves_too_late(symptom: NotMoved) -> Cause:
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "
         f"{format_duration(max(left_s, 0.0))} before the end",
         "A speed below 1 mm/s, or one that holds for a moment only, does not move the robot.",
-        evidence,
+        symptom.evidence,
     )
-
-
-def _first_to_move(symptom: NotMoved) -> tuple[VelocityCommand, Evidence]:
-    first = next(item for item in symptom.sent if not is_zero(item.twist))
-    return first, symptom.moment("first command to move", first)

@@ -29,8 +29,10 @@ class Sight:
     bearing_rad: float = 0.0
 
 
-def ahead(scene: Scene, step: Truth) -> Sight | None:
+def ahead(scene: Scene | None, step: Truth) -> Sight | None:
     """The nearest thing straight ahead of the robot, or None where there is nothing."""
+    if scene is None:
+        return None
     eye = _eye(scene, step)
     cos, sin = math.cos(step.yaw_rad), math.sin(step.yaw_rad)
 
