@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import code, counted
@@ -23,6 +23,7 @@ from grader.measure.motion.quantities import metres, speed
 from grader.measure.motion.scan import misreading
 from grader.measure.motion.track import (
     REST_M_S,
+    evidence_at,
     first_rest,
     has_moved,
     over_time,
@@ -145,8 +146,7 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
 
 
 def _evidence(recording: Recording, scene: Scene, rest: int, parameters: Stops) -> Evidence:
-    when_s = recording.since_launch_s(recording.truth[rest].time_ns)
-    wanted_m = parameters.distance
+    rest_ns, wanted_m = recording.truth[rest].time_ns, parameters.distance
     band = (wanted_m - parameters.late, wanted_m + parameters.early)
 
     def distance_m(step: Truth) -> float | None:
@@ -155,10 +155,8 @@ def _evidence(recording: Recording, scene: Scene, rest: int, parameters: Stops) 
 
     title = "Distance to what is straight ahead"
     distance_plot = over_time(recording, title, "distance (m)", distance_m, band)
-    return Evidence(
-        moments=(Moment("the robot came to rest", when_s),),
-        plots=(distance_plot, speed_plot(recording)),
-    )
+    plots = distance_plot, speed_plot(recording)
+    return evidence_at(recording, "the robot came to rest", rest_ns, *plots)
 
 
 class StaysAtRest(RobotParameters):
@@ -232,7 +230,7 @@ def _set_off(
         if is_start
         else "Remember that the robot has stopped, or compare the same range in every callback: "
         "two places that publish contradict each other.",
-        Evidence(moments=(Moment("the robot set off", when_s),), plots=(speed_plot(recording),)),
+        evidence_at(recording, "the robot set off", step.time_ns, speed_plot(recording)),
     )
 
 

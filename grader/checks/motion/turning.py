@@ -8,7 +8,7 @@ from itertools import pairwise
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.finding import Evidence, Finding
 from grader.checks.motion.robot_check import GoalParameters
 from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
@@ -17,7 +17,7 @@ from grader.diagnosis.motion.no_motion import approach
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.quantities import degrees, metres, speed
-from grader.measure.motion.track import speed_plot, way_m
+from grader.measure.motion.track import evidence_at, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, PositiveLength, Speed
@@ -76,7 +76,7 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
         f"(from {when_s:.2f} s after launch)",
         "In the second phase linear.x is 0.0. Remember that the position was reached: a flag that "
         "is set once does not fall back into the first phase.",
-        Evidence(moments=(Moment("drives again", when_s),), plots=evidence.plots),
+        evidence_at(recording, "drives again", first.time_ns, *evidence.plots),
     )
 
 
@@ -161,7 +161,7 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
         f"{_sense(-error_rad)} where {degrees(abs(error_rad))} {_sense(error_rad)} would do "
         f"({when_s:.2f} s after launch{more})",
         WRAP_HINT,
-        Evidence(moments=(Moment("turns the long way", when_s),), plots=evidence.plots),
+        evidence_at(recording, "turns the long way", step.time_ns, *evidence.plots),
     )
 
 

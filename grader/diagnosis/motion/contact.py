@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
@@ -13,7 +12,7 @@ from grader.diagnosis.process.blocked_executor import stuck_callback
 from grader.measure.motion.command import VelocityCommand, commands, is_zero
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
-from grader.measure.motion.track import is_at_rest, speed_plot
+from grader.measure.motion.track import evidence_at, is_at_rest, speed_plot
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 
@@ -71,7 +70,7 @@ def why_touched(recording: Recording) -> Cause | None:
     return Cause(
         f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {command}{reason.words}",
         reason.hint,
-        Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
+        evidence_at(recording, f"contact with {name}", step.time_ns, speed_plot(recording)),
     )
 
 

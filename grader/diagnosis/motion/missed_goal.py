@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence, Moment
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.motion.misread_yaw import misread_yaw
@@ -14,7 +13,7 @@ from grader.diagnosis.process.blocked_executor import stuck_callback
 from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import metres, point, speed, turn
-from grader.measure.motion.track import is_at_rest, turned_rad
+from grader.measure.motion.track import evidence_at, is_at_rest, turned_rad
 from grader.recording.model import NS, Ending, Recording
 from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration
@@ -68,11 +67,10 @@ class GoalMissed(Symptom[Cause]):
 
     def cause(self, words: str, hint: str) -> Cause:
         """The symptom in words, followed by more, with the distance over time."""
-        when_s = self.recording.since_launch_s(self.nearest.time_ns)
-        moments = (Moment("nearest to the goal", when_s),)
-        return Cause(
-            f"{self.seen}{words}", hint, Evidence(moments, plots=(self.run.distance_plot,))
+        evidence = evidence_at(
+            self.recording, "nearest to the goal", self.nearest.time_ns, self.run.distance_plot
         )
+        return Cause(f"{self.seen}{words}", hint, evidence)
 
 
 def why_not_there(run: Approach, position_m: float) -> Cause | None:

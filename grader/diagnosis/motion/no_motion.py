@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-from grader.checks.finding import Evidence, Moment
+from grader.checks.finding import Evidence
 from grader.checks.first_seen import endpoints_seen, first_seen
 from grader.checks.reference import Goal, UnknownValue
 from grader.checks.wording import code, codes, counted
@@ -28,7 +28,7 @@ from grader.measure.motion.command import (
 from grader.measure.motion.ground import ahead
 from grader.measure.motion.quantities import metres, speed
 from grader.measure.motion.scan import misreading
-from grader.measure.motion.track import has_moved, index_at, is_at_rest
+from grader.measure.motion.track import evidence_at, has_moved, index_at, is_at_rest
 from grader.recording.model import NS, Kind, Owner, Recording
 from grader.spec.unit import format_duration
 
@@ -67,8 +67,7 @@ class NotMoved(Symptom[Cause]):
     @property
     def evidence(self) -> Evidence:
         """When that command came."""
-        when_s = self.recording.since_launch_s(self.first.time_ns)
-        return Evidence(moments=(Moment("first command to move", when_s),))
+        return evidence_at(self.recording, "first command to move", self.first.time_ns)
 
 
 def why_not_moved(recording: Recording) -> Cause | None:
@@ -110,13 +109,12 @@ def why_rejected(recording: Recording) -> Cause | None:
         return None
     first = refused[0]
     were = "was" if len(refused) == 1 else "were"
-    when_s = recording.since_launch_s(first.time_ns)
     return Cause(
         f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
         f"(first: {first.text}); the robot stops instead",
         "A command must be finite: look for a division by zero, for inf from a range that sees "
         "nothing, and for sqrt or acos of a number out of range.",
-        Evidence(moments=(Moment("command rejected", when_s),)),
+        evidence_at(recording, "command rejected", first.time_ns),
     )
 
 

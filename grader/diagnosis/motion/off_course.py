@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from grader.checks.finding import Evidence, Moment
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.measure.motion.command import commands, is_zero
-from grader.measure.motion.track import speed_plot
+from grader.measure.motion.track import evidence_at, speed_plot
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 
@@ -46,7 +45,5 @@ def why_unsteered(recording: Recording) -> Cause | None:
         "on, and the robot moved on by its last command",
         "Publish a command for each odometry: look for time.sleep() and for a loop in a "
         "callback, which keep the next one waiting, and for a condition before publish().",
-        Evidence(
-            moments=(Moment("no command from here on", when_s),), plots=(speed_plot(recording),)
-        ),
+        evidence_at(recording, "no command from here on", begin_ns, speed_plot(recording)),
     )
