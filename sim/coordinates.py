@@ -61,16 +61,15 @@ def metres(value: Any, *, positive: bool = False) -> float:
 
 @dataclass(frozen=True)
 class Entries:
-    """Pydantic annotation: a list with named entries.
+    """Pydantic annotation: a list of lengths, and of an angle where its name is ``yaw``.
 
     Attributes:
-        names: What each entry is; one called ``yaw`` is an angle, all others are lengths.
         optional: So many entries at the end may be left out; they are then zero.
         positive: Whether every length must be more than zero.
     """
 
     names: tuple[str, ...]
-    make: Callable[..., Any]
+    make: Callable[..., Any] = lambda *numbers: numbers
     optional: int = 0
     positive: bool = False
 
@@ -135,10 +134,6 @@ def _angle(item: Any) -> float:
     return parse_quantity(item, Dimension.ANGLE)
 
 
-def _tuple(*numbers: float) -> tuple[float, ...]:
-    return numbers
-
-
 def _ends(x1: float, y1: float, x2: float, y2: float) -> tuple[float, ...]:
     if math.hypot(x2 - x1, y2 - y1) < MIN_SIZE_M:
         raise refusal("both ends are the same point")
@@ -166,8 +161,8 @@ Metres = Annotated[float, PlainValidator(lambda value: _refused(metres, value)),
 PositiveMetres = Annotated[
     float, PlainValidator(lambda value: _refused(partial(metres, positive=True), value)), _LENGTH
 ]
-Point = Annotated[tuple[float, float], Entries(("x", "y"), _tuple)]
-Size = Annotated[tuple[float, float], Entries(("length", "width"), _tuple, positive=True)]
+Point = Annotated[tuple[float, float], Entries(("x", "y"))]
+Size = Annotated[tuple[float, float], Entries(("length", "width"), positive=True)]
 Ends = Annotated[tuple[float, float, float, float], Entries(("x1", "y1", "x2", "y2"), _ends)]
 Rectangle = Annotated[
     tuple[float, float, float, float], Entries(("x_min", "y_min", "x_max", "y_max"), _rectangle)

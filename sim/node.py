@@ -38,11 +38,7 @@ from sim.simulation import Simulation, Step
 
 
 class Sink(Protocol):
-    """Receiver of the truth, such as a recording.
-
-    Both methods are called from the loop and must be quick. Steps come in their order, but
-    several at a time (see the module).
-    """
+    """Receiver of the truth, such as a recording; called from the loop, so it must be quick."""
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
         """A step was done."""
@@ -193,11 +189,7 @@ class RosSimulator:
 
 
 def make_node(name: str, context: Context) -> Node:
-    """A node without anything that a student could use to disturb it.
-
-    No parameter services, no /rosout, no type description service, and no arguments of the
-    process that could rename it.
-    """
+    """A node without services, /rosout and arguments, by which a student could disturb it."""
     parameter: Any = Parameter  # rclpy is typed in parts only
     return rclpy.create_node(
         name,

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.text import Text
 
-from sim.contact import obstacles_at
 from sim.lidar import Lidar, Scan
 from sim.motion import NS, Pose, Twist, compose
 from sim.pacing import Lateness
-from sim.shapes import Capsule
+from sim.shapes import Shape, circle
 from sim.simulation import EventKind, Simulation, Step
 from sim.world import World
 
@@ -179,13 +178,12 @@ def draw(
     middle = np.array((0.5 * (x_min + x_max), 0.5 * (y_min + y_max)))
     characters = np.zeros((rows, columns), dtype=np.int64)
     layers = np.zeros((rows, columns), dtype=np.int64)
-    walls = [capsule for shape in world.shapes for capsule in shape.capsules]
     at = np.array(((pose.x_m, pose.y_m),))
     drawn = (
-        _outlines(walls, dots_per_m),
-        _outlines(obstacles_at(world.moving, time_ns), dots_per_m),
+        _outlines(world.shapes, dots_per_m),
+        _outlines(world.moving_at(time_ns), dots_per_m),
         hits,
-        _outlines([(*at[0], *at[0], radius_m)], dots_per_m),
+        _outlines([circle("", pose.x_m, pose.y_m, radius_m)], dots_per_m),
         at,
     )
     for layer, points in enumerate(drawn, start=1):
@@ -208,10 +206,10 @@ def draw(
     return text
 
 
-def _outlines(capsules: Iterable[Capsule], dots_per_m: float) -> Points:
+def _outlines(shapes: Iterable[Shape], dots_per_m: float) -> Points:
     """Points on walls and circles, so near to each other that they make lines."""
     found = [np.empty((0, 2))]
-    for x1, y1, x2, y2, radius in capsules:
+    for x1, y1, x2, y2, radius in (item for shape in shapes for item in shape.capsules):
         length_m = math.tau * radius or math.hypot(x2 - x1, y2 - y1)
         share = np.linspace(0.0, 1.0, min(_MOST_DOTS, math.ceil(length_m * dots_per_m) + 2))
         x, y = x1 + share * (x2 - x1), y1 + share * (y2 - y1)

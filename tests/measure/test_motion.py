@@ -18,7 +18,7 @@ from grader.measure.motion.quantities import degrees, metres, point, side, speed
 from grader.recording.model import NS
 from grader.recording.simulated import Scene, Truth
 from sim.motion import ORIGIN, Pose
-from sim.script import MovingObstacle, Waypoint
+from sim.shapes import MovingObstacle, Waypoint
 from tests.checks.builder import (
     at,
     endpoint,

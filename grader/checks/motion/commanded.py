@@ -156,15 +156,9 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
         )
     if _size(last) <= parameters.share * fastest:
         return Finding.passed(expected, seen, evidence)
-    same = all(abs(_size(item) - fastest) <= NO_SPEED_M_S for item in driving)
-    observed = (
-        f"all of {counted(len(driving), 'command')} that drive have linear.x = {speed(fastest)}"
-        if same
-        else seen
-    )
     return Finding.failed(
         expected,
-        observed,
+        seen,
         "linear.x = gain * distance: far from the goal the robot is fast, near it slow.",
         evidence,
     )

@@ -246,16 +246,13 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     evidence = Evidence(plots=tuple(plots))
     if (most_m is None or past_m <= most_m) and (most_rad is None or beyond_rad <= most_rad):
         return Finding.passed(expected, " and ".join(seen), evidence)
-    deeper = why_off_course(recording)
-    if deeper is not None:
-        return deeper.finding(expected)
-    return Finding.failed(
-        expected,
+    cause = why_off_course(recording) or Cause(
         " and ".join(seen),
         "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
         "Make the gain smaller, so that linear.x is below its limit before the robot arrives.",
         evidence_at(recording, "at the goal", run.truth[arrival].time_ns, *evidence.plots),
     )
+    return cause.finding(expected)
 
 
 def _past_m(run: Approach, arrival: int) -> float:

@@ -25,8 +25,7 @@ from grader.measure.motion.command import (
     is_zero,
     stolen_s,
 )
-from grader.measure.motion.ground import ahead
-from grader.measure.motion.quantities import metres, speed
+from grader.measure.motion.quantities import speed
 from grader.measure.motion.scan import misreading
 from grader.measure.motion.track import evidence_at, has_moved, index_at, is_at_rest
 from grader.recording.model import NS, Kind, Owner, Recording
@@ -192,10 +191,8 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
     misread = misreading(recording, last)
     if misread is not None:
         return Cause(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
-    sight = ahead(recording.scene, last)
-    where = f"; {code(sight.name)} is {metres(sight.distance_m)} straight ahead" if sight else ""
     return Cause(
-        f"{seen}{where}",
+        seen,
         "Which branch of the callback publishes? Log what it compares. The speed ahead is "
         "linear.x, the turn is angular.z.",
         symptom.evidence,

@@ -17,12 +17,7 @@ from sim.shapes import Capsule, point_clearance_m
 
 @dataclass(frozen=True)
 class Sight:
-    """Something as seen from the robot.
-
-    Attributes:
-        name: Such as ``boxes[2]``.
-        bearing_rad: In the robot's frame, counter-clockwise from straight ahead.
-    """
+    """Something such as ``boxes[2]``, with its bearing from straight ahead."""
 
     name: str
     distance_m: float

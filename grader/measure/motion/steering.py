@@ -97,10 +97,7 @@ def fit(samples: Sequence[Sample], limit_rad_s: float) -> Line:
     """Lay a line through the origin and the commands that are at no limit.
 
     A command at a limit is left out only if the line asks for at least that much there, so that
-    a step does not pass for a clamp.
-
-    Args:
-        samples: At least one.
+    a step does not pass for a clamp. There must be a command.
     """
     errors = np.array([item.error_rad for item in samples])
     commands = np.array([item.command_rad_s for item in samples])

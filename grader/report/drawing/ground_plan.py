@@ -16,7 +16,7 @@ from grader.recording.model import NS
 from grader.recording.simulated import Scene
 from grader.report.drawing.svg import Point, element, label, line, simplified
 from sim.motion import Pose
-from sim.script import MovingObstacle
+from sim.shapes import MovingObstacle
 
 MARGIN_M = 0.15
 """Shown around what matters."""
