@@ -2,10 +2,9 @@
 
 It needs no executor: it takes commands from their subscription by itself, and wakes up only when
 there is something to publish. Steps between two messages are invisible, so they are done
-together with the next visible one; a command acts from the first step that begins after the
-middleware had received it. The result is that of doing every step at its time, for a third of
-the CPU time. So a moment in which this loop is held up delays messages, which is reported, but
-does not change where the robot is.
+together with the next visible one, for a third of the CPU time; a command acts from the first
+step that begins after the middleware had received it. So a moment in which this loop is held up
+delays messages, which is reported, but does not change where the robot is.
 """
 
 from __future__ import annotations

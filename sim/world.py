@@ -79,10 +79,7 @@ class World:
         return [obstacle.shape_at(pose) for obstacle, pose in poses if pose is not None]
 
     def obstruction(self, pose: Pose, radius_m: float) -> Problem | None:
-        """The shape that keeps a robot with a circular footprint from a pose, or None.
-
-        What moves is where it is at simulated time 0.
-        """
+        """The shape that keeps a circular robot from a pose at simulated time 0, or None."""
         place = f"a robot with radius {radius_m:g} m cannot be at ({pose.x_m:g}, {pose.y_m:g})"
         for shape in (*self.shapes, *self.moving_at(0)):
             if shape.label == "bounds" and self.bounds is not None:

@@ -134,12 +134,13 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     driving = [item for item in commands(recording) if _size(item) > NO_SPEED_M_S]
     if not driving:
         topic = command_topic(recording)
-        return Finding.failed(
-            expected,
+        sent = recording.on(topic)
+        cause = Cause(
             f"no command on {code(topic)} has a linear.x other than 0",
             "linear.x = gain * distance, on the way to the goal's position.",
-            Evidence(moments=first_seen(recording, recording.on(topic))),
+            Evidence(moments=first_seen(recording, sent)),
         )
+        return (cause if sent else why_silent(recording, topic)).finding(expected)
     fastest = max(map(_size, driving))
     last = min(driving[-_LAST:], key=_size)
     plot = _plot(recording, driving, "linear.x (m/s)")

@@ -6,9 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import VelocityCommand, commands, number, odometry
@@ -16,7 +14,11 @@ from grader.measure.motion.track import pose_at
 from grader.recording.model import NS, Message, Recording
 from sim.motion import Pose
 
-Numbers = NDArray[np.float64]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[Any]
+
 MOST_BEHIND = 2
 """Messages of odometry that are on their way, or wait for a busy callback, at most."""
 LEAST_FIT = 3
@@ -99,6 +101,8 @@ def fit(samples: Sequence[Sample], limit_rad_s: float) -> Line:
     A command at a limit is left out only if the line asks for at least that much there, so that
     a step does not pass for a clamp. There must be a command.
     """
+    import numpy as np
+
     errors = np.array([item.error_rad for item in samples])
     commands = np.array([item.command_rad_s for item in samples])
     sizes, wanted = np.abs(commands), np.abs(errors)
@@ -109,18 +113,16 @@ def fit(samples: Sequence[Sample], limit_rad_s: float) -> Line:
     clamp = min(clamp, limit_rad_s * 0.999)
     high, low = clamp * (1.0 - _SAME), floor * (1.0 + _SAME)
     inside = (low < sizes) & (sizes < high)
-    if np.count_nonzero(inside) < LEAST_FIT:
+    if inside.sum() < LEAST_FIT:
         # Without a clamp of its own the law shows in what was asked for beyond the limit too.
         inside, high, low = sizes >= 0.0, math.inf, 0.0
     wanted = wanted * _gain(errors[inside], commands[inside])
-    kept = np.where(
-        sizes >= high, wanted < _SHORT_OF * clamp, (sizes > low) | (wanted > floor / _SHORT_OF)
-    )
+    kept = (sizes > low) | (wanted > floor / _SHORT_OF)
+    kept &= (sizes < high) | (wanted < _SHORT_OF * clamp)
     errors, commands = errors[kept], commands[kept]
     if len(errors) >= _LEAST_TRIMMED:
         # Where one phase ends and the next begins, a command or two answer the error of the other.
-        rests = np.abs(commands - _gain(errors, commands) * errors)
-        fitting = np.argsort(rests, kind="stable")
+        fitting = abs(commands - _gain(errors, commands) * errors).argsort(kind="stable")
         fitting = fitting[: len(errors) - math.ceil(FEW_STRAYS * len(errors))]
         errors, commands = errors[fitting], commands[fitting]
     gain = _gain(errors, commands)
@@ -128,7 +130,7 @@ def fit(samples: Sequence[Sample], limit_rad_s: float) -> Line:
 
 
 def _count(sizes: Numbers, size: float) -> int:
-    return int(np.count_nonzero(np.isclose(sizes, size, rtol=_SAME, atol=0.0)))
+    return int((abs(sizes - size) <= _SAME * size).sum())
 
 
 def _gain(errors: Numbers, commands: Numbers) -> float:
@@ -138,10 +140,10 @@ def _gain(errors: Numbers, commands: Numbers) -> float:
 
 def _r2(errors: Numbers, commands: Numbers, gain: float) -> float:
     # In shares of the largest command, so that the squares of huge ones are still numbers.
-    largest = float(np.abs(commands).max(initial=0.0)) or 1.0
+    largest = float(abs(commands).max(initial=0.0)) or 1.0
     shares = commands / largest
-    total = float(np.sum((shares - shares.mean()) ** 2))
-    rest = float(np.sum((shares - gain / largest * errors) ** 2))
+    total = float(((shares - shares.mean()) ** 2).sum())
+    rest = float(((shares - gain / largest * errors) ** 2).sum())
     if total <= 0.0:
         return 1.0 if rest <= 0.0 else 0.0
     return 1.0 - rest / total
