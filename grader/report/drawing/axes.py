@@ -19,14 +19,7 @@ TIME_AXIS = 40
 
 @dataclass(frozen=True)
 class Scale:
-    """A linear map from values to pixels.
-
-    Attributes:
-        low: Value at ``begin``.
-        high: Value at ``end``, more than ``low``.
-        begin: Pixel.
-        end: Pixel.
-    """
+    """A linear map from values, from ``low`` up to ``high``, to pixels."""
 
     low: float
     high: float

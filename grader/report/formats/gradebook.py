@@ -45,12 +45,9 @@ _OPTIONAL = ("SIS User ID", "SIS Login ID", "Integration ID", "Root Account")
 class CanvasExport:
     """A gradebook as Canvas exported it.
 
-    Attributes:
-        identity: Titles of the first columns, which say who a student is.
-        points: What it says of the points of each other column: a number, ``(read only)``, or
-            nothing.
-        students: The first columns of each student.
-        excused: Of each student, the columns that Canvas excuses from.
+    ``identity`` titles the first columns, which say who a student is. ``points`` are those of each
+    other column: a number, ``(read only)``, or nothing. ``excused`` are the columns that Canvas
+    excuses each student from.
     """
 
     identity: tuple[str, ...]
@@ -63,9 +60,7 @@ class CanvasExport:
 class CanvasFile:
     """A gradebook to import into Canvas.
 
-    Attributes:
-        problems: Who could not be matched, is not graded, or is left out.
-        doubts: What an instructor should know of the column.
+    ``problems`` name who has no score in it, ``doubts`` what is odd about the column.
     """
 
     text: str

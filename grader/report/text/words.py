@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from grader.checks.finding import Status
 from grader.recording.model import Ending
 
 
-@dataclass(frozen=True)
-class StatusWords:
+class StatusWords(NamedTuple):
     """A status for people; the symbol tells it without colour, and in ASCII too."""
 
     word: str
