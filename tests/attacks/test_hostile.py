@@ -239,11 +239,6 @@ without = dict(start_parameter_services=False, enable_rosout=False)
 off = rclpy.parameter.Parameter('start_type_description_service', value=False)
 node.other = rclpy.create_node('<b>\\x1b[31m=a b', parameter_overrides=[off], **without)
 """
-CLAIM = """\
-import json
-claim = {'kind': 'publisher', 'pid': os.getpid(), 'topic': '/cmd_vel', 'depth': None}
-os.write(int(os.environ['ROSGRADE_TRACER_FD']), json.dumps(claim).encode() + b'\\n')
-"""
 KILL_COLCON = """\
 import os, sys
 if 'install' in sys.argv:
@@ -253,12 +248,6 @@ SPEAK_AS_COLCON = """\
 import sys
 if 'install' in sys.argv:
     print('Starting >>> ghost', 'Finished <<< bot_publisher', sep='\\n', flush=True)
-    sys.exit(1)
-"""
-SPEAK_AS_CMAKE = """\
-import sys
-if 'install' in sys.argv:
-    print('Could not find a package configuration file provided by "nav2_msgs" with')
     sys.exit(1)
 """
 # As if colcon had been cut off in the middle, which would be a fault of the machine.
@@ -413,7 +402,6 @@ ATTACKS = {
     "loads_a_program_into_the_kernel": ended(
         CALL.format(x86_64=321, aarch64=280, arguments="0, 0, 0"), "called `bpf`"
     ),
-    "kills_its_group": ended("os.killpg(0, signal.SIGKILL)", "SIGKILL"),
     "fork_bomb": ended(BOMB, "sessions"),
     "heap": Attack(
         # Pages that nobody touches: the limit is reached at once, however busy the machine is.
@@ -479,14 +467,6 @@ ATTACKS = {
         maybe=frozenset({"messages"}),
         named=("with a name that ROS does not allow",),
     ),
-    "names_a_topic_past_rclpy": Attack(
-        "node.odd = node.create_publisher(Twist, '/<b> =a', 10)",
-        at_import=ALLOW_NAMES,
-        lost=frozenset({"alive"}),
-        maybe=frozenset({"messages"}),
-        named=("with a name that ROS does not allow",),
-    ),
-    "claims_a_queue_of_no_depth": ended(CLAIM, "wrote into the channel"),
     "stops_itself": ended("os.kill(os.getpid(), signal.SIGSTOP)", "SIGSTOP"),
     "sleeps": unstarted("time.sleep(1000)"),
     "leaves_at_once": unstarted("os._exit(0)"),
@@ -559,9 +539,6 @@ ATTACKS = {
     "build_kills_colcon": unbuilt(
         KILL_COLCON.format(signal=9), "PermissionError: [Errno 1] Operation not permitted"
     ),
-    "build_kills_colcon_in_real_time": unbuilt(
-        KILL_COLCON.format(signal=40), "PermissionError: [Errno 1] Operation not permitted"
-    ),
     "build_kills_its_group": unbuilt(
         "import os, sys\nif 'install' in sys.argv:\n    os.kill(0, 15)",
         "PermissionError: [Errno 1] Operation not permitted",
@@ -574,7 +551,6 @@ ATTACKS = {
     "build_ends_as_if_killed": unbuilt(
         "import sys\nif 'install' in sys.argv:\n    sys.exit(137)", "exited with code 137"
     ),
-    "build_speaks_as_cmake": unbuilt(SPEAK_AS_CMAKE, "setup.py: Could not find"),
     "build_speaks_as_colcon": unbuilt(SPEAK_AS_COLCON, "setup.py: Finished"),
     "build_speaks_without_a_line_end": unbuilt(SPEAK_UNFINISHED, "setup.py: and no line end"),
     "build_hides_memory": unbuilt(
