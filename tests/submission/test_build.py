@@ -20,7 +20,7 @@ from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
 from grader.submission.build.build_key import build_key
 from grader.submission.build.colcon import BuildLimits
-from grader.submission.prepare import Prepared, PrepareLimits, prepare
+from grader.submission.prepare import Prepared, prepare
 from grader.submission.record import BuildRecord, PackageRecord
 from tests.submission.samples import INTERFACES, MANIFEST, NODE, SETUP_PY, Tree, zip_bytes
 
@@ -30,7 +30,7 @@ FOLDER = "src/bot_publisher"
 
 
 def prepared(tree: Tree, ros: RosInstallation, python_s: float = 60.0) -> Prepared:
-    limits = PrepareLimits(build=BuildLimits(python_s=python_s))
+    limits = BuildLimits(python_s=python_s)
     cache = tree.root.parent / "cache"
     return prepare(tree.root, ros, cache=cache, limits=limits)
 

@@ -12,7 +12,6 @@ from grader.submission.build.build_cache import (
     INSTALL,
     BuildCache,
     CachedBuild,
-    CacheLimits,
 )
 from grader.submission.record import BuildRecord
 
@@ -141,8 +140,10 @@ def test_builds_that_were_not_used_for_long_go(cache: BuildCache, tmp_path: Path
     assert names(tmp_path) == {"used", "soon after another", "new"}
 
 
-def test_the_least_recently_used_go_when_there_is_too_much(tmp_path: Path) -> None:
-    cache = BuildCache(tmp_path, CacheLimits(total_bytes=25))
+def test_the_least_recently_used_go_when_there_is_too_much(
+    cache: BuildCache, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("grader.submission.build.build_cache._MOST_BYTES", 25)
     for key, days in (("first", 3), ("second", 2), ("third", 1)):
         stored(cache, key, content="x" * 10)
         age(tmp_path, key, days * DAY_S)
