@@ -10,10 +10,9 @@ where they are not, which is where the robot stops.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from sim.motion import Pose, integrate
-from sim.script import MovingObstacle
 from sim.shapes import Capsule, chord_clearance_m, point_clearance_m
 from sim.world import World
 
@@ -28,14 +27,8 @@ _ROUNDING_M = 1e-12
 _SIGHT_M = 0.5
 
 
-@dataclass(frozen=True, slots=True)
-class Contact:
-    """Result of a step near walls.
-
-    Attributes:
-        share: How much of the translation was possible, in [0, 1].
-        label: What is touched at the end, such as ``boxes[2]``, or None.
-    """
+class Contact(NamedTuple):
+    """How much of a translation was possible, in [0, 1], and the label of what is touched."""
 
     share: float
     label: str | None
@@ -56,7 +49,7 @@ class ContactFinder:
         self._all: _Near = tuple(
             (capsule, shape.label) for shape in world.shapes for capsule in shape.capsules
         )
-        self._moving = world.moving
+        self._world = world
         self._near: _Near = ()
         self._anchor = (math.inf, math.inf)
         self._sight_m = 0.0
@@ -70,7 +63,7 @@ class ContactFinder:
             end_ns: Simulated time at its end; moving obstacles are already there.
         """
         travel_m = abs(linear_m_s) * dt_s
-        near = self._walls_near(pose, travel_m) + self._moving_near(pose, travel_m, end_ns)
+        near = self._walls_near(pose, travel_m) + self._moving(pose, end_ns)
         if not near:
             return Contact(1.0, None)
         share, hit = 1.0, None
@@ -94,18 +87,12 @@ class ContactFinder:
             )
         return self._near
 
-    def _moving_near(self, pose: Pose, travel_m: float, time_ns: int) -> _Near:
+    def _moving(self, pose: Pose, time_ns: int) -> _Near:
         found: list[tuple[Capsule, str]] = []
-        for obstacle in self._moving:
-            at = obstacle.pose_at(time_ns)
-            if at is None:
-                continue
-            reach_m = obstacle.reach_m + self._radius_m + travel_m + TOUCH_M
-            if math.hypot(at.x_m - pose.x_m, at.y_m - pose.y_m) <= reach_m:
-                shape = obstacle.shape_at(at)
-                found.extend((capsule, obstacle.label) for capsule in shape.capsules)
-                if shape.contains(pose.x_m, pose.y_m):
-                    found.append(((pose.x_m, pose.y_m, pose.x_m, pose.y_m, 0.0), obstacle.label))
+        for shape in self._world.moving_at(time_ns):
+            found.extend((capsule, shape.label) for capsule in shape.capsules)
+            if shape.contains(pose.x_m, pose.y_m):
+                found.append(((pose.x_m, pose.y_m, pose.x_m, pose.y_m, 0.0), shape.label))
         return tuple(found)
 
     def _advance(
@@ -146,13 +133,3 @@ class ContactFinder:
             else:
                 length = max(least, 0.125 * min(length, part))
         return 1.0, None
-
-
-def obstacles_at(moving: tuple[MovingObstacle, ...], time_ns: int) -> list[Capsule]:
-    """The outlines of all obstacles that are there at a simulated time."""
-    found: list[Capsule] = []
-    for obstacle in moving:
-        pose = obstacle.pose_at(time_ns)
-        if pose is not None:
-            found.extend(obstacle.shape_at(pose).capsules)
-    return found

@@ -13,8 +13,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, core_schema
+from pydantic import (
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    PlainValidator,
+    WithJsonSchema,
+)
+from pydantic_core import CoreSchema
 
 from grader.spec.quantity import refusal, written_as_read
 from grader.spec.unit import Dimension, parse_quantity
@@ -55,42 +60,16 @@ def metres(value: Any, *, positive: bool = False) -> float:
 
 
 @dataclass(frozen=True)
-class Metres:
-    """Pydantic annotation: a length in metres, a bare number is allowed."""
-
-    positive: bool = False
-
-    def __get_pydantic_core_schema__(
-        self, source: type[Any], handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Validate by :func:`metres`."""
-        return core_schema.no_info_plain_validator_function(
-            lambda value: _refused(partial(metres, positive=self.positive), value)
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Describe the length to an editor."""
-        return {
-            "type": ["number", "string"],
-            "description": "Metres, or a length with its unit.",
-            "x-words": "length, such as `0.2 m`; a bare number is in metres",
-        }
-
-
-@dataclass(frozen=True)
 class Entries:
-    """Pydantic annotation: a list with named entries.
+    """Pydantic annotation: a list of lengths, and of an angle where its name is ``yaw``.
 
     Attributes:
-        names: What each entry is; one called ``yaw`` is an angle, all others are lengths.
         optional: So many entries at the end may be left out; they are then zero.
         positive: Whether every length must be more than zero.
     """
 
     names: tuple[str, ...]
-    make: Callable[..., Any]
+    make: Callable[..., Any] = lambda *numbers: numbers
     optional: int = 0
     positive: bool = False
 
@@ -155,10 +134,6 @@ def _angle(item: Any) -> float:
     return parse_quantity(item, Dimension.ANGLE)
 
 
-def _tuple(*numbers: float) -> tuple[float, ...]:
-    return numbers
-
-
 def _ends(x1: float, y1: float, x2: float, y2: float) -> tuple[float, ...]:
     if math.hypot(x2 - x1, y2 - y1) < MIN_SIZE_M:
         raise refusal("both ends are the same point")
@@ -175,9 +150,19 @@ def _pose(x_m: float, y_m: float, yaw_rad: float) -> Pose:
     return Pose(x_m, y_m, math.remainder(yaw_rad, math.tau))
 
 
-PositiveMetres = Annotated[float, Metres(positive=True)]
-Point = Annotated[tuple[float, float], Entries(("x", "y"), _tuple)]
-Size = Annotated[tuple[float, float], Entries(("length", "width"), _tuple, positive=True)]
+_LENGTH = WithJsonSchema(
+    {
+        "type": ["number", "string"],
+        "description": "Metres, or a length with its unit.",
+        "x-words": "length, such as `0.2 m`; a bare number is in metres",
+    }
+)
+Metres = Annotated[float, PlainValidator(lambda value: _refused(metres, value)), _LENGTH]
+PositiveMetres = Annotated[
+    float, PlainValidator(lambda value: _refused(partial(metres, positive=True), value)), _LENGTH
+]
+Point = Annotated[tuple[float, float], Entries(("x", "y"))]
+Size = Annotated[tuple[float, float], Entries(("length", "width"), positive=True)]
 Ends = Annotated[tuple[float, float, float, float], Entries(("x1", "y1", "x2", "y2"), _ends)]
 Rectangle = Annotated[
     tuple[float, float, float, float], Entries(("x_min", "y_min", "x_max", "y_max"), _rectangle)

@@ -1,7 +1,6 @@
 """The YAML options of the simulator: ``robot``, ``lidar``, ``odometry`` and ``topics``.
 
-Only models; this module imports neither numpy nor rclpy. Defaults are those of TurtleBot3 in
-Gazebo, or the text says why not:
+Defaults are those of TurtleBot3 in Gazebo, or the text says why not:
 
 - Topics and their QoS: ``turtlebot3_gazebo/params/turtlebot3_burger_bridge.yaml`` of
   ROBOTIS-GIT/turtlebot3_simulations, bridged by ros_gz_bridge with its default QoS
@@ -93,9 +92,7 @@ class Push(Model):
     """
 
     after: PositiveMetres = Field(description="Way along its path after which it begins.")
-    ahead: Annotated[float, Metres()] = Field(
-        0.0, description="How far it is pushed ahead; backwards is negative."
-    )
+    ahead: Metres = Field(0.0, description="How far it is pushed ahead; backwards is negative.")
     turn: Angle = Field(0.0, description="How far it is turned, counter-clockwise.")
     lasts: Duration = Field(0.3, description="How long the push takes.", validate_default=False)
 

@@ -11,15 +11,15 @@ their outlines.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.contact import obstacles_at
 from sim.description import Layout, LidarOptions, NoReturn
 from sim.motion import Pose, compose
-from sim.shapes import Capsule
+from sim.shapes import Shape
 from sim.world import World
 
 Floats = NDArray[np.float64]
@@ -61,7 +61,7 @@ class Lidar:
         self.angle_increment_rad = math.tau / options.beams
         self.angle_max_rad = self.angle_min_rad + (options.beams - 1) * self.angle_increment_rad
         self._world = world
-        self._walls = _outlines([item for shape in world.shapes for item in shape.capsules])
+        self._walls = _outlines(world.shapes)
         self.angles_rad = self.angle_min_rad + np.arange(options.beams) * self.angle_increment_rad
         self._cos, self._sin = np.cos(self.angles_rad), np.sin(self.angles_rad)
 
@@ -76,7 +76,7 @@ class Lidar:
         ranges = np.full(self.options.beams, np.inf)
         self._see(self._walls, sensor, ranges)
         if self._world.moving:
-            self._see(_outlines(obstacles_at(self._world.moving, time_ns)), sensor, ranges)
+            self._see(_outlines(self._world.moving_at(time_ns)), sensor, ranges)
         ranges[ranges > self.options.range_max] = np.inf
         return ranges
 
@@ -163,8 +163,9 @@ class Lidar:
         return wall, np.remainder(beam, self.options.beams)
 
 
-def _outlines(capsules: list[Capsule]) -> tuple[Floats, Floats]:
+def _outlines(shapes: Iterable[Shape]) -> tuple[Floats, Floats]:
     """Segments, shape (4, n): x1, y1, x2, y2; and circles, shape (3, m): x, y, radius."""
+    capsules = [capsule for shape in shapes for capsule in shape.capsules]
     segments = [item[:4] for item in capsules if item[4] == 0.0]
     circles = [(item[0], item[1], item[4]) for item in capsules if item[4] > 0.0]
     return (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any
@@ -40,20 +40,16 @@ def run(
     pose: str | None = None,
     seed: int = 0,
     domain_id: int | None = None,
-    values: Iterable[str] | None = None,
+    values: Sequence[str] | None = None,
     duration: float | None = None,
 ) -> None:
     """Simulate in real time until Ctrl-C, with a view on a terminal, else a line in a second.
 
     Args:
-        options: File with robot, sensors and topics; if left out, the defaults.
-        domain_id: ROS domain; if left out, ROS_DOMAIN_ID.
+        options: File with robot, sensors and topics, or None for the defaults.
+        domain_id: ROS domain, or None for ROS_DOMAIN_ID.
         values: Of the world, each as ``NAME=VALUE``.
         duration: End after so many simulated seconds, or None.
-
-    Raises:
-        UsageError: A file cannot be read, or there is no such robot or pose.
-        AssignmentError: A file says something that it must not.
     """
     read = read_world(world, _read_values(values or ()))
     chosen = _options(options, robot, pose)
@@ -101,14 +97,11 @@ def _loop(simulator: RosSimulator, screen: Screen, end_ns: int | None) -> None:
                 print(screen.line(), flush=True)
 
 
-def _read_values(texts: Iterable[str]) -> dict[str, str]:
-    values = {}
+def _read_values(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
-        name, equals, value = text.partition("=")
-        if not equals:
+        if "=" not in text:
             raise UsageError(f"--set {text}: write NAME=VALUE")
-        values[name] = value
-    return values
+    return dict(text.split("=", 1) for text in texts)
 
 
 def _options(file: Path | None, robot: str | None, pose: str | None) -> SimulatorOptions:

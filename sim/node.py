@@ -2,10 +2,9 @@
 
 It needs no executor: it takes commands from their subscription by itself, and wakes up only when
 there is something to publish. Steps between two messages are invisible, so they are done
-together with the next visible one; a command acts from the first step that begins after the
-middleware had received it. The result is that of doing every step at its time, for a third of
-the CPU time. So a moment in which this loop is held up delays messages, which is reported, but
-does not change where the robot is.
+together with the next visible one, for a third of the CPU time; a command acts from the first
+step that begins after the middleware had received it. So a moment in which this loop is held up
+delays messages, which is reported, but does not change where the robot is.
 """
 
 from __future__ import annotations
@@ -38,11 +37,7 @@ from sim.simulation import Simulation, Step
 
 
 class Sink(Protocol):
-    """Receiver of the truth, such as a recording.
-
-    Both methods are called from the loop and must be quick. Steps come in their order, but
-    several at a time (see the module).
-    """
+    """Receiver of the truth, such as a recording; called from the loop, so it must be quick."""
 
     def on_step(self, step: Step, stamp_ns: int) -> None:
         """A step was done."""
@@ -57,13 +52,6 @@ class PolledGroup(CallbackGroup):
     def can_execute(self, entity: Any) -> bool:
         """Never."""
         return False
-
-    def beginning_execution(self, entity: Any) -> bool:
-        """Never."""
-        return False
-
-    def ending_execution(self, entity: Any) -> None:
-        """There is nothing to end."""
 
 
 class RosSimulator:
@@ -200,11 +188,7 @@ class RosSimulator:
 
 
 def make_node(name: str, context: Context) -> Node:
-    """A node without anything that a student could use to disturb it.
-
-    No parameter services, no /rosout, no type description service, and no arguments of the
-    process that could rename it.
-    """
+    """A node without services, /rosout and arguments, by which a student could disturb it."""
     parameter: Any = Parameter  # rclpy is typed in parts only
     return rclpy.create_node(
         name,

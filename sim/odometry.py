@@ -20,11 +20,7 @@ from sim.motion import ORIGIN, Pose, Twist, integrate, relative
 
 @dataclass(frozen=True, slots=True)
 class OdometrySample:
-    """What odometry says at a moment.
-
-    Attributes:
-        pose: Of base_footprint in the frame ``odom``.
-    """
+    """What odometry says at a moment: base_footprint in the frame ``odom``."""
 
     time_ns: int
     pose: Pose

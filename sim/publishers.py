@@ -106,13 +106,13 @@ class ClockPublisher:
 
     def __init__(self, node: Node, topic: TopicOptions) -> None:
         """Create the publisher."""
-        self._message = Clock()
         self.publisher = _publisher(node, Clock, topic.topic, topic)
 
     def publish(self, stamp_ns: int) -> None:
         """Publish a ROS time."""
-        _set_time(self._message.clock, stamp_ns)
-        self.publisher.publish(self._message)
+        message = Clock()
+        _set_time(message.clock, stamp_ns)
+        self.publisher.publish(message)
 
 
 class TransformPublisher:

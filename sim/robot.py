@@ -73,19 +73,10 @@ def next_velocity(twist: Twist, command: Twist, dt_s: float, limits: RobotLimits
     Args:
         command: What is asked for; must be finite.
     """
+    change, turn = limits.acceleration_m_s2 * dt_s, limits.angular_acceleration_rad_s2 * dt_s
     return Twist(
-        _approach(
-            twist.linear_m_s,
-            command.linear_m_s,
-            limits.speed_m_s,
-            limits.acceleration_m_s2 * dt_s,
-        ),
-        _approach(
-            twist.angular_rad_s,
-            command.angular_rad_s,
-            limits.angular_speed_rad_s,
-            limits.angular_acceleration_rad_s2 * dt_s,
-        ),
+        _approach(twist.linear_m_s, command.linear_m_s, limits.speed_m_s, change),
+        _approach(twist.angular_rad_s, command.angular_rad_s, limits.angular_speed_rad_s, turn),
     )
 
 

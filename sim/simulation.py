@@ -54,12 +54,9 @@ class Step:
     Attributes:
         index: Number of the step, from 1.
         time_ns: Simulated time at its end: ``index * STEP_NS``.
-        pose: True pose in the world's frame.
-        twist: True velocity at its end, in the robot's frame.
+        pose: In the world's frame.
         command: What was asked for, before any limit; zero after a rejected command.
         contact: What the robot touches, such as ``boxes[2]``, or None.
-        scan: The scan that was taken at its end, or None if none was due.
-        odometry: The odometry at its end, or None if none was due.
     """
 
     index: int
@@ -101,11 +98,7 @@ class Schedule:
 
 
 class Simulation:
-    """The stepping core.
-
-    Attributes:
-        pose: True pose now.
-    """
+    """The stepping core, with the true pose of its robot."""
 
     def __init__(self, world: World, options: SimulatorOptions, seed: int = 0) -> None:
         """Begin at simulated time 0, at rest.
@@ -242,11 +235,7 @@ class Simulation:
 
 
 def make_simulation(world: World, options: SimulatorOptions, seed: int = 0) -> Simulation:
-    """Put together what the YAML describes.
-
-    Raises:
-        AssignmentError: The robot would start inside a wall.
-    """
+    """Put together what the YAML describes; a robot inside a wall is refused."""
     simulation = Simulation(world, options, seed)
     world.check_start(simulation.pose, simulation.model.radius_m)
     return simulation

@@ -33,8 +33,7 @@ from grader.spec.document import Place
 from grader.spec.nearest_name import did_you_mean
 from grader.spec.source import Source, parse_source, read_source
 from sim.motion import ORIGIN, Pose
-from sim.script import MovingObstacle
-from sim.shapes import Shape, polygon, wall
+from sim.shapes import MovingObstacle, Shape, polygon, wall
 from sim.world_model import WorldModel
 
 MAX_SEGMENTS = 3_000
@@ -74,14 +73,15 @@ class World:
             return (0.0, 0.0, 0.0, 0.0)
         return (min(xs), min(ys), max(xs), max(ys))
 
-    def obstruction(self, pose: Pose, radius_m: float) -> Problem | None:
-        """The shape that keeps a robot with a circular footprint from a pose, or None.
+    def moving_at(self, time_ns: int) -> list[Shape]:
+        """The moving obstacles that are there at a simulated time, each where it is then."""
+        poses = ((obstacle, obstacle.pose_at(time_ns)) for obstacle in self.moving)
+        return [obstacle.shape_at(pose) for obstacle, pose in poses if pose is not None]
 
-        What moves is where it is at simulated time 0.
-        """
+    def obstruction(self, pose: Pose, radius_m: float) -> Problem | None:
+        """The shape that keeps a circular robot from a pose at simulated time 0, or None."""
         place = f"a robot with radius {radius_m:g} m cannot be at ({pose.x_m:g}, {pose.y_m:g})"
-        starts = [(obstacle, obstacle.pose_at(0)) for obstacle in self.moving]
-        for shape in (*self.shapes, *(one.shape_at(at) for one, at in starts if at is not None)):
+        for shape in (*self.shapes, *self.moving_at(0)):
             if shape.label == "bounds" and self.bounds is not None:
                 x_min, y_min, x_max, y_max = self.bounds
                 if not (x_min < pose.x_m < x_max and y_min < pose.y_m < y_max):
@@ -93,11 +93,7 @@ class World:
         return None
 
     def check_start(self, pose: Pose, radius_m: float) -> None:
-        """Refuse a robot that would start inside a wall.
-
-        Raises:
-            AssignmentError: With the line of the shape that is in the way.
-        """
+        """Refuse a robot that would start inside a wall."""
         problem = self.obstruction(pose, radius_m)
         if problem is not None:
             raise AssignmentError(self.file, [problem])

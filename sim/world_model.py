@@ -20,15 +20,25 @@ from sim.coordinates import (
     Size,
 )
 from sim.motion import NS, ORIGIN, Pose, relative
-from sim.script import MAX_SPEED_M_S, MovingObstacle, Waypoint
-from sim.shapes import Shape, box, circle, polygon
+from sim.shapes import MAX_SPEED_M_S, MovingObstacle, Shape, Waypoint, box, circle, polygon
 
 
-class BoxModel(Model):
+class CornerModel(Model):
+    """The outline of a moving box."""
+
+    size: Size = Field(description="Length (along x at yaw 0) and width.")
+
+
+class RoundModel(Model):
+    """The outline of a moving pillar."""
+
+    radius: PositiveMetres = Field(description="Its radius.")
+
+
+class BoxModel(CornerModel):
     """A filled rectangle."""
 
     centre: Point = Field(description="Where its middle is.")
-    size: Size = Field(description="Length (along x at yaw 0) and width.")
     yaw: Angle = Field(0.0, description="Counter-clockwise turn.")
 
     def shape(self, label: str, line: int | None) -> Shape:
@@ -36,11 +46,10 @@ class BoxModel(Model):
         return box(label, Pose(*self.centre, self.yaw), self.size, line)
 
 
-class CircleModel(Model):
+class CircleModel(RoundModel):
     """A round pillar."""
 
     centre: Point = Field(description="Where its middle is.")
-    radius: PositiveMetres = Field(description="Its radius.")
 
     def shape(self, label: str, line: int | None) -> Shape:
         """What the simulation computes with."""
@@ -64,18 +73,6 @@ class PolygonModel(Model):
     def shape(self, label: str, line: int | None) -> Shape:
         """What the simulation computes with."""
         return polygon(label, self.points, line)
-
-
-class RoundModel(Model):
-    """The outline of a moving pillar."""
-
-    radius: PositiveMetres = Field(description="Its radius.")
-
-
-class CornerModel(Model):
-    """The outline of a moving box."""
-
-    size: Size = Field(description="Length (along x at yaw 0) and width.")
 
 
 class WaypointModel(Model):

@@ -26,7 +26,7 @@ from grader.run.runner import Runner, scenario_seed
 from grader.sandbox.python_tree import check_installed
 from grader.submission.build.bounded import OutputLimits
 from grader.submission.build.colcon import BuildLimits
-from grader.submission.prepare import Prepared, PrepareLimits, prepare
+from grader.submission.prepare import Prepared, prepare
 from grader.tree import listing
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class Grading:
         self._cache = cache
         self._seed = seed
         check_installed(loaded.assignment.libraries)
-        self._prepare_limits = _prepare_limits(loaded.assignment.build_limits)
+        self._build_limits = _build_limits(loaded.assignment.build_limits)
         self._type_support = TypeSupport(loaded, runner.ros, cache)
         self._scenarios = loaded.assignment.scenarios
         self._builds = threading.BoundedSemaphore(cpu_count())
@@ -108,7 +108,7 @@ class Grading:
                 path,
                 self._runner.ros,
                 cache=self._cache,
-                limits=self._prepare_limits,
+                limits=self._build_limits,
                 on_progress=on_build,
                 sandbox=sandbox,
                 stop=self._stop,
@@ -279,9 +279,9 @@ def _has_died(recording: Recording) -> bool:
     return any(process.stopped_by == "itself" for process in recording.processes)
 
 
-def _prepare_limits(options: BuildLimitOptions) -> PrepareLimits:
+def _build_limits(options: BuildLimitOptions) -> BuildLimits:
     room = options.limits()
     limits = BuildLimits(output=OutputLimits(total=room.output_bytes), room=room)
     if options.wall_time is not None:
         limits = replace(limits, python_s=options.wall_time, other_s=options.wall_time)
-    return PrepareLimits(build=limits)
+    return limits

@@ -16,8 +16,7 @@ class Wanted:
     """What the log should show of one message.
 
     Attributes:
-        ready_ns: When a subscription was there to get it, later than the message itself for
-            what a publisher kept for late joiners.
+        ready_ns: When a subscription was there to get it, perhaps after it was published.
     """
 
     message: Message
@@ -26,17 +25,13 @@ class Wanted:
 
     @property
     def due_ns(self) -> int:
-        """From when on a line is waited for."""
+        """From when on a line is expected."""
         return max(self.message.stamp_ns, self.ready_ns)
 
 
 @dataclass(frozen=True)
 class Echo:
-    """Lines that show one message.
-
-    Attributes:
-        lines: At least one; all values are in them together.
-    """
+    """Lines that show all values of one message together; at least one line."""
 
     wanted: Wanted
     lines: tuple[LogLine, ...]
@@ -45,11 +40,7 @@ class Echo:
 def wanted_values(
     messages: Sequence[Message], fields: Sequence[str], ready_ns: int = 0
 ) -> tuple[Wanted, ...]:
-    """What the log should show of each message.
-
-    Raises:
-        NoSuchField: The messages have no such field, or it holds no number.
-    """
+    """What the log should show of each message; raises NoSuchField where a number is not there."""
     return tuple(
         Wanted(message, {path: number_at(message.value, path) for path in fields}, ready_ns)
         for message in messages
@@ -130,11 +121,7 @@ def echoes(
 
 
 def _listed(printed: Sequence[float], wanted: Sequence[Wanted], decimals: int) -> int:
-    """How many messages a line serves: its numbers are their values in order, and no two the same.
-
-    Args:
-        decimals: How many decimals must be right.
-    """
+    """How many messages a line serves: its numbers are their values in order, no two the same."""
     values = [value for item in wanted for value in item.values.values()][: len(printed)]
     single = all(len(item.values) == 1 for item in wanted)
     if not single or len(values) < len(printed) or len(set(printed)) < len(printed):

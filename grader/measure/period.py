@@ -1,12 +1,9 @@
 """Periods of a stream of messages: intervals, their statistics, what the host explains.
 
-Two figures say whether messages come regularly:
-
-* the **median** of the intervals is the period; a few late messages do not move it;
-* an interval is **irregular** if it differs from the median by more than an allowed amount.
-  A message that comes late makes one interval too long and, if the next message is in time,
-  the following one as much too short: such a pair counts once. A pause counts for every message
-  that is missing in it.
+The median of the intervals is the period. An interval that differs from it by more than an allowed
+amount is irregular. A message that comes late makes one interval too long and, if the next message
+is in time, the following one as much too short: such a pair counts once. A pause counts for every
+message that is missing in it.
 """
 
 from __future__ import annotations

@@ -94,17 +94,14 @@ def exchanged(text: str, values: Mapping[str, float], decimals: int) -> tuple[st
     named: dict[str, list[float]] = {}
     for match in _NAMED.finditer(logged_text(text).replace(_MINUS, "-")):
         named.setdefault(match["name"].lower(), []).append(float(match["number"]))
+
+    def is_named(path: str, value: float) -> bool:
+        return any(shows(number, value, decimals) for number in named.get(_last(path), []))
+
     for one, other in combinations(values, 2):
-        of_one, of_other = named.get(_last(one), []), named.get(_last(other), [])
-        if _last(one) == _last(other) or not of_one or not of_other:
-            continue
-        if any(shows(number, values[one], decimals) for number in of_one) or any(
-            shows(number, values[other], decimals) for number in of_other
-        ):
-            continue
-        if any(shows(number, values[other], decimals) for number in of_one) and any(
-            shows(number, values[one], decimals) for number in of_other
-        ):
+        right = is_named(one, values[one]) or is_named(other, values[other])
+        wrong = is_named(one, values[other]) and is_named(other, values[one])
+        if _last(one) != _last(other) and wrong and not right:
             return one, other
     return None
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from sim.motion import ORIGIN, Pose
-from sim.script import MovingObstacle
+from sim.shapes import MovingObstacle
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,14 @@ import hashlib
 import os
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.errors import SubmissionError
 from grader.ros import RosInstallation
 from grader.submission.build.build import Builder, once_more
-from grader.submission.build.build_cache import BuildCache, CacheLimits
+from grader.submission.build.build_cache import BuildCache
 from grader.submission.build.build_error_location import Sources
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.build.installed import inspect
@@ -21,7 +21,7 @@ from grader.submission.build.standalone_build import standalone
 from grader.submission.build.underlay import completed
 from grader.submission.intake.archive import SUFFIXES
 from grader.submission.intake.locate import Located, check_path, opened, submission_id
-from grader.submission.intake.members import MIB, ArchiveLimits
+from grader.submission.intake.members import MIB
 from grader.submission.intake.paths import shown
 from grader.submission.read.package import Package, read_package, record_packages
 from grader.submission.read.source import Allowance
@@ -53,21 +53,12 @@ class Prepared:
         return replace(self, record=replace(self.record, id=name))
 
 
-@dataclass(frozen=True)
-class PrepareLimits:
-    """How much a submission may hold, how long it may build, what the cache keeps."""
-
-    archive: ArchiveLimits = field(default_factory=ArchiveLimits)
-    build: BuildLimits = field(default_factory=BuildLimits)
-    cache: CacheLimits = field(default_factory=CacheLimits)
-
-
 def prepare(
     path: Path | str,
     ros: RosInstallation,
     *,
     cache: Path,
-    limits: PrepareLimits | None = None,
+    limits: BuildLimits | None = None,
     on_progress: Callable[[str], None] = lambda _: None,
     sandbox: Sandbox | None = None,
     stop: threading.Event | None = None,
@@ -87,13 +78,12 @@ def prepare(
         UsageError: Nothing is at ``path``, or it is a URL.
         GraderFault: It cannot be graded here, for no fault of the student.
     """
-    limits = limits or PrepareLimits()
     source = check_path(path)
     on_progress("reading the submission")
     builder = Builder(
         ros=ros,
-        cache=BuildCache(cache, limits.cache),
-        limits=limits.build,
+        cache=BuildCache(cache),
+        limits=limits or BuildLimits(),
         sandbox=sandbox,
         stop=stop,
         on_progress=on_progress,
@@ -101,7 +91,7 @@ def prepare(
     )
 
     def attempt(is_second: bool) -> Prepared:
-        with opened(source, limits.archive) as located:
+        with opened(source) as located:
             return _prepare(located, replace(builder, is_second=is_second))
 
     try:
@@ -116,16 +106,11 @@ def refused(source: Path, error: SubmissionError) -> Prepared:
     return Prepared(record, None)
 
 
-def fingerprint(path: Path | str, limits: ArchiveLimits | None = None) -> str:
-    """The hash that :func:`prepare` will give a submission; nothing is built.
-
-    Raises:
-        UsageError: Nothing is at ``path``, or it is a URL.
-        GraderFault: It cannot be read here, for no fault of the student.
-    """
+def fingerprint(path: Path | str) -> str:
+    """The hash that :func:`prepare` will give a submission; nothing is built."""
     source = check_path(path)
     try:
-        with opened(source, limits) as located:
+        with opened(source) as located:
             return located.sha256
     except SubmissionError:
         return _hash(source)

@@ -52,29 +52,9 @@ def write(path):
     return path
 
 
-def read_hidden_checks():
-    return read(TARGETS['hidden'])
-
-
-def read_instructors_home():
-    return read(TARGETS['home'])
-
-
 def read_other_submission():
     found = glob.glob(TARGETS['cache'] + '/builds/*/build.json')
     return found[0]
-
-
-def read_reference():
-    return os.listdir(TARGETS['repository'] + '/reference')
-
-
-def read_assignments():
-    return os.listdir(TARGETS['repository'] + '/assignments')
-
-
-def read_code_of_rosgrade():
-    return read(TARGETS['repository'] + '/grader/grade/judge.py')
 
 
 def import_rosgrade():
@@ -85,10 +65,6 @@ def import_rosgrade():
 def import_library_of_rosgrade():
     import pydantic
     return pydantic.BaseModel
-
-
-def read_host_password_file():
-    return read('/etc/shadow')
 
 
 def read_environment_of_the_grader():
@@ -114,17 +90,9 @@ def read_command_line_of_the_grader():
     raise PermissionError('no such process')
 
 
-def forge_result():
-    return write(TARGETS['result'])
-
-
 def plant_in_site_packages():
     path = os.path.join(TARGETS['prefix'], 'lib', f'python3.{sys.version_info[1]}', 'site-packages')
     return write(path + '/planted_by_an_attack.pth')
-
-
-def plant_in_cache():
-    return write(glob.glob(TARGETS['cache'] + '/python/*')[0] + '/planted')
 
 
 def write_to_system():
@@ -173,36 +141,16 @@ def find_another_interface():
     return names
 
 
-def open_vsock():
-    return socket.socket(40, socket.SOCK_STREAM)
-
-
 def open_vsock_with_high_bits():
     # The kernel looks at 32 bits of the 64.
     if LIBC.syscall(41, ctypes.c_uint64((1 << 32) | 40), 1, 0) == -1:
         raise OSError(ctypes.get_errno(), 'socket')
 
 
-def open_raw_socket():
-    return socket.socket(socket.AF_PACKET, socket.SOCK_RAW)
-
-
-def open_bluetooth_socket():
-    return socket.socket(31, socket.SOCK_RAW, 1)
-
-
-def trace_parent():
-    return syscall('ptrace', 16, os.getppid(), 0, 0)
-
-
 def read_memory_of_parent():
     buffer = ctypes.create_string_buffer(8)
     vector = (ctypes.c_void_p * 2)(ctypes.addressof(buffer), 8)
     return syscall('process_vm_readv', os.getppid(), vector, 1, vector, 1, 0)
-
-
-def mount_something():
-    return syscall('mount', b'none', b'/tmp', b'tmpfs', 0, 0)
 
 
 def enter_namespace():
@@ -235,34 +183,6 @@ def make_device():
     return open('/tmp/disk', 'rb').read(1)
 
 
-def add_key():
-    return syscall('add_key', b'user', b'rosgrade', b'x', 1, -3)
-
-
-def load_program_into_kernel():
-    return syscall('bpf', 0, 0, 0)
-
-
-def watch_the_cpu():
-    return syscall('perf_event_open', ctypes.create_string_buffer(128), 0, -1, -1, 0)
-
-
-def use_io_uring():
-    return syscall('io_uring_setup', 1, ctypes.create_string_buffer(128))
-
-
-def hide_memory_in_a_file():
-    return syscall('memfd_create', b'x', 0)
-
-
-def hide_memory_in_a_segment():
-    return syscall('shmget', 0, 4096, 0o1600)
-
-
-def open_by_handle():
-    return syscall('open_by_handle_at', -1, 0, 0)
-
-
 def push_into_terminal():
     master, slave = os.openpty()
     fcntl.ioctl(slave, 0x5412, b'x')
@@ -293,23 +213,47 @@ def call_as_32_bit_program():
         raise OSError(f'signal {os.WTERMSIG(status)}')
 
 
+SIMPLE = {
+    'read_hidden_checks': lambda: read(TARGETS['hidden']),
+    'read_instructors_home': lambda: read(TARGETS['home']),
+    'read_reference': lambda: os.listdir(TARGETS['repository'] + '/reference'),
+    'read_assignments': lambda: os.listdir(TARGETS['repository'] + '/assignments'),
+    'read_code_of_rosgrade': lambda: read(TARGETS['repository'] + '/grader/grade/judge.py'),
+    'read_host_password_file': lambda: read('/etc/shadow'),
+    'forge_result': lambda: write(TARGETS['result']),
+    'plant_in_cache': lambda: write(glob.glob(TARGETS['cache'] + '/python/*')[0] + '/planted'),
+    'open_vsock': lambda: socket.socket(40, socket.SOCK_STREAM),
+    'open_raw_socket': lambda: socket.socket(socket.AF_PACKET, socket.SOCK_RAW),
+    'open_bluetooth_socket': lambda: socket.socket(31, socket.SOCK_RAW, 1),
+    'trace_parent': lambda: syscall('ptrace', 16, os.getppid(), 0, 0),
+    'mount_something': lambda: syscall('mount', b'none', b'/tmp', b'tmpfs', 0, 0),
+    'add_key': lambda: syscall('add_key', b'user', b'rosgrade', b'x', 1, -3),
+    'load_program_into_kernel': lambda: syscall('bpf', 0, 0, 0),
+    'watch_the_cpu':
+        lambda: syscall('perf_event_open', ctypes.create_string_buffer(128), 0, -1, -1, 0),
+    'use_io_uring': lambda: syscall('io_uring_setup', 1, ctypes.create_string_buffer(128)),
+    'hide_memory_in_a_file': lambda: syscall('memfd_create', b'x', 0),
+    'hide_memory_in_a_segment': lambda: syscall('shmget', 0, 4096, 0o1600),
+    'open_by_handle': lambda: syscall('open_by_handle_at', -1, 0, 0),
+}
 # A node is ended for these, so they are tried one by one: see test_hostile.py.
 NOTICED = ('trace_parent', 'read_memory_of_parent', 'load_program_into_kernel', 'open_by_handle')
-ATTACKS = [value for name, value in list(globals().items())
-           if callable(value) and getattr(value, '__module__', None) == __name__
-           and name not in ('read', 'read_all', 'write', 'syscall', 'descriptors')]
+HELPERS = ('read', 'read_all', 'write', 'syscall', 'descriptors')
+ATTACKS = {**SIMPLE, **{name: value for name, value in list(globals().items())
+                        if callable(value) and getattr(value, '__module__', None) == __name__
+                        and name not in HELPERS}}
 
 
-def main(but=()):
-    for attack in ATTACKS:
-        if attack.__name__ in but:
+def main(but=(), only=ATTACKS):
+    for name in ATTACKS:
+        if name in but or name not in only:
             continue
         try:
-            got = attack()
+            got = ATTACKS[name]()
         except BaseException as error:
-            print(f'ATTACK {attack.__name__} refused {type(error).__name__}: {error}', file=sys.stderr)
+            print(f'ATTACK {name} refused {type(error).__name__}: {error}', file=sys.stderr)
         else:
-            print(f'ATTACK {attack.__name__} succeeded {got!r}', file=sys.stderr)
+            print(f'ATTACK {name} succeeded {got!r}', file=sys.stderr)
 
 
 if __name__ == '__main__':

@@ -239,11 +239,6 @@ without = dict(start_parameter_services=False, enable_rosout=False)
 off = rclpy.parameter.Parameter('start_type_description_service', value=False)
 node.other = rclpy.create_node('<b>\\x1b[31m=a b', parameter_overrides=[off], **without)
 """
-CLAIM = """\
-import json
-claim = {'kind': 'publisher', 'pid': os.getpid(), 'topic': '/cmd_vel', 'depth': None}
-os.write(int(os.environ['ROSGRADE_TRACER_FD']), json.dumps(claim).encode() + b'\\n')
-"""
 KILL_COLCON = """\
 import os, sys
 if 'install' in sys.argv:
@@ -253,12 +248,6 @@ SPEAK_AS_COLCON = """\
 import sys
 if 'install' in sys.argv:
     print('Starting >>> ghost', 'Finished <<< bot_publisher', sep='\\n', flush=True)
-    sys.exit(1)
-"""
-SPEAK_AS_CMAKE = """\
-import sys
-if 'install' in sys.argv:
-    print('Could not find a package configuration file provided by "nav2_msgs" with')
     sys.exit(1)
 """
 # As if colcon had been cut off in the middle, which would be a fault of the machine.
@@ -374,11 +363,26 @@ class Attack:
 
 ALIVE = frozenset({"alive", "messages"})
 HOLDER = "the process that holds their sandbox"
+
+
+def ended(attack: str, *named: str) -> Attack:
+    """One that ends the node, or for which it is ended."""
+    return Attack(attack, lost=ALIVE, named=named)
+
+
+def unbuilt(at_build: str, *named: str) -> Attack:
+    """One that keeps the package from being built."""
+    return Attack(at_build=at_build, lost=frozenset({"builds"}), named=named)
+
+
+def unstarted(at_import: str, *named: str) -> Attack:
+    """One that keeps the node from starting."""
+    return Attack(at_import=at_import, lost=frozenset({"starts"}), named=named)
+
+
 ATTACKS = {
-    "kills_everything": Attack(
-        "os.kill(-1, signal.SIGKILL)\nos.kill(os.getpid(), 9)", lost=ALIVE, named=("SIGKILL",)
-    ),
-    "kills_the_probe": Attack(KILL_PROBE, lost=ALIVE, named=(f"sent SIGKILL to {HOLDER}",)),
+    "kills_everything": ended("os.kill(-1, signal.SIGKILL)\nos.kill(os.getpid(), 9)", "SIGKILL"),
+    "kills_the_probe": ended(KILL_PROBE, f"sent SIGKILL to {HOLDER}"),
     # It is over before anybody looks.
     "kills_the_probe_at_its_end": Attack(
         at_import="import atexit\natexit.register(lambda: os.kill(1, signal.SIGTERM))",
@@ -391,18 +395,14 @@ ATTACKS = {
         lost=ALIVE,
         named=(f"called `ptrace` on {HOLDER}",),
     ),
-    "reads_memory_of_the_probe": Attack(
+    "reads_memory_of_the_probe": ended(
         CALL.format(x86_64=310, aarch64=270, arguments="os.getppid(), None, 0, None, 0, 0"),
-        lost=ALIVE,
-        named=(f"called `process_vm_readv` on {HOLDER}",),
+        f"called `process_vm_readv` on {HOLDER}",
     ),
-    "loads_a_program_into_the_kernel": Attack(
-        CALL.format(x86_64=321, aarch64=280, arguments="0, 0, 0"),
-        lost=ALIVE,
-        named=("called `bpf`",),
+    "loads_a_program_into_the_kernel": ended(
+        CALL.format(x86_64=321, aarch64=280, arguments="0, 0, 0"), "called `bpf`"
     ),
-    "kills_its_group": Attack("os.killpg(0, signal.SIGKILL)", lost=ALIVE, named=("SIGKILL",)),
-    "fork_bomb": Attack(BOMB, lost=ALIVE, named=("sessions",)),
+    "fork_bomb": ended(BOMB, "sessions"),
     "heap": Attack(
         # Pages that nobody touches: the limit is reached at once, however busy the machine is.
         "x = []\nwhile True:\n    x.append(bytes(2**24))",
@@ -411,35 +411,29 @@ ATTACKS = {
         maybe=frozenset({"alive", "ends"}),
         named=("MemoryError",),
     ),
-    "memory_of_many": Attack(MANY_HOGS, lost=ALIVE, named=("MiB of memory",)),
-    "shared_memory_map": Attack(
+    "memory_of_many": ended(MANY_HOGS, "MiB of memory"),
+    "shared_memory_map": ended(
         "import mmap\nm = mmap.mmap(-1, 3 * 2**30)\nfor i in range(0, len(m), 4096):\n    m[i] = 1",
-        lost=ALIVE,
-        named=("MiB of memory",),
+        "MiB of memory",
     ),
-    "fills_the_disk": Attack(
+    "fills_the_disk": ended(
         "for i in range(9):\n    open(f'/tmp/{i}', 'wb').write(bytes(2**22))",
-        lost=ALIVE,
-        named=("No space left on device", "all space in /tmp and home"),
+        "No space left on device",
+        "all space in /tmp and home",
     ),
-    "one_huge_file": Attack(
+    "one_huge_file": ended(
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "os.truncate(os.open('/tmp/x', os.O_CREAT | os.O_RDWR), 2**40)",
-        lost=ALIVE,
-        named=("File too large",),
+        "File too large",
     ),
-    "a_million_files": Attack(
-        "for i in range(10**6):\n    open(f'/tmp/{i}', 'w').close()",
-        lost=ALIVE,
-        named=("No space left on device",),
+    "a_million_files": ended(
+        "for i in range(10**6):\n    open(f'/tmp/{i}', 'w').close()", "No space left on device"
     ),
-    "fills_shared_memory": Attack(
-        "open('/dev/shm/x', 'wb').write(bytes(2**25 - 2**20))", lost=ALIVE, named=("No space left",)
+    "fills_shared_memory": ended(
+        "open('/dev/shm/x', 'wb').write(bytes(2**25 - 2**20))", "No space left"
     ),
-    "endless_output": Attack(
-        "block = b'spam ' * 2**15\nwhile True:\n    os.write(1, block)",
-        lost=ALIVE,
-        named=("MiB of output",),
+    "endless_output": ended(
+        "block = b'spam ' * 2**15\nwhile True:\n    os.write(1, block)", "MiB of output"
     ),
     "daemon": Attack(DAEMON, lost=frozenset({"ends"}), named=("86397",)),
     "ignores_signals": Attack(
@@ -448,31 +442,24 @@ ATTACKS = {
         lost=frozenset({"ends"}),
         named=("SIGKILL",),
     ),
-    "hides_shared_memory": Attack(
-        HIDDEN_MEMORY.format(mib=600), lost=ALIVE, named=("MiB of memory",)
-    ),
-    "memory_in_sockets": Attack(SOCKETS, lost=ALIVE, named=("open files, 1024 are allowed",)),
+    "hides_shared_memory": ended(HIDDEN_MEMORY.format(mib=600), "MiB of memory"),
+    "memory_in_sockets": ended(SOCKETS, "open files, 1024 are allowed"),
     "hoards_descriptors_in_flight": Attack(
         at_import=IN_FLIGHT,
         maybe=frozenset({"alive", "starts", "messages"}),
         named=("more than 64 descriptors on their way between processes",),
     ),
-    "hoards_asynchronous_io": Attack(
+    "hoards_asynchronous_io": ended(
         CALL.format(x86_64=206, aarch64=0, arguments="65536, ctypes.byref(ctypes.c_ulong())"),
-        lost=ALIVE,
-        named=("called `io_setup`",),
+        "called `io_setup`",
     ),
-    "hoards_inotify": Attack(
-        HOARD_INOTIFY, lost=ALIVE, named=("called `inotify_init` more than 8 times",)
-    ),
-    "writes_into_the_init": Attack(
-        "os.open('/proc/1/mem', os.O_RDWR)", lost=ALIVE, named=("FileNotFoundError",)
-    ),
+    "hoards_inotify": ended(HOARD_INOTIFY, "called `inotify_init` more than 8 times"),
+    "writes_into_the_init": ended("os.open('/proc/1/mem', os.O_RDWR)", "FileNotFoundError"),
     "publishes_other_bytes": Attack(
         OTHER_BYTES, lost=frozenset({"messages"}), named=("cannot be read",)
     ),
-    "logs_before_1970": Attack(LOG_BEFORE_TIME, lost=ALIVE, named=("and now it is graded",)),
-    "writes_packets_by_hand": Attack(BY_HAND, lost=ALIVE, named=("and now it is graded",)),
+    "logs_before_1970": ended(LOG_BEFORE_TIME, "and now it is graded"),
+    "writes_packets_by_hand": ended(BY_HAND, "and now it is graded"),
     "names_a_node_past_rclpy": Attack(
         ODD_NODE,
         at_import=ALLOW_NAMES,
@@ -480,28 +467,13 @@ ATTACKS = {
         maybe=frozenset({"messages"}),
         named=("with a name that ROS does not allow",),
     ),
-    "names_a_topic_past_rclpy": Attack(
-        "node.odd = node.create_publisher(Twist, '/<b> =a', 10)",
-        at_import=ALLOW_NAMES,
-        lost=frozenset({"alive"}),
-        maybe=frozenset({"messages"}),
-        named=("with a name that ROS does not allow",),
-    ),
-    "claims_a_queue_of_no_depth": Attack(CLAIM, lost=ALIVE, named=("wrote into the channel",)),
-    "stops_itself": Attack(
-        "os.kill(os.getpid(), signal.SIGSTOP)", lost=ALIVE, named=("SIGSTOP",)
-    ),
-    "sleeps": Attack(at_import="time.sleep(1000)", lost=frozenset({"starts"})),
-    "leaves_at_once": Attack(at_import="os._exit(0)", lost=frozenset({"starts"})),
-    "another_domain": Attack(
-        at_import="os.environ['ROS_DOMAIN_ID'] = '5'",
-        lost=frozenset({"starts"}),
-        named=("joined ROS domain 5",),
-    ),
-    "another_discovery_server": Attack(
-        at_import="os.environ['ROS_DISCOVERY_SERVER'] = '127.0.0.1:11811'",
-        lost=frozenset({"starts"}),
-        named=("the program changed ROS_DISCOVERY_SERVER",),
+    "stops_itself": ended("os.kill(os.getpid(), signal.SIGSTOP)", "SIGSTOP"),
+    "sleeps": unstarted("time.sleep(1000)"),
+    "leaves_at_once": unstarted("os._exit(0)"),
+    "another_domain": unstarted("os.environ['ROS_DOMAIN_ID'] = '5'", "joined ROS domain 5"),
+    "another_discovery_server": unstarted(
+        "os.environ['ROS_DISCOVERY_SERVER'] = '127.0.0.1:11811'",
+        "the program changed ROS_DISCOVERY_SERVER",
     ),
     "calls_its_node_otherwise_than_it_says": Attack(
         at_import="Node.get_name = lambda _: 'bot_publisher'",
@@ -509,10 +481,9 @@ ATTACKS = {
         lost=frozenset({"node"}),
         named=("found the node `/publisher_bot`",),
     ),
-    "hides_what_python_has": Attack(
-        at_import="if sys.flags.no_site == 0:\n"
-        "    os.execv(sys.executable, [sys.executable, '-S', *sys.argv])",
-        lost=frozenset({"starts"}),
+    "hides_what_python_has": unstarted(
+        "if sys.flags.no_site == 0:\n"
+        "    os.execv(sys.executable, [sys.executable, '-S', *sys.argv])"
     ),
     "shuts_the_tracer_out": Attack(
         at_import="import posix\nposix.close(int(os.environ['ROSGRADE_TRACER_FD']))",
@@ -529,7 +500,7 @@ ATTACKS = {
         lost=frozenset({"depth", "timer"}),
         named=("the heartbeats of the publisher show that it keeps 1 message",),
     ),
-    "forged_tracer": Attack(FORGED, lost=ALIVE, named=("wrote into the channel",)),
+    "forged_tracer": ended(FORGED, "wrote into the channel"),
     "squats_the_probe_s_name": Attack(
         SQUAT,
         lost=frozenset({"untouched"}),
@@ -541,17 +512,15 @@ ATTACKS = {
         lost=frozenset({"messages"}),
         named=("messages were sent on `/cmd_vel` within 1 s",),
     ),
-    "garbage_on_dds_ports": Attack(GARBAGE, lost=ALIVE, named=("sent garbage to the UDP ports",)),
+    "garbage_on_dds_ports": ended(GARBAGE, "sent garbage to the UDP ports"),
     "announces_endless_samples": Attack(
         HEARTBEAT,
         lost=frozenset({"starts"}),
         named=("keeps the middleware of the node that watches the run busy",),
     ),
-    "burns_the_cpus": Attack(HOGS, lost=ALIVE, named=("s of CPU time, 3 s are allowed",)),
-    "burns_the_cpus_in_turns": Attack(
-        RELAY, lost=ALIVE, named=("s of CPU time, 3 s are allowed",)
-    ),
-    "injection": Attack(INJECTION, lost=ALIVE, named=("RuntimeError",)),
+    "burns_the_cpus": ended(HOGS, "s of CPU time, 3 s are allowed"),
+    "burns_the_cpus_in_turns": ended(RELAY, "s of CPU time, 3 s are allowed"),
+    "injection": ended(INJECTION, "RuntimeError"),
     "shadows_modules": Attack(
         files={
             "numpy/__init__.py": "raise SystemExit('trojan')",
@@ -559,84 +528,42 @@ ATTACKS = {
         },
         lost=frozenset({"starts"}),
     ),
-    "build_fork_bomb": Attack(
-        at_build=BOMB, lost=frozenset({"builds"}), named=("it started 64 processes",)
-    ),
-    "build_plants_links": Attack(
-        at_build=PLANT,
-        lost=frozenset({"builds"}),
-        named=("'share/passwd', a link out to '/etc/passwd'",),
-    ),
-    "build_digs_deep": Attack(
-        at_build=DIG,
-        lost=frozenset({"builds"}),
-        named=("it made more than 100 folders in one another",),
-    ),
-    "build_installs_outside": Attack(
-        at_build="import setuptools\n_s = setuptools.setup\ndef setup(**k):\n"
+    "build_fork_bomb": unbuilt(BOMB, "it started 64 processes"),
+    "build_plants_links": unbuilt(PLANT, "'share/passwd', a link out to '/etc/passwd'"),
+    "build_digs_deep": unbuilt(DIG, "it made more than 100 folders in one another"),
+    "build_installs_outside": unbuilt(
+        "import setuptools\n_s = setuptools.setup\ndef setup(**k):\n"
         "    k['data_files'].append(('/etc/cron.d', ['package.xml']))\n    _s(**k)\n"
-        "setuptools.setup = setup",
-        lost=frozenset({"builds"}),
+        "setuptools.setup = setup"
     ),
-    "build_kills_colcon": Attack(
-        at_build=KILL_COLCON.format(signal=9),
-        lost=frozenset({"builds"}),
-        named=("PermissionError: [Errno 1] Operation not permitted",),
+    "build_kills_colcon": unbuilt(
+        KILL_COLCON.format(signal=9), "PermissionError: [Errno 1] Operation not permitted"
     ),
-    "build_kills_colcon_in_real_time": Attack(
-        at_build=KILL_COLCON.format(signal=40),
-        lost=frozenset({"builds"}),
-        named=("PermissionError: [Errno 1] Operation not permitted",),
+    "build_kills_its_group": unbuilt(
+        "import os, sys\nif 'install' in sys.argv:\n    os.kill(0, 15)",
+        "PermissionError: [Errno 1] Operation not permitted",
     ),
-    "build_kills_its_group": Attack(
-        at_build="import os, sys\nif 'install' in sys.argv:\n    os.kill(0, 15)",
-        lost=frozenset({"builds"}),
-        named=("PermissionError: [Errno 1] Operation not permitted",),
-    ),
-    "build_writes_into_colcon": Attack(
-        at_build="import os\nopen(f'/proc/{os.getppid()}/mem', 'r+b')",
-        lost=frozenset({"builds"}),
-        named=("PermissionError: [Errno 13] Permission denied",),
+    "build_writes_into_colcon": unbuilt(
+        "import os\nopen(f'/proc/{os.getppid()}/mem', 'r+b')",
+        "PermissionError: [Errno 13] Permission denied",
     ),
     # No signal, though a shell would tell of one so.
-    "build_ends_as_if_killed": Attack(
-        at_build="import sys\nif 'install' in sys.argv:\n    sys.exit(137)",
-        lost=frozenset({"builds"}),
-        named=("exited with code 137",),
+    "build_ends_as_if_killed": unbuilt(
+        "import sys\nif 'install' in sys.argv:\n    sys.exit(137)", "exited with code 137"
     ),
-    "build_speaks_as_cmake": Attack(
-        at_build=SPEAK_AS_CMAKE,
-        lost=frozenset({"builds"}),
-        named=("setup.py: Could not find",),
+    "build_speaks_as_colcon": unbuilt(SPEAK_AS_COLCON, "setup.py: Finished"),
+    "build_speaks_without_a_line_end": unbuilt(SPEAK_UNFINISHED, "setup.py: and no line end"),
+    "build_hides_memory": unbuilt(
+        HIDDEN_MEMORY.format(mib=1200), "it took more than 1024 MiB of memory"
     ),
-    "build_speaks_as_colcon": Attack(
-        at_build=SPEAK_AS_COLCON,
-        lost=frozenset({"builds"}),
-        named=("setup.py: Finished",),
-    ),
-    "build_speaks_without_a_line_end": Attack(
-        at_build=SPEAK_UNFINISHED,
-        lost=frozenset({"builds"}),
-        named=("setup.py: and no line end",),
-    ),
-    "build_hides_memory": Attack(
-        at_build=HIDDEN_MEMORY.format(mib=1200),
-        lost=frozenset({"builds"}),
-        named=("it took more than 1024 MiB of memory",),
-    ),
-    "build_memory": Attack(
-        at_build="x = bytearray(2**32)", lost=frozenset({"builds"}), named=("MemoryError",)
-    ),
-    "build_disk": Attack(
-        at_build="import os\nfor i in range(40):\n"
+    "build_memory": unbuilt("x = bytearray(2**32)", "MemoryError"),
+    "build_disk": unbuilt(
+        "import os\nfor i in range(40):\n"
         "    open(f'{os.environ[\"HOME\"]}/{i}', 'wb').write(bytes(2**26))",
-        lost=frozenset({"builds"}),
-        named=("it wrote more than 128 MiB",),
+        "it wrote more than 128 MiB",
     ),
-    "build_output": Attack(
-        at_build="import sys\nwhile True:\n    sys.stderr.write('spam ' * 10**5)",
-        lost=frozenset({"builds"}),
-        named=("too much output",),
+    "build_output": unbuilt(
+        "import sys\nwhile True:\n    sys.stderr.write('spam ' * 10**5)", "too much output"
     ),
 }
 
@@ -645,7 +572,7 @@ HONEST = {
     "right": Attack(),
     "misnamed": Attack(name="publisher_bot", lost=frozenset({"node"})),
     "stops_too_early": Attack("node.timer.cancel()", lost=frozenset({"messages"})),
-    "crashes": Attack("raise ValueError('a mistake')", lost=ALIVE),
+    "crashes": ended("raise ValueError('a mistake')"),
     "uses_what_is_allowed": Attack(at_import="import scipy"),
     "names_a_module_that_is_no_text": Attack(
         files={"bot_publisher/other.py": "import importlib\nimportlib.import_module('\\ud800')"}
@@ -656,12 +583,13 @@ HONEST = {
         at_import="if 'ANEW' not in os.environ:\n"
         "    os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, 'ANEW': ''})"
     ),
-    "uses_what_is_not": Attack(
-        at_import="import pydantic",
-        lost=frozenset({"starts"}),
-        named=("No module named 'pydantic'", "Is `pydantic` spelt right?", "`numpy` and `scipy`"),
+    "uses_what_is_not": unstarted(
+        "import pydantic",
+        "No module named 'pydantic'",
+        "Is `pydantic` spelt right?",
+        "`numpy` and `scipy`",
     ),
-    "does_not_build": Attack(at_build="raise ValueError('a mistake')", lost=frozenset({"builds"})),
+    "does_not_build": unbuilt("raise ValueError('a mistake')"),
 }
 """Right and wrong, without any bad intent."""
 

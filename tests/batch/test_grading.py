@@ -32,7 +32,7 @@ from grader.recording.model import Ending, Endpoint, Kind, Node, Owner, Qos, Rec
 from grader.report.model.facts import Clock
 from grader.run.runner import Runner
 from grader.submission.build.colcon import BuildLimits
-from grader.submission.prepare import Prepared, PrepareLimits
+from grader.submission.prepare import Prepared
 from grader.submission.record import BuildRecord, PackageRecord, SubmissionRecord
 
 YAML = """\
@@ -348,9 +348,9 @@ def test_an_untouched_starter_that_gets_many_points_is_judged_wrongly(
 
 
 def test_a_limit_of_the_build_is_the_author_s(lesson: LoadedAssignment, tmp_path: Path) -> None:
-    asked: list[PrepareLimits] = []
+    asked: list[BuildLimits] = []
 
-    def note(*_: object, limits: PrepareLimits, **__: object) -> Prepared:
+    def note(*_: object, limits: BuildLimits, **__: object) -> Prepared:
         asked.append(limits)
         return Prepared(record=dataclasses.replace(SUBMISSION, build=None), install=None)
 
@@ -361,7 +361,7 @@ def test_a_limit_of_the_build_is_the_author_s(lesson: LoadedAssignment, tmp_path
         patch.setattr(grading_module, "prepare", note)
         for loaded in (lesson, load_assignment(lesson.folder)):
             Grading(loaded, ScriptedRunner(), tmp_path).grade(tmp_path, tmp_path / "out")
-    usual, own = (limits.build for limits in asked)
+    usual, own = asked
     assert usual == BuildLimits()
     assert (own.python_s, own.other_s, own.output.total) == (30.0, 30.0, 2**20)
     assert own.room.memory_bytes == 2**30

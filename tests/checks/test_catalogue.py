@@ -32,7 +32,7 @@ from grader.recording.model import (
 )
 from grader.recording.simulated import Incident, Scene, Truth
 from sim.motion import ORIGIN, Pose
-from sim.script import MovingObstacle, Waypoint
+from sim.shapes import MovingObstacle, Waypoint
 from tests.checks.builder import (
     CHECKS,
     LAUNCH_NS,

@@ -101,7 +101,7 @@ class TestGood:
         assert responsive(recording(calls=tuple(twins))).status is Status.PASSED
         silent_one = tuple(replace(item, answered_ns=None) for item in twins)
         found = failing("executor.responsive", recording(calls=silent_one))
-        assert "2 nodes offer these services under its name, and not every one" in found
+        assert "answered 0 of 6 calls" in found
 
     def test_another_node_cannot_answer_in_its_place(self):
         helper = replace(OFFERED, node="/helper")
@@ -180,12 +180,6 @@ class TestBlocked:
         found = failing("executor.responsive", recording(calls=calls(None)))
         assert "something blocks the executor" in found
         assert "never called" not in found
-
-    def test_a_timer_of_zero(self):
-        run = recording(calls=calls(None), declarations=declarations(timer_s=0.0))
-        found = failing("executor.responsive", run)
-        assert "the process declared a timer of 0 s" in found
-        assert "300 // 1000" in found and "while True" not in found
 
     def test_a_node_in_spin_when_it_was_interrupted_is_not_blamed_for_that_line(self):
         log = output(traceback("KeyboardInterrupt", source="rclpy.spin(node)", line=30))

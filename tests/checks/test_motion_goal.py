@@ -332,7 +332,7 @@ class TestMistakes:
 
     def test_the_same_speed_all_the_way(self):
         said = failing("motion.slows_down", run_to(GOAL, constant=0.1))
-        assert "commands that drive have linear.x = 0.1 m/s" in said
+        assert "0.1 m/s at the end, 0.1 m/s at most" in said
         assert "linear.x = gain * distance" in said
 
     @pytest.mark.parametrize(
@@ -435,9 +435,7 @@ class TestMistakes:
             ((GOAL[0], -GOAL[1], GOAL[2]), "the sign of y changed"),
             ((GOAL[0], GOAL[1], math.radians(GOAL[2])), "taken for degrees"),
             ((GOAL[0], GOAL[1], 0.0), "as if the goal's heading were 0"),
-            ((GOAL[0], GOAL[1], wrap(math.degrees(GOAL[2]))), "converted to degrees"),
             ((GOAL[0], GOAL[1], -GOAL[2]), "its sign changed"),
-            ((GOAL[0], GOAL[1], GOAL[2] + math.pi), "the opposite of the goal's heading"),
             ((0.4, 0.2, 0.0), "came to rest at (0.3"),
         ],
     )
@@ -481,7 +479,7 @@ class TestMistakes:
     def test_a_detour(self):
         run = run_to((-0.8, 0.1, 0.0), angular=0.5, linear=0.3, seconds=60)
         said = failing("motion.path_length", run, goal=yaml((-0.8, 0.1, 0.0)), most="20 %")
-        assert "longer" in said and "with the goal more than 45° to the side" in said
+        assert "longer" in said and "Look at its heading on the way" in said
 
     def test_one_command_for_a_straight_way_is_no_silence(self):
         said = [None]
@@ -594,7 +592,6 @@ def test_a_robot_that_turns_the_long_way_and_never_rests_is_told_to_normalise_th
         (lambda yaw: yaw / 2, "as if yaw were half of what it is", "2 * atan2(z, w)"),
         (lambda yaw: math.sin(yaw / 2), "as if yaw were z of the quaternion", "half the angle"),
         (lambda yaw: -yaw, "with its sign changed", "Counter-clockwise"),
-        (abs, "as if yaw were never negative", "acos loses the sign"),
     ],
 )
 @pytest.mark.parametrize("style", [{}, {"wrap": lambda error: error}, {"spin": 1.0}])

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import re
 from dataclasses import replace
 
 import pytest
@@ -155,7 +154,7 @@ class TestDrives:
 
     def test_backwards(self):
         run = drive(by_front(-0.1), seconds=5)
-        assert "drives backwards" in failing("motion.drives", run, speed="0.1 m/s")
+        assert "-1 times the expected" in failing("motion.drives", run, speed="0.1 m/s")
 
     def test_on_and_off(self):
         ticks = iter(range(10_000))
@@ -319,8 +318,7 @@ class TestStops:
 
         run = drive(law, world=WALL, seconds=15)
         said = failing("motion.no_contact", run)
-        assert re.search(r"only \d\d commands followed the \d\d scans until then", said)
-        assert "lets scans wait in the queue" in said
+        assert "A time.sleep() in the callback or a slow timer decides by an old scan" in said
 
     def test_two_places_that_publish(self):
         def law(senses: Senses):
@@ -394,7 +392,6 @@ class TestStops:
     def test_too_late_by_another_limit(self):
         law = on_scan(lambda ranges: (0.0 if ranges[0] <= 0.13 else 0.1, 0.0))
         said = failing("motion.stops", drive(law, world=WALL, seconds=20), **STOPS)
-        assert "and commands to drive on followed them" in said
         assert "Which number does the callback compare" in said
 
     def test_too_late_by_what_the_machine_took_is_no_fault_of_the_student(self):

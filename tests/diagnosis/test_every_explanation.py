@@ -44,7 +44,8 @@ from tests.checks.builder import (
     traceback,
     twist,
 )
-from tests.checks.requests import action, asked, service, serving
+from tests.checks.requests import acting, action, asked, parameters_read, service, serving
+from tests.checks.test_action import canceled
 from tests.checks.test_interface import CMAKE, INTERFACE, TEXT, handed_in, unbuilt
 from tests.checks.test_package import NEEDS_NAV2
 from tests.diagnosis import motion_cases
@@ -126,6 +127,13 @@ def typed(type_: str) -> Recording:
     return recording(endpoints=(endpoint(type=type_), reader()))
 
 
+def without_value(*names: str) -> Any:
+    """The answers of a node that declares parameters without a default."""
+    listed, described, read = parameters_read(**dict.fromkeys(names, 1.0))
+    descriptors = [{**item, "type": 0} for item in described.response["descriptors"]]
+    return listed, replace(described, response={"descriptors": descriptors}), read
+
+
 def paced(intervals_s: list[float], **changes: Any) -> Recording:
     """A publisher whose messages come after these intervals."""
     times_s = builder.after(intervals_s)
@@ -142,6 +150,7 @@ ENABLE = {"service": "/enable", "within": "1 s"}
 TYPED = {"topic": "/cmd_vel", "type": "geometry_msgs/msg/Twist"}
 EACH = {"topic": "/cmd_vel", "period": "300 ms"}
 PACKAGE = {"package": "bot_publisher"}
+EXECUTABLE = {"package": "bot_publisher", "executable": "bot_pub"}
 OF_INTERFACE = {"interface": INTERFACE}
 
 
@@ -436,6 +445,53 @@ CASES: list[Group] = [
             ),
             "NotGenerated.no_member_of_group": unbuilt(groups=()),
             "NotGenerated.unknown_type": unbuilt(TEXT.replace("float64", "float46")),
+        },
+    ),
+    (
+        "package.executable",
+        EXECUTABLE,
+        {
+            "NoExecutable.no_such_function": submission(
+                package(missing_targets=(("bot_pub", SourceError("setup.py", 22, "no module")),))
+            ),
+            "NoExecutable.in_another_package": submission(
+                package(executables=(), entry_points=()), package("robot")
+            ),
+            "NoExecutable.installed_in_bin": submission(
+                package(executables=(), misplaced_executables=("bot_pub",))
+            ),
+            "NoExecutable.not_installed_by_cmake": submission(
+                package(executables=(), build_type="ament_cmake")
+            ),
+            "NoExecutable.no_console_scripts": submission(package(executables=(), entry_points=())),
+            "NoExecutable.other_console_scripts": submission(package(executables=())),
+        },
+    ),
+    (
+        "parameter.declared",
+        {"node": NODE, "name": "speed"},
+        {
+            "NotDeclared.services_not_asked": recording(),
+            "NotDeclared.no_parameters": recording(calls=without_value()),
+            "NotDeclared.no_value": recording(calls=without_value("speed")),
+            "NotDeclared.other_parameters": recording(calls=parameters_read(sped=1.0)),
+        },
+    ),
+    (
+        "action.cancels",
+        {"action": "/fibonacci"},
+        {
+            "NotCanceled.cancel_refused": acting(
+                canceled(cancel_accepted=False, status="succeeded")
+            ),
+            "NotCanceled.execute_callback_raised": acting(
+                canceled(status="succeeded", end_s=0.9),
+                log=output(traceback("ValueError: no"), time_s=1.5),
+            ),
+            "NotCanceled.executor_busy_with_the_goal": acting(
+                canceled(cancel_answered_ns=None, cancel_accepted=None, status="succeeded")
+            ),
+            "NotCanceled.request_ignored": acting(canceled(status="succeeded", end_s=0.9)),
         },
     ),
 ]

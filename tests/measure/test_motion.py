@@ -13,12 +13,12 @@ from grader.checks.reference import (
     GoalPose,
     UnknownValue,
 )
-from grader.measure.motion.ground import ahead, edge_m, nearest
+from grader.measure.motion.ground import ahead, nearest
 from grader.measure.motion.quantities import degrees, metres, point, side, speed
 from grader.recording.model import NS
 from grader.recording.simulated import Scene, Truth
 from sim.motion import ORIGIN, Pose
-from sim.script import MovingObstacle, Waypoint
+from sim.shapes import MovingObstacle, Waypoint
 from tests.checks.builder import (
     at,
     endpoint,
@@ -151,7 +151,6 @@ class TestGround:
         world = scene({"wall": ((0.0, 1.0, 2.0, 1.0, 0.0),)}, lidar=lidar)
         sight = ahead(world, standing(1.0, 0.0, math.pi / 2))
         assert sight is not None and math.isclose(sight.distance_m, 0.95)
-        assert math.isclose(edge_m(world), 0.05)
 
 
 class TestUntouched:

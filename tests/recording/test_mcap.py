@@ -41,7 +41,7 @@ from grader.submission.read.code_facts import (
 )
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 from sim.motion import Pose
-from sim.script import MovingObstacle, Waypoint
+from sim.shapes import MovingObstacle, Waypoint
 
 TWIST = """\
 Vector3  linear

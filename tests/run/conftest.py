@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -13,6 +14,7 @@ from grader import ros
 from grader.assignment.model import Assignment
 from grader.recording.mcap_reader import read_recording
 from grader.recording.model import Recording
+from grader.run.process.descendants import command_line
 from grader.run.runner import Runner
 from grader.submission.record import SubmissionRecord
 
@@ -52,6 +54,12 @@ def install(folder: Path, source: str) -> Path:
     file.write_text(f"#!{sys.executable}\n{source}", encoding="utf-8")
     file.chmod(0o755)
     return folder / "install"
+
+
+def running(marker: str) -> list[int]:
+    """Processes of this machine whose command line holds a text."""
+    found = [int(path.name) for path in Path("/proc").glob("[0-9]*")]
+    return [pid for pid in found if pid != os.getpid() and marker in command_line(pid)]
 
 
 @pytest.fixture

@@ -103,12 +103,3 @@ def test_the_same_answer_to_different_questions_counts_a_moment_later() -> None:
     assert not answers.may_go_on(0.01)
     assert answers.may_go_on(0.06)
     assert answers.is_over(0.06)
-
-
-def test_what_came_before_the_first_question_is_no_answer() -> None:
-    answers = Answers(WITHIN_S)
-    answers.hear(b"hello", 0.0)
-    assert answers.may_go_on(0.0)
-    answers.ask()
-    assert not answers.may_go_on(0.5)
-    assert answers.may_go_on(WITHIN_S)

@@ -22,10 +22,9 @@ from grader.errors import GraderFault
 from grader.measure import declarations
 from grader.recording.model import NS, Ending, Kind, Owner, Recording
 from grader.run.environment import cell_environment
-from grader.run.process.descendants import command_line
 from tests.checks.builder import judge
 from tests.run import nodes
-from tests.run.conftest import RunNode
+from tests.run.conftest import RunNode, running
 
 pytestmark = pytest.mark.ros
 
@@ -39,43 +38,32 @@ def is_alive(pid: int) -> bool:
     return stat[stat.rindex(")") + 2] not in "ZX"
 
 
-def is_running(fragment: str) -> bool:
-    """Whether any process has a text in its command line."""
-    for file in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            if fragment.encode() in file.read_bytes():
-                return True
-        except OSError:
-            continue
-    return False
-
-
 def values(recording: Recording) -> list[float]:
     """linear.x of all messages on /cmd_vel."""
     return [message.value["linear"]["x"] for message in recording.on("/cmd_vel")]
 
 
-def test_a_message_published_in_the_constructor_is_received(run_node: RunNode) -> None:
+HEARS_ITSELF = nodes.ONE_SHOT.replace(
+    "        self.publisher =",
+    '        self.create_subscription(Twist, "cmd_vel", print, 10)\n        self.publisher =',
+)
+
+
+@pytest.mark.parametrize(
+    ("source", "quiet", "ending"),
+    [
+        pytest.param(nodes.ONE_SHOT, "300 ms", Ending.UNTIL, id="in the constructor"),
+        pytest.param(HEARS_ITSELF, "300 ms", Ending.UNTIL, id="and heard by the program"),
+        pytest.param(nodes.ONE_SHOT_THEN_EXIT, "2 s", Ending.EXITED, id="before it ends"),
+    ],
+)
+def test_a_message_that_is_published_once_is_received(
+    run_node: RunNode, source: str, quiet: str, ending: Ending
+) -> None:
     for _ in range(5):
-        recording = run_node(nodes.ONE_SHOT, until={"quiet": "300 ms"})
+        recording = run_node(source, until={"quiet": quiet})
         assert values(recording) == [1.0]
-
-
-def test_a_message_that_the_program_itself_hears_is_received_as_well(run_node: RunNode) -> None:
-    own = nodes.ONE_SHOT.replace(
-        "        self.publisher =",
-        '        self.create_subscription(Twist, "cmd_vel", print, 10)\n        self.publisher =',
-    )
-    for _ in range(5):
-        assert values(run_node(own, until={"quiet": "300 ms"})) == [1.0]
-
-
-def test_a_message_published_just_before_the_process_ends_is_received(run_node: RunNode) -> None:
-    for _ in range(5):
-        recording = run_node(nodes.ONE_SHOT_THEN_EXIT, until={"quiet": "2 s"})
-        assert values(recording) == [1.0]
-        assert recording.ending is Ending.EXITED
-        assert recording.processes[0].exit_code == 0
+        assert recording.ending is ending
 
 
 def test_a_timer_is_recorded_with_its_source_timestamps(run_node: RunNode) -> None:
@@ -275,7 +263,7 @@ def test_a_child_that_leaves_the_session_is_killed_and_named(run_node: RunNode) 
     )
     recording = run_node(nodes.timed(before_spin=spawn))
     assert any(marker in command for command in recording.processes[0].survivors)
-    assert not is_running(marker)
+    assert not running(marker)
 
 
 def test_a_foreign_node_ends_the_run_as_our_fault_by_name(run_node: RunNode) -> None:
@@ -340,28 +328,21 @@ def test_nothing_survives_the_death_of_whoever_ordered_the_run(tmp_path: Path) -
     )
     assert process.stdout is not None
     assert process.stdout.readline().strip() == "recording"
-    assert is_running(marker)
+    assert running(marker)
     process.kill()
     process.communicate()
     deadline = time.monotonic() + 20.0
-    while is_running(marker):
+    while running(marker):
         assert time.monotonic() < deadline, "the student's process is still there"
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("source", [nodes.timed().replace("rclpy.spin(node)\n", "")])
-def test_a_node_that_ends_at_once_is_seen_every_time(run_node: RunNode, source: str) -> None:
+def test_a_node_that_ends_at_once_is_seen_every_time(run_node: RunNode) -> None:
     for _ in range(5):
-        recording = run_node(source)
+        recording = run_node(nodes.timed().replace("rclpy.spin(node)\n", ""))
         assert [node.name for node in recording.student_nodes] == ["/bot_publisher"]
         assert recording.student_endpoints(Kind.PUBLISHER, "/cmd_vel")
         assert recording.ending is Ending.EXITED
-
-
-def running(marker: str) -> list[int]:
-    """Processes of this machine whose command line holds a text."""
-    found = [int(path.name) for path in Path("/proc").glob("[0-9]*")]
-    return [pid for pid in found if pid != os.getpid() and marker in command_line(pid)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])

@@ -62,10 +62,6 @@ def test_a_long_wait_is_booked_at_its_end_and_explained_by_all_of_its_time() -> 
     assert others_share(300 * MS, samples(100, 0, 0, 0, 0, 5)) == 5 * MS
 
 
-def test_without_a_measurement_everything_is_the_host_s() -> None:
-    assert others_share(7 * MS, []) == 7 * MS
-
-
 @given(
     st.integers(0, 10**9),
     st.lists(st.floats(0, 400), max_size=30),

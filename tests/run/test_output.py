@@ -13,8 +13,14 @@ from grader.recording.model import LogLine
 from grader.run.process.output import OutputReader, _Stream
 
 
-def read(*chunks: bytes, stream: str = "stdout", limit: int = 1 << 16) -> tuple[LogLine, ...]:
+def read(*chunks: bytes, limit: int = 1 << 16) -> tuple[LogLine, ...]:
     """Write chunks into a pipe that is being read; all lines."""
+    return reader_of(*chunks, limit=limit)[1]
+
+
+def reader_of(
+    *chunks: bytes, stream: str = "stdout", limit: int = 1 << 16
+) -> tuple[OutputReader, tuple[LogLine, ...]]:
     reader = OutputReader(limit)
     read_end, write_end = os.pipe()
     reader.add(read_end, "p/e", stream)
@@ -23,7 +29,14 @@ def read(*chunks: bytes, stream: str = "stdout", limit: int = 1 << 16) -> tuple[
         while rest:
             rest = rest[os.write(write_end, rest) :]
     os.close(write_end)
-    return reader.close(10.0)
+    return reader, reader.close(10.0)
+
+
+def traced(*lines: bytes) -> OutputReader:
+    """What a tracer wrote; none of it is output."""
+    reader, output = reader_of(*(line + b"\n" for line in lines), stream="tracer")
+    assert output == ()
+    return reader
 
 
 def test_lines_keep_their_order_and_lose_their_ends() -> None:
@@ -88,14 +101,8 @@ def test_whatever_is_written_is_read_within_bounds(chunks: list[bytes]) -> None:
 
 
 def test_declarations_are_read_and_nonsense_is_dropped() -> None:
-    reader = OutputReader(1 << 16)
-    read_end, write_end = os.pipe()
-    reader.add(read_end, "p/e", "tracer")
     good = json.dumps({"kind": "timer", "pid": 7, "period_s": 0.3}).encode()
-    for line in (b"nonsense", b"[1, 2]", b"{}", b"[" * 100_000, good, b'"text"'):
-        os.write(write_end, line + b"\n")
-    os.close(write_end)
-    assert reader.close(10.0) == ()
+    reader = traced(b"nonsense", b"[1, 2]", b"{}", b"[" * 100_000, good, b'"text"')
     foreign, timer = reader.declarations
     assert (foreign.kind, foreign.process) == ("foreign", "p/e")
     assert (timer.kind, timer.data) == ("timer", {"pid": 7, "period_s": 0.3})
@@ -111,26 +118,15 @@ def test_declarations_are_read_and_nonsense_is_dropped() -> None:
     ],
 )
 def test_what_no_tracer_writes_was_written_by_another(data: dict[str, object]) -> None:
-    reader = OutputReader(1 << 16)
-    read_end, write_end = os.pipe()
-    reader.add(read_end, "p/e", "tracer")
-    os.write(write_end, json.dumps({"pid": 7, **data}).encode() + b"\n")
-    os.close(write_end)
-    assert reader.close(10.0) == ()
+    reader = traced(json.dumps({"pid": 7, **data}).encode())
     assert reader.forgers == {"p/e"}
     assert [item.kind for item in reader.declarations] == ["foreign"]
 
 
-def test_a_tracer_that_reports_what_cannot_be_kept_is_no_forger() -> None:
-    reader = OutputReader(1 << 16)
-    read_end, write_end = os.pipe()
-    reader.add(read_end, "p/e", "tracer")
-    for value in (1e300, [1, 2], "\ud800"):
-        line = json.dumps({"kind": "timer", "pid": 7, "period_s": value}).encode()
-        os.write(write_end, line + b"\n")
-    os.close(write_end)
-    assert reader.close(10.0) == ()
-    assert reader.declarations == ()
+@pytest.mark.parametrize("value", [1e300, [1, 2], "\ud800"])
+def test_a_tracer_that_reports_what_cannot_be_kept_is_no_forger(value: object) -> None:
+    line = json.dumps({"kind": "timer", "pid": 7, "period_s": value}).encode()
+    assert traced(line).declarations == ()
 
 
 def test_a_pipe_that_stays_open_does_not_hold_us_up() -> None:

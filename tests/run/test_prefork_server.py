@@ -27,6 +27,14 @@ from tests.run.conftest import SUBMISSION, RunNode, assignment, install
 pytestmark = pytest.mark.ros
 
 
+@pytest.fixture
+def sandbox(tmp_path: Path) -> Sandbox:
+    found = try_sandbox()
+    if found.problem:
+        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
+    return Sandbox(tmp_path / "cache")
+
+
 def prefork_servers() -> set[int]:
     """The prefork servers among this process's children; their forks are their own children."""
     return {
@@ -37,7 +45,9 @@ def prefork_servers() -> set[int]:
     }
 
 
-def test_a_run_whose_nursery_is_killed_is_a_fault_and_the_next_one_is_not(tmp_path: Path) -> None:
+def test_a_run_whose_prefork_server_is_killed_is_a_fault_and_the_next_one_is_not(
+    tmp_path: Path,
+) -> None:
     course = assignment(until={"messages": 3})
     scenario = course.scenarios[0]
     space = install(tmp_path, nodes.timed())
@@ -58,11 +68,8 @@ def test_a_run_whose_nursery_is_killed_is_a_fault_and_the_next_one_is_not(tmp_pa
 
 
 @pytest.mark.parametrize("boxed", [False, True])
-def test_a_cell_that_hangs_keeps_nobody_waiting_for_the_end(boxed: bool, tmp_path: Path) -> None:
-    found = try_sandbox()
-    if boxed and found.problem:
-        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
-    prefork_server = PreforkServer(ros.find(), Sandbox(tmp_path / "cache") if boxed else None)
+def test_the_end_does_not_wait_for_a_cell_that_hangs(boxed: bool, sandbox: Sandbox) -> None:
+    prefork_server = PreforkServer(ros.find(), sandbox if boxed else None)
     cell = CellProcess(prefork_server)
     cell.await_fork()
     usages = usage_of([prefork_server._popen.pid])
@@ -93,11 +100,9 @@ def test_a_cell_that_hangs_does_not_outlive_long_whoever_could_kill_it() -> None
     prefork_server.close()
 
 
-def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(tmp_path: Path) -> None:
-    found = try_sandbox()
-    if found.problem:
-        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
-    sandbox = Sandbox(tmp_path / "cache")
+def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(
+    sandbox: Sandbox,
+) -> None:
     prefork_server = PreforkServer(ros.find(), sandbox)
     check = sandbox.watched()
     check()
@@ -110,11 +115,8 @@ def test_no_cell_is_made_where_files_of_the_students_python_were_deleted(tmp_pat
 
 
 def test_whoever_installs_a_package_meanwhile_spoils_no_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sandbox: Sandbox
 ) -> None:
-    found = try_sandbox()
-    if found.problem:
-        pytest.skip(f"no sandbox on this machine: {found.problem}; {found.remedy}")
     course = assignment(until={"messages": 3})
     space = install(tmp_path, nodes.timed())
     # Not below /tmp, where a sandbox has its own.
@@ -123,7 +125,7 @@ def test_whoever_installs_a_package_meanwhile_spoils_no_run(
         linker_cache.write_bytes(b"old")
         Path(etc).chmod(0o755)
         monkeypatch.setattr(bubblewrap, "_SYSTEM_FILES", (str(linker_cache),))
-        with Runner(ros.find(), sandbox=Sandbox(tmp_path / "cache")) as runner:
+        with Runner(ros.find(), sandbox=sandbox) as runner:
             for name in ("before", "after"):
                 file = tmp_path / f"{name}.mcap"
                 runner.run(course, course.scenarios[0], SUBMISSION, space, file, seed=1)

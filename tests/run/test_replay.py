@@ -19,7 +19,7 @@ from grader.run.replay import replay_scenario
 from grader.run.runner import Runner
 from grader.scratch import PREFIX
 from tests.recording.written import write_robot_run
-from tests.run.conftest import SUBMISSION, assignment, install
+from tests.run.conftest import SUBMISSION, assignment, install, running
 from tests.run.nodes import HEADER
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -113,7 +113,7 @@ def test_ctrl_c_ends_the_node_and_leaves_nothing(run: tuple[Path, Path], tmp_pat
     told, _ = player.communicate(timeout=60)
     assert player.returncode == 130, told
     assert "Traceback" not in re.sub(r"bot_pub  .*", "", told)
-    assert not _running(str(tmp_path)) and not _running(str(place))
+    assert not running(str(tmp_path)) and not running(str(place))
     assert not list(tmp_path.glob(f"{PREFIX}replay-*"))
 
 
@@ -138,15 +138,3 @@ def test_a_scenario_that_is_no_longer_there_is_named(tmp_path: Path) -> None:
     recording = write_robot_run(tmp_path / "run.mcap", scenario="walk")
     with pytest.raises(UsageError, match="the assignment 'test' has no scenario 'walk'"):
         replay_scenario(tmp_path / "run.mcap", recording, assignment())
-
-
-def _running(fragment: str) -> list[bytes]:
-    found = []
-    for file in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            line = file.read_bytes()
-        except OSError:
-            continue
-        if fragment.encode() in line:
-            found.append(line)
-    return found

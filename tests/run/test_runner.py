@@ -22,7 +22,7 @@ class FakeServer:
         self.is_closed = True
 
 
-def test_cells_that_run_keep_their_folders_where_a_nursery_is_replaced(
+def test_cells_that_run_keep_their_folders_where_a_prefork_server_is_replaced(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(runner_module, "PreforkServer", FakeServer)
@@ -36,7 +36,7 @@ def test_cells_that_run_keep_their_folders_where_a_nursery_is_replaced(
     second = runner._new_cell(())
     assert isinstance(second, FakeServer)
     assert second is not first
-    # Closing waits for its cells, with the lock held that whoever interrupts needs.
+    # Closing waits for its cells, with a lock held that an interruption needs.
     assert not first.is_closed
     runner.close()
     assert first.is_closed

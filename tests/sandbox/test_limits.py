@@ -42,10 +42,6 @@ def test_an_author_s_limits_reach_the_command_in_front_of_the_program() -> None:
     ]
 
 
-def test_the_address_space_grows_with_the_memory() -> None:
-    assert LimitOptions.model_validate({"memory": "8 GiB"}).limits().address_bytes == 32 * 2**30
-
-
 def test_an_author_s_limits_of_the_build_reach_it() -> None:
     limits = BuildLimitOptions.model_validate({"memory": "1 GiB", "disk": "64 MiB", "files": 500})
     assert limits.limits() == dataclasses.replace(

@@ -21,11 +21,6 @@ from grader.sandbox.seccomp import student_filter
 from grader.sandbox.trial import Trial, choose
 
 
-def test_what_is_bound_is_read_only_unless_it_is_to_be_written() -> None:
-    binds = [Bind.same(Path("/a")), Bind(Path("/b"), Path("/c"), writable=True)]
-    assert bubblewrap.bound(binds) == ["--ro-bind", "/a", "/a", "--bind", "/b", "/c"]
-
-
 def test_root_goes_on_as_nobody_before_bubblewrap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: 0)
     command = bubblewrap.launch(["--x"], [Bind.same(Path("/root/a"))], [], ["true"])
@@ -34,27 +29,12 @@ def test_root_goes_on_as_nobody_before_bubblewrap(monkeypatch: pytest.MonkeyPatc
     assert command[-5:] == ["--ro-bind", "/run/rosgrade/0", "/root/a", "--", "true"]
 
 
-def test_a_user_starts_bubblewrap_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    command = bubblewrap.launch(["--x"], [Bind.same(Path("/home/a"))], [], ["true"])
-    assert command[1:] == ["--x", "--ro-bind", "/home/a", "/home/a", "--", "true"]
-
-
 def test_code_of_ours_is_covered_where_it_would_be_shown() -> None:
     import grader
 
     code = Path(grader.__file__).resolve().parent
     assert str(code) in hide([Bind.same(code.parent)])
     assert str(code) not in hide([Bind(Path("/elsewhere"), code.parent)])
-
-
-def test_libraries_beside_an_environment_are_covered() -> None:
-    base = Path(sys.base_prefix).resolve()
-    name = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    beside = base / "lib" / name / "site-packages"
-    if sys.prefix == sys.base_prefix or base == Path("/usr") or not beside.is_dir():
-        pytest.skip("this Python has no environment of its own, or is the system's")
-    assert str(beside) in hide([Bind.same(base)])
 
 
 def test_auto_says_in_one_line_that_there_is_no_sandbox(
@@ -180,14 +160,6 @@ def test_a_tree_that_another_process_uses_stays(tmp_path: Path) -> None:
         user.communicate("\n")
     prune(tmp_path, kept=0)
     assert not (tmp_path / "used").exists()
-
-
-def test_what_a_sandbox_uses_is_not_thrown_away(tmp_path: Path) -> None:
-    sandbox = Sandbox(tmp_path)
-    tree = sandbox.python_tree
-    os.utime(tree, (1, 1))
-    prune(tree.parent, kept=0)
-    assert (tree / "pyvenv.cfg").exists()
 
 
 def test_a_build_room_writes_only_where_it_may(tmp_path: Path) -> None:

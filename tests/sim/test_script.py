@@ -7,7 +7,7 @@ import math
 import pytest
 
 from sim.motion import NS, Pose
-from sim.script import MovingObstacle, Waypoint
+from sim.shapes import MovingObstacle, Waypoint
 
 
 def obstacle(**changes: object) -> MovingObstacle:

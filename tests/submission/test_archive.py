@@ -51,17 +51,6 @@ def refusal(tmp_path: Path, content: bytes, limits: ArchiveLimits | None = None)
     return str(caught.value)
 
 
-@pytest.mark.parametrize("mode", ["w", "w:gz", "w:bz2", "w:xz"])
-def test_every_kind_of_tar_is_unpacked(tmp_path: Path, mode: str) -> None:
-    content = tar_bytes(tar_member("a/b.py", b"x = 1\n"), tar_member("empty", b""), mode=mode)
-    assert unpacked(tmp_path, content, "bot.tar") == {"a/b.py": b"x = 1\n", "empty": b""}
-
-
-def test_a_zip_is_unpacked(tmp_path: Path) -> None:
-    content = zip_bytes(("a/", b""), ("a/b.py", b"x = 1\n"))
-    assert unpacked(tmp_path, content) == {"a/b.py": b"x = 1\n"}
-
-
 def test_the_content_decides_not_the_suffix(tmp_path: Path) -> None:
     content = tar_bytes(tar_member("b.py", b"x = 1\n"))
     assert unpacked(tmp_path, content, "bot (1).zip") == {"b.py": b"x = 1\n"}
@@ -90,11 +79,6 @@ def test_a_name_in_utf_8_that_is_not_marked_as_such_is_read(tmp_path: Path) -> N
         archive.writestr("gr__e.py", b"")
     content = buffer.getvalue().replace(b"gr__e.py", "größe.py".encode()[:4] + b"e.py")
     assert list(unpacked(tmp_path, content)) == ["gröe.py"]
-
-
-def test_leftovers_of_macos_are_not_unpacked(tmp_path: Path) -> None:
-    content = zip_bytes(("bot/a.py", b""), ("__MACOSX/bot/._a.py", b"x"), (".DS_Store", b"x"))
-    assert list(unpacked(tmp_path, content)) == ["bot/a.py"]
 
 
 def test_links_that_stay_inside_are_made(tmp_path: Path) -> None:
@@ -149,18 +133,11 @@ def test_a_file_below_a_link_is_refused(tmp_path: Path) -> None:
     assert "not a folder" in refusal(tmp_path, content)
 
 
-@pytest.mark.parametrize("wrap", [lambda c: c, bz2.compress, lzma.compress])
-def test_a_bomb_is_refused_before_it_is_written(tmp_path: Path, wrap: object) -> None:
+@pytest.mark.parametrize("mode", ["zip", "w:gz", "w:bz2", "w:xz"])
+def test_a_bomb_is_refused_before_it_is_written(tmp_path: Path, mode: str) -> None:
     zeros = b"\0" * (40 * MIB)
-    content = tar_bytes(tar_member("zeros", zeros), mode="w:gz")
-    if wrap in (bz2.compress, lzma.compress):
-        content = wrap(tar_bytes(tar_member("zeros", zeros), mode="w"))  # type: ignore[operator]
-    assert "times its size" in refusal(tmp_path, content)
-    assert not listdir(tmp_path / "into")
-
-
-def test_a_zip_bomb_is_refused_before_it_is_written(tmp_path: Path) -> None:
-    assert "times its size" in refusal(tmp_path, zip_bytes(("zeros", b"\0" * (40 * MIB))))
+    tar = mode != "zip" and tar_bytes(tar_member("zeros", zeros), mode=mode)
+    assert "times its size" in refusal(tmp_path, tar or zip_bytes(("zeros", zeros)))
     assert not listdir(tmp_path / "into")
 
 
@@ -171,13 +148,15 @@ def test_a_zip_that_lies_about_a_size_is_refused(tmp_path: Path) -> None:
     assert "broken" in refusal(tmp_path, bytes(content))
 
 
-def test_many_small_files_are_refused(tmp_path: Path) -> None:
-    content = tar_bytes(*(tar_member(str(number)) for number in range(30)))
-    assert "20 members" in refusal(tmp_path, content, ArchiveLimits(members=20))
-
-
-def test_a_zip_with_too_long_a_directory_is_refused_before_it_is_read(tmp_path: Path) -> None:
-    content = zip_bytes(*((str(number), b"") for number in range(30)))
+@pytest.mark.parametrize(
+    "content",
+    [
+        tar_bytes(*(tar_member(str(number)) for number in range(30))),
+        zip_bytes(*((str(number), b"") for number in range(30))),
+    ],
+    ids=["tar", "zip"],
+)
+def test_many_small_files_are_refused(tmp_path: Path, content: bytes) -> None:
     assert "2 members" in refusal(tmp_path, content, ArchiveLimits(members=2))
 
 
@@ -200,13 +179,10 @@ def test_a_rare_compression_is_refused(tmp_path: Path) -> None:
     assert "rare method" in refusal(tmp_path, buffer.getvalue())
 
 
-def test_a_header_that_is_longer_than_any_name_is_refused(tmp_path: Path) -> None:
-    content = tar_bytes(tar_member("x", pax_headers={"comment": "c" * 100_000}), mode="w")
-    assert "header" in refusal(tmp_path, content)
-
-
-def test_a_header_that_old_pythons_read_in_quadratic_time_is_refused(tmp_path: Path) -> None:
-    content = tar_bytes(tar_member("x", pax_headers={"comment": "1" * 60_000}), mode="w")
+# The second one is read by old Pythons in quadratic time.
+@pytest.mark.parametrize("comment", ["c" * 100_000, "1" * 60_000], ids=["long", "digits"])
+def test_a_header_that_is_no_name_is_refused(tmp_path: Path, comment: str) -> None:
+    content = tar_bytes(tar_member("x", pax_headers={"comment": comment}), mode="w")
     assert "header" in refusal(tmp_path, content)
 
 

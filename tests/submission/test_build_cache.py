@@ -12,8 +12,6 @@ from grader.submission.build.build_cache import (
     INSTALL,
     BuildCache,
     CachedBuild,
-    CacheLimits,
-    tree_hash,
 )
 from grader.submission.record import BuildRecord
 
@@ -48,10 +46,6 @@ def test_what_was_stored_is_found_and_said_to_be_cached(cache: BuildCache) -> No
     assert found.install == first.install
     assert found.install is not None
     assert (found.install / "lib/node.py").read_text() == "x = 1\n"
-
-
-def test_what_was_not_stored_is_not_found(cache: BuildCache) -> None:
-    assert cache.find("k") is None
 
 
 def test_a_failed_build_is_kept_too(cache: BuildCache) -> None:
@@ -146,8 +140,10 @@ def test_builds_that_were_not_used_for_long_go(cache: BuildCache, tmp_path: Path
     assert names(tmp_path) == {"used", "soon after another", "new"}
 
 
-def test_the_least_recently_used_go_when_there_is_too_much(tmp_path: Path) -> None:
-    cache = BuildCache(tmp_path, CacheLimits(total_bytes=25))
+def test_the_least_recently_used_go_when_there_is_too_much(
+    cache: BuildCache, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("grader.submission.build.build_cache._MOST_BYTES", 25)
     for key, days in (("first", 3), ("second", 2), ("third", 1)):
         stored(cache, key, content="x" * 10)
         age(tmp_path, key, days * DAY_S)
@@ -155,13 +151,6 @@ def test_the_least_recently_used_go_when_there_is_too_much(tmp_path: Path) -> No
     age(tmp_path, "first", 0.5 * DAY_S)
     cache.prune()
     assert names(tmp_path) == {"first", "third"}
-
-
-def test_a_build_that_may_be_running_never_goes(tmp_path: Path) -> None:
-    cache = BuildCache(tmp_path, CacheLimits(total_bytes=0))
-    for key in ("a", "b"):
-        stored(cache, key)
-    assert names(tmp_path) == {"a", "b"}
 
 
 def test_what_a_killed_build_left_goes_after_a_day(cache: BuildCache, tmp_path: Path) -> None:
@@ -191,13 +180,3 @@ def test_a_cache_from_which_nothing_can_be_started_is_named(
     monkeypatch.setattr(os, "statvfs", lambda _: NoExec)
     with pytest.raises(GraderFault, match="noexec"), cache.locked("k", 1.0):
         pass
-
-
-def test_a_tree_is_hashed_without_following_links(tmp_path: Path) -> None:
-    (tmp_path / "a").mkdir()
-    (tmp_path / "a/up").symlink_to("..")
-    (tmp_path / "etc").symlink_to("/etc")
-    before = tree_hash(tmp_path)
-    (tmp_path / "etc").unlink()
-    (tmp_path / "etc").symlink_to("/usr")
-    assert tree_hash(tmp_path) != before

@@ -44,14 +44,10 @@ def test_modules_named_at_run_time_are_not_guessed() -> None:
     assert imports(source) == []
 
 
-@pytest.mark.parametrize("caught", ["ImportError", "(OSError, ModuleNotFoundError)", "Exception"])
+@pytest.mark.parametrize("caught", ["ImportError", "(OSError, ModuleNotFoundError)", ""])
 def test_an_import_that_may_fail_is_optional_and_so_is_what_replaces_it(caught: str) -> None:
     source = f"try:\n    import cv2\nexcept {caught}:\n    import PIL\nelse:\n    import numpy\n"
     assert imports(source) == [("cv2", 2, True), ("PIL", 4, True), ("numpy", 6, False)]
-
-
-def test_a_bare_except_makes_an_import_optional() -> None:
-    assert imports("try:\n    import cv2\nexcept:\n    pass\n") == [("cv2", 2, True)]
 
 
 def test_a_try_for_something_else_does_not() -> None:

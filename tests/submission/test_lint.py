@@ -34,21 +34,11 @@ def test_neither_configuration_nor_noqa_has_a_say(tmp_path: Path) -> None:
     assert "F401" in codes(tmp_path, "node.py")
 
 
-def test_a_script_without_suffix_is_looked_at(tmp_path: Path) -> None:
-    (tmp_path / "-node").write_text("#!/usr/bin/env python3\nimport os\n")
-    assert "F401" in codes(tmp_path, "-node")
-
-
 def test_many_places_of_one_rule_do_not_hide_another(tmp_path: Path) -> None:
     (tmp_path / "node.py").write_text("import os\n" * 5000 + "print(nothing)\n")
     found = lint(tmp_path, ["node.py"])
     assert len(found.findings) < 500
     assert "F821" in {item.code for item in found.findings}
-
-
-def test_a_syntax_error_is_told_elsewhere(tmp_path: Path) -> None:
-    (tmp_path / "node.py").write_text("def f(:\n")
-    assert "invalid-syntax" not in codes(tmp_path, "node.py")
 
 
 def test_without_ruff_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,18 +65,6 @@ def test_what_colcon_made_inside_a_package_is_known_by_its_marks(tree: Tree) -> 
     assert listed(root) == ["package.xml"]
 
 
-def test_a_module_of_a_package_may_be_called_log(tree: Tree) -> None:
-    files = {"package.xml": "", "bot/log/__init__.py": ""}
-    assert listed(tree.write({f"bot/{name}": text for name, text in files.items()})) == [
-        "bot/bot/log/__init__.py",
-        "bot/package.xml",
-    ]
-
-
-def test_a_package_may_be_called_log(tree: Tree) -> None:
-    assert listed(tree.write({"log/package.xml": ""})) == ["log/package.xml"]
-
-
 def test_odd_names_do_not_matter(tree: Tree) -> None:
     names = ["new\nline.py", "🤖.py", "שלום.py", os.fsdecode(b"caf\xe9.py"), " ", "-rf", "\\"]
     assert sorted(listed(tree.write(dict.fromkeys(names, "")))) == sorted(names)
@@ -137,19 +125,23 @@ def test_too_deep_a_submission_is_refused(tree: Tree) -> None:
         list_files(root)
 
 
-@pytest.mark.parametrize("marker", ["COLCON_IGNORE", "AMENT_IGNORE", "CATKIN_IGNORE"])
-def test_packages_below_an_ignore_marker_are_none(marker: str) -> None:
-    assert find_packages(["a/package.xml", f"b/{marker}", "b/c/package.xml"]) == ["a"]
+def test_a_package_or_a_module_of_one_may_be_called_log(tree: Tree) -> None:
+    names = ["bot/bot/log/__init__.py", "bot/package.xml", "log/package.xml"]
+    assert listed(tree.write(dict.fromkeys(names, ""))) == names
 
 
-def test_packages_are_found_at_any_depth_but_not_in_one_another() -> None:
-    paths = ["z/y/src/bot/package.xml", "z/y/src/bot/inner/package.xml", "a/package.xml"]
-    assert find_packages(paths) == ["a", "z/y/src/bot"]
-
-
-def test_the_submission_itself_may_be_the_package() -> None:
-    assert find_packages(["package.xml", "-x/package.xml", "a/package.xml"]) == ["."]
-
-
-def test_hidden_folders_hold_no_packages() -> None:
-    assert find_packages([".hidden/a/package.xml", "b/package.xml"]) == ["b"]
+@pytest.mark.parametrize(
+    ("paths", "packages"),
+    [
+        (["a/package.xml", "b/COLCON_IGNORE", "b/c/package.xml"], ["a"]),
+        (["a/package.xml", "AMENT_IGNORE"], []),
+        (
+            ["z/y/src/bot/package.xml", "z/y/src/bot/in/package.xml", "a/package.xml"],
+            ["a", "z/y/src/bot"],
+        ),
+        (["package.xml", "-x/package.xml", "a/package.xml"], ["."]),
+        ([".hidden/a/package.xml", "b/package.xml"], ["b"]),
+    ],
+)
+def test_packages_are_found_as_colcon_finds_them(paths: list[str], packages: list[str]) -> None:
+    assert find_packages(paths) == packages

@@ -74,11 +74,6 @@ def test_a_dependency_for_ros_1_only_is_none() -> None:
     assert [item.name for item in manifest.dependencies] == ["geometry_msgs"]
 
 
-def test_without_a_build_type_colcon_takes_it_for_catkin() -> None:
-    manifest = changed("<build_type>ament_python</build_type>", "")
-    assert (manifest.build_type, manifest.error) == ("catkin", None)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "line", "message"),
     [
@@ -110,12 +105,6 @@ def test_a_tag_that_is_not_closed_is_blamed_where_it_begins() -> None:
     assert (manifest.name, manifest.build_type) == ("bot_publisher", None)
 
 
-def test_a_last_tag_that_is_missing_is_named() -> None:
-    assert str(changed("</package>", "").error) == (
-        "src/bot/package.xml:2: invalid XML: <package> is not closed"
-    )
-
-
 @pytest.mark.parametrize(
     ("data", "message"),
     [
@@ -134,15 +123,6 @@ def test_broken_and_hostile_xml_is_an_error(data: bytes, message: str) -> None:
     error = read(data).error
     assert error is not None
     assert message in error.message
-
-
-def test_a_billion_laughs_are_not_even_begun() -> None:
-    entities = '<!ENTITY l0 "ha">' + "".join(
-        f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10)
-    )
-    error = read(f"<!DOCTYPE p [{entities}]><package><name>&l9;</name></package>").error
-    assert error is not None
-    assert "DOCTYPE" in error.message
 
 
 def test_too_many_dependencies_are_an_error() -> None:

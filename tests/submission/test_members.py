@@ -41,10 +41,6 @@ def refusal(members: list[Member], archive_bytes: int = 1000) -> str:
     return str(caught.value)
 
 
-def test_names_are_made_plain() -> None:
-    assert [one.name for one in admitted(files("./a//b", "c"))] == ["a/b", "c"]
-
-
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
@@ -79,14 +75,10 @@ def test_the_ratio_is_bounded_from_a_size_on() -> None:
     assert "10 times its size" in refusal(files("a", size=300), archive_bytes=20)
 
 
-def test_the_number_of_members_is_bounded() -> None:
-    admitted(files(*"abcdefghij"))
-    assert "more than 10 members" in refusal(files(*"abcdefghijk"))
-
-
 def test_what_tools_left_is_not_unpacked_and_may_be_ten_times_as_much() -> None:
+    assert "more than 10 members" in refusal(files(*"abcdefghijk"))
     left = files(*(f".git/objects/{number}" for number in range(90)))
-    assert [one.name for one in admitted([*left, *files("a")])] == ["a"]
+    assert [one.name for one in admitted([*left, *files("./a//b")])] == ["a/b"]
     assert "members" in refusal([*left, *files(*(f"__MACOSX/{n}" for n in range(20)))])
 
 
@@ -100,10 +92,6 @@ def test_a_path_that_is_there_twice_is_refused(names: tuple[str, str]) -> None:
     assert "twice" in refusal(files(*names))
 
 
-def test_a_folder_may_be_listed_twice() -> None:
-    assert len(admitted([Member(0, "a/", Kind.FOLDER), Member(1, "a/", Kind.FOLDER)])) == 2
-
-
 def test_a_file_cannot_be_a_folder_as_well() -> None:
     assert "a is not a folder" in refusal(files("a", "a/b"))
     assert "twice" in refusal(files("a/b", "a"))
@@ -112,10 +100,6 @@ def test_a_file_cannot_be_a_folder_as_well() -> None:
 def test_nothing_is_written_through_a_link() -> None:
     link = Member(0, "a", Kind.LINK, target=".")
     assert "a is not a folder" in refusal([link, *files("a/b")])
-
-
-def test_devices_and_pipes_are_refused() -> None:
-    assert "special file" in refusal([Member(0, "pipe", Kind.SPECIAL)])
 
 
 def test_a_negative_size_is_refused() -> None:

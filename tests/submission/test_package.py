@@ -7,7 +7,7 @@ from grader.submission.build.installed import InstallSpace
 from grader.submission.intake.locate import opened
 from grader.submission.read.package import read_package, record_packages
 from grader.submission.record import Import, PackageRecord
-from tests.submission.samples import MANIFEST, NODE, SETUP_PY, Tree
+from tests.submission.samples import MANIFEST, NODE, Tree
 
 FOLDER = "src/bot_publisher"
 
@@ -89,18 +89,6 @@ def test_of_packages_that_provide_a_module_the_declared_one_counts(
     assert records(tree, named_ros)["bot_publisher"].ros_imports[0].module == declared
 
 
-def test_misspelt_dependencies_are_told_from_unknown_ones(
-    tree: Tree, named_ros: RosInstallation
-) -> None:
-    names = ("geometry_msg", "acme_driver", "python3-numpy", "bot_publisher_msgs")
-    depends = "".join(f"<exec_depend>{name}</exec_depend>" for name in names)
-    tree.package({"package.xml": MANIFEST.replace("<export>", f"{depends}<export>")})
-    tree.write({"m/package.xml": MANIFEST.replace("bot_publisher", "bot_publisher_msgs")})
-    record = records(tree, named_ros)["bot_publisher"]
-    known = {item.name: item.known for item in record.dependencies}
-    assert [known[name] for name in names] == [False, None, True, True]
-
-
 def test_a_broken_manifest_does_not_hide_the_rest(tree: Tree, named_ros: RosInstallation) -> None:
     tree.package({"package.xml": "<package><name>bot"})
     tree.package({"package.xml": MANIFEST.replace("bot_publisher", "good")}, folder="src/good")
@@ -119,24 +107,6 @@ def test_a_package_that_is_named_nowhere_has_its_folders_name(
 ) -> None:
     tree.write({"my_bot/package.xml": "", "my_bot/CMakeLists.txt": ""})
     assert records(tree, named_ros)["my_bot"].build_type == "ament_cmake"
-
-
-def test_syntax_errors_are_told_for_every_file(tree: Tree, named_ros: RosInstallation) -> None:
-    tree.package({"bot_publisher/node.py": "def main(:\n", "setup.py": "setup(\n"})
-    errors = records(tree, named_ros)["bot_publisher"].syntax_errors
-    assert [error.file for error in errors] == [
-        f"{FOLDER}/bot_publisher/node.py",
-        f"{FOLDER}/setup.py",
-    ]
-
-
-def test_a_target_that_is_not_there_is_told(tree: Tree, named_ros: RosInstallation) -> None:
-    tree.package({"setup.py": SETUP_PY.replace("node:main", "node:mian")})
-    ((name, error),) = records(tree, named_ros)["bot_publisher"].missing_targets
-    assert name == "bot_pub"
-    assert str(error) == (
-        f"{FOLDER}/setup.py:21: bot_publisher/node.py has no function 'mian'. Did you mean 'main'?"
-    )
 
 
 def test_modules_below_src_are_found(tree: Tree, named_ros: RosInstallation) -> None:

@@ -9,14 +9,12 @@ import pytest
 
 from grader.errors import UsageError
 from grader.ros import RosInstallation
-from grader.submission.intake.members import ArchiveLimits
-from grader.submission.prepare import Prepared, PrepareLimits, fingerprint, prepare
+from grader.submission.prepare import Prepared, fingerprint, prepare
 from tests.submission.samples import NODE, Tree, tar_bytes, tar_member, zip_bytes
 
 
 def prepared(path: Path, ros: RosInstallation) -> Prepared:
-    limits = PrepareLimits(archive=ArchiveLimits(members=50))
-    return prepare(path, ros, cache=path.parent / "cache", limits=limits)
+    return prepare(path, ros, cache=path.parent / "cache")
 
 
 def problem(path: Path, ros: RosInstallation) -> str:
@@ -70,11 +68,6 @@ def test_a_refused_archive_is_a_problem_of_the_submission(
     assert found.problem == "eve.tar.gz: ../../evil: paths with '..' are refused"
 
 
-def test_too_large_a_submission_is_a_problem(tree: Tree, named_ros: RosInstallation) -> None:
-    root = tree.write({f"{number}": "" for number in range(60)})
-    assert problem(root, named_ros) == "the submission holds more than 50 files"
-
-
 def test_the_packages_of_a_submission_with_a_problem_are_recorded_all_the_same(
     tree: Tree, named_ros: RosInstallation
 ) -> None:
@@ -90,22 +83,13 @@ def test_a_path_that_does_not_exist_is_a_wrong_use(
         prepared(tmp_path / "nobody", named_ros)
 
 
-def test_two_folders_that_are_refused_are_not_taken_for_the_same(tmp_path: Path) -> None:
-    limits = ArchiveLimits(members=1)
+def test_two_folders_that_are_refused_are_not_taken_for_the_same(
+    tmp_path: Path, named_ros: RosInstallation
+) -> None:
     prints = set()
-    for number in (1, 2):
+    for number in range(3):
         folder = tmp_path / str(number) / "ws"
-        folder.mkdir(parents=True)
-        (folder / "a.py").write_text("x" * number)
-        (folder / "b.py").touch()
-        prints |= {fingerprint(folder, limits), fingerprint(folder, limits)}
-    assert len(prints) == 2
-
-
-def test_a_folder_that_is_refused_is_never_the_same_as_an_empty_one(tmp_path: Path) -> None:
-    (tmp_path / "empty").mkdir()
-    folders = [tmp_path / name for name in ("deep", "other")]
-    for folder in folders:
-        (folder / folder.name / "d" / "d").mkdir(parents=True)
-    limits = ArchiveLimits(depth=1)
-    assert len({fingerprint(path, limits) for path in (*folders, tmp_path / "empty")}) == 3
+        (folder / "/".join("x" * (50 + number))).mkdir(parents=True)
+        assert "too many folders in one another" in problem(folder, named_ros)
+        prints |= {fingerprint(folder), fingerprint(folder)}
+    assert len(prints) == 3

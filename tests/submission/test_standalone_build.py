@@ -41,13 +41,6 @@ def test_an_interface_package_beside_a_node_is_built_apart(
     assert standalone_build(tree, named_ros) == ("bot_msgs",)
 
 
-def test_where_nothing_else_is_there_it_is_just_built(
-    tree: Tree, named_ros: RosInstallation
-) -> None:
-    tree.write(dict(INTERFACES))
-    assert standalone_build(tree, named_ros) == ()
-
-
 COURSE = """
 set(files "msg/Bot.msg")
 if(BUILD_TESTING)
@@ -285,21 +278,3 @@ def content(install: Path) -> dict[str, str]:
         # stays there is not always the same.
         if path.is_file() and path.suffix not in (".pyc", ".so", ".c")
     }
-
-
-@pytest.mark.compiles
-@pytest.mark.ros
-@pytest.mark.slow
-def test_a_message_that_does_not_build_is_told_as_if_all_were_built_together(
-    tree: Tree, real_ros: RosInstallation
-) -> None:
-    workspace(tree)
-    tree.write({f"{MSGS}/msg/Bot.msg": "uint8 model\nunit8 x\n"})
-    found = built(tree, real_ros)
-    build = found.record.build
-    assert build is not None
-    assert build.failed_packages == ("bot_msgs", "bot_publisher")
-    assert build.culprit is not None
-    assert (build.culprit.file, build.culprit.line) == (f"{MSGS}/msg/Bot.msg", 2)
-    assert build.log.count("Failed   <<< bot_msgs") == 1
-    assert found.install is None

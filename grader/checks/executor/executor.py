@@ -221,14 +221,6 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
     meanwhile = f" while {counted(number, 'message was', 'messages were')} published"
     seen += meanwhile if number else ""
     evidence = _evidence(recording, [group])
-    servers = max(call.servers for call in group.late)
-    if servers > 1:
-        return Cause(
-            f"{seen}: {servers} nodes offer these services under its name, and not every one of "
-            "them answers",
-            "The name of a node must be its own: give every node another one, and spin each.",
-            evidence,
-        )
     processes = () if process is None else (process,)
     never_spun = why_never_spun(recording, seen, (group.node,), processes)
     if never_spun is not None:
@@ -236,14 +228,6 @@ def _why_late(recording: Recording, group: _Answers, parameters: Responsive) -> 
     place = interrupted_place(recording, process.name) if process is not None else None
     where = f" ({place.file}:{place.line})" if place else ""
     evidence = replace(evidence, places=(place,) if place else ())
-    if declarations.timer_of_zero(recording):
-        return Cause(
-            f"{seen}: the process declared a timer of 0 s, whose callbacks take all of the "
-            f"executor's time{where}",
-            "create_timer takes its period in seconds, and less than a second becomes 0 in whole "
-            "numbers, as in 300 // 1000 or int(0.3).",
-            evidence,
-        )
     return Cause(
         f"{seen}: something blocks the executor{where}",
         "A callback must return soon. Look for `while True`, time.sleep() or input() in a "

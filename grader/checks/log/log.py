@@ -14,7 +14,6 @@ from grader.checks.first_seen import endpoints_seen
 from grader.checks.value import FieldPath, NoSuchField, value_at
 from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.process.blocked_executor import why_slow
 from grader.measure.echo import Echo, Wanted, echoes, wanted_values
@@ -178,14 +177,10 @@ def _too_seldom(
         return Cause.to_repeat(f"{observed}, but the machine took the time from the process")
     observed += f", although messages came on {code(parameters.topic)}"
     nodes = {item.node for item in recording.student_endpoints(Kind.SUBSCRIPTION, parameters.topic)}
-    return (
-        why_unsubscribed(recording, parameters.topic, observed)
-        or why_slow(recording, observed, nodes)
-        or Cause(
-            observed,
-            "Log in every call of the callback, or at least once in a second.",
-            Evidence(moments=(Moment("no line from here on", begin_s),)),
-        )
+    hint = "Log in every call of the callback, or at least once in a second."
+    moment = Moment("no line from here on", begin_s)
+    return why_slow(recording, observed, nodes) or Cause(
+        observed, hint, Evidence(moments=(moment,))
     )
 
 

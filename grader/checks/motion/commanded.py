@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.finding import Evidence, Finding, Plot
 from grader.checks.first_seen import first_seen
 from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import code, counted, percent
@@ -23,6 +23,7 @@ from grader.diagnosis.no_messages import why_silent
 from grader.measure.motion.approach import NO_SPEED_M_S
 from grader.measure.motion.command import VelocityCommand, command_topic, commands
 from grader.measure.motion.quantities import speed, turn
+from grader.measure.motion.track import evidence_at
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene
 from grader.spec.quantity import Ratio
@@ -70,45 +71,38 @@ def within_limits(recording: Recording, parameters: WithinLimits) -> Finding:
     cause = why_rejected(recording)
     if cause is not None:
         return cause.finding(expected)
-    beyond = [item for item in sent if _excess(item, scene) > _ROUNDING]
+    beyond = [item for item in sent if _excess(item, scene)[0] > _ROUNDING]
     plots = (
         _plot(recording, sent, "linear.x (m/s)", scene.max_linear_m_s),
         _plot(recording, sent, "angular.z (rad/s)", scene.max_angular_rad_s),
     )
     if len(beyond) <= parameters.share * len(sent):
-        widest = max(sent, key=lambda item: _excess(item, scene))
+        widest = max(sent, key=lambda item: _excess(item, scene)[0])
         return Finding.passed(
             expected,
-            f"{counted(len(sent), 'command')}, at most {_words(widest, scene)}",
+            f"{counted(len(sent), 'command')}, at most {_excess(widest, scene)[1]}",
             Evidence(plots=plots),
         )
-    first, worst = beyond[0], max(beyond, key=lambda item: _excess(item, scene))
-    when_s = recording.since_launch_s(first.time_ns)
+    first, worst = beyond[0], max(beyond, key=lambda item: _excess(item, scene)[0])
     share = percent(round(len(beyond) / len(sent), 3))
-    most = "" if worst is first else f", the largest {_words(worst, scene)}"
+    most = "" if worst is first else f", the largest {_excess(worst, scene)[1]}"
     return Finding.failed(
         expected,
         f"{len(beyond)} of {counted(len(sent), 'command')} ({share}): the first is "
-        f"{_words(first, scene)}{most}",
+        f"{_excess(first, scene)[1]}{most}",
         "Clamp before you publish: max(-limit, min(limit, value)).",
-        Evidence(moments=(Moment("first command beyond", when_s),), plots=plots),
+        evidence_at(recording, "first command beyond", first.time_ns, *plots),
     )
 
 
-def _excess(item: VelocityCommand, scene: Scene) -> float:
-    """How many times the nearer limit is asked for."""
+def _excess(item: VelocityCommand, scene: Scene) -> tuple[float, str]:
+    """How many times the nearer limit is asked for, and the field that asks."""
+    linear, angular = item.twist.linear_m_s, item.twist.angular_rad_s
     return max(
-        abs(item.twist.linear_m_s) / scene.max_linear_m_s,
-        abs(item.twist.angular_rad_s) / scene.max_angular_rad_s,
+        (abs(linear) / scene.max_linear_m_s, f"linear.x = {speed(linear)}"),
+        (abs(angular) / scene.max_angular_rad_s, f"angular.z = {turn(angular)}"),
+        key=lambda excess: excess[0],
     )
-
-
-def _words(item: VelocityCommand, scene: Scene) -> str:
-    twist = item.twist
-    linear = abs(twist.linear_m_s) / scene.max_linear_m_s
-    if linear >= abs(twist.angular_rad_s) / scene.max_angular_rad_s:
-        return f"linear.x = {speed(twist.linear_m_s)}"
-    return f"angular.z = {turn(twist.angular_rad_s)}"
 
 
 class SlowsDown(RobotParameters):
@@ -140,20 +134,17 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
     driving = [item for item in commands(recording) if _size(item) > NO_SPEED_M_S]
     if not driving:
         topic = command_topic(recording)
-        if not recording.on(topic):
-            return why_silent(recording, topic).finding(expected)
-        return Finding.failed(
-            expected,
+        sent = recording.on(topic)
+        cause = Cause(
             f"no command on {code(topic)} has a linear.x other than 0",
             "linear.x = gain * distance, on the way to the goal's position.",
-            Evidence(moments=first_seen(recording, recording.on(topic))),
+            Evidence(moments=first_seen(recording, sent)),
         )
+        return (cause if sent else why_silent(recording, topic)).finding(expected)
     fastest = max(map(_size, driving))
     last = min(driving[-_LAST:], key=_size)
-    evidence = Evidence(
-        moments=(Moment("end of the way", recording.since_launch_s(last.time_ns)),),
-        plots=(_plot(recording, driving, "linear.x (m/s)"),),
-    )
+    plot = _plot(recording, driving, "linear.x (m/s)")
+    evidence = evidence_at(recording, "end of the way", last.time_ns, plot)
     seen = f"{speed(_size(last))} at the end, {speed(fastest)} at most"
     levels = Counter(round(_size(item), _DIGITS) for item in driving)
     if len(levels) == _SWITCHED and min(levels.values()) >= _SEVERAL and _stays(driving, levels):
@@ -166,15 +157,9 @@ def slows_down(recording: Recording, parameters: SlowsDown) -> Finding:
         )
     if _size(last) <= parameters.share * fastest:
         return Finding.passed(expected, seen, evidence)
-    same = all(abs(_size(item) - fastest) <= NO_SPEED_M_S for item in driving)
-    observed = (
-        f"all of {counted(len(driving), 'command')} that drive have linear.x = {speed(fastest)}"
-        if same
-        else seen
-    )
     return Finding.failed(
         expected,
-        observed,
+        seen,
         "linear.x = gain * distance: far from the goal the robot is fast, near it slow.",
         evidence,
     )

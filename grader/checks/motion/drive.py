@@ -9,7 +9,7 @@ from statistics import median
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import counted, percent
@@ -24,6 +24,7 @@ from grader.measure.motion.track import (
     MOVED_M,
     REST_M_S,
     departure,
+    evidence_at,
     final_rest,
     gone_ahead_m,
     over_time,
@@ -38,6 +39,7 @@ from sim.motion import wrap_angle
 
 _LEAST_SHARE = 0.9
 _LEAST_STEPS = 30
+_SAME_SPEED = 0.05
 # Besides what the robot needs to speed up, a node may bring its commands up in steps.
 _IN_STEPS_S = 0.5
 _WAY_TOLERANCE_M = 2e-3
@@ -78,7 +80,7 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
         return (cause or Cause("there is no world", ours=True)).finding(expected)
     low, high = sorted((wanted * (1.0 - share), wanted * (1.0 + share)))
     steps = _free(recording.truth, recording.scene, parameters)
-    evidence = Evidence(plots=(speed_plot(recording, (low, high)),))
+    plot = speed_plot(recording, (low, high))
     if not steps:
         cause = why_interrupted(recording) or Cause(
             f"the robot drove too shortly to judge: {metres(way_m(recording.truth))} in all",
@@ -90,14 +92,13 @@ def drives(recording: Recording, parameters: Drives) -> Finding:
     good = sum(low <= step.linear_m_s <= high for step in steps) / len(steps)
     seen = f"median {speed(middle)}, in that range for {percent(round(good, 3))} of the time"
     if low <= middle <= high and good >= _LEAST_SHARE:
-        return Finding.passed(expected, seen, evidence)
+        return Finding.passed(expected, seen, Evidence(plots=(plot,)))
     deeper = why_interrupted(recording)
     if deeper is not None and low <= middle <= high:
         return deeper.finding(expected)
     words, hint = _wrong_speed(steps, recording.scene, wanted, middle)
     off = next((step for step in steps if not low <= step.linear_m_s <= high), steps[0])
-    moment = Moment("first out of that range", recording.since_launch_s(off.time_ns))
-    evidence = Evidence(moments=(moment,), plots=evidence.plots)
+    evidence = evidence_at(recording, "first out of that range", off.time_ns, plot)
     return Finding.failed(expected, f"{seen}: {words}", hint, evidence)
 
 
@@ -139,17 +140,14 @@ def _wrong_speed(
         return "the robot turns on the spot instead of driving", _FIELDS_HINT
     if number:
         return f"the robot paused in between, {counted(number, 'time')}", _IN_BETWEEN_HINT
-    if middle * wanted < 0.0:
-        return "the robot drives backwards", _FIELDS_HINT
     if abs(command) > limit * 1.001 and abs(middle) > limit * 0.98:
         words = f"{speed(command)} was commanded, and the robot can do no more than {speed(limit)}"
         return words, _FIELDS_HINT
+    words = f"{middle / wanted:.3g} times the expected speed"
     slowest, fastest = min(s.linear_m_s for s in steps), max(s.linear_m_s for s in steps)
-    return (
-        f"{middle / wanted:.3g} times the expected speed, between {speed(slowest)} and "
-        f"{speed(fastest)}",
-        f"Publish the same speed as long as nothing is near ahead. {_FIELDS_HINT}",
-    )
+    if fastest - slowest > _SAME_SPEED * abs(middle):
+        words += f", between {speed(slowest)} and {speed(fastest)}"
+    return words, f"Publish the same speed as long as nothing is near ahead. {_FIELDS_HINT}"
 
 
 class KeepsDriving(RobotParameters):
@@ -193,8 +191,8 @@ def _why_not_ahead(recording: Recording, gone_m: float) -> Cause:
         return _too_slow(recording, gone_m)
     when_s = recording.since_launch_s(truth[rest].time_ns)
     misread = misreading(recording, truth[rest])
-    evidence = Evidence(
-        moments=(Moment("the robot stopped", when_s),), plots=(speed_plot(recording),)
+    evidence = evidence_at(
+        recording, "the robot stopped", truth[rest].time_ns, speed_plot(recording)
     )
     seen = f"stopped after {metres(gone_m)} in all"
     if misread is not None:
@@ -227,10 +225,7 @@ def _since_departure(recording: Recording) -> Evidence:
     """The speed, and when the robot set off."""
     truth = recording.truth
     begin = truth[departure(truth) or 0]
-    return Evidence(
-        moments=(Moment("set off", recording.since_launch_s(begin.time_ns)),),
-        plots=(speed_plot(recording),),
-    )
+    return evidence_at(recording, "set off", begin.time_ns, speed_plot(recording))
 
 
 class Straight(RobotParameters):
@@ -256,16 +251,12 @@ def straight(recording: Recording, parameters: Straight) -> Finding:
     if cause is not None:
         return cause.finding(expected)
     truth = recording.truth
-    evidence = Evidence(
-        plots=(
-            over_time(
-                recording,
-                "Commanded turn",
-                "angular.z (rad/s)",
-                lambda step: step.command_rad_s,
-                (-parameters.tolerance, parameters.tolerance),
-            ),
-        )
+    plot = over_time(
+        recording,
+        "Commanded turn",
+        "angular.z (rad/s)",
+        lambda step: step.command_rad_s,
+        (-parameters.tolerance, parameters.tolerance),
     )
     turning = [step for step in truth if abs(step.command_rad_s) > parameters.tolerance]
     if turning:
@@ -276,18 +267,18 @@ def straight(recording: Recording, parameters: Straight) -> Finding:
             f"angular.z = {turn(worst)} was commanded (from {when_s:.2f} s after launch, "
             f"{percent(len(turning) / len(truth))} of the time)",
             "The speed ahead is linear.x, the turn is angular.z: leave angular.z at 0.0.",
-            Evidence(moments=(Moment("first turn commanded", when_s),), plots=evidence.plots),
+            evidence_at(recording, "first turn commanded", turning[0].time_ns, plot),
         )
     turned = [wrap_angle(step.yaw_rad - truth[0].yaw_rad) for step in truth]
     off_rad = max(turned, key=abs)
     if abs(off_rad) > parameters.heading:
         first = next(i for i, angle in enumerate(turned) if abs(angle) > parameters.heading)
-        when_s = recording.since_launch_s(truth[first].time_ns)
         return Finding.failed(
             expected,
             f"the heading changed by {degrees(off_rad)}, through commands of less than "
             f"{turn(parameters.tolerance)} that add up",
             "Leave angular.z at exactly 0.0.",
-            Evidence(moments=(Moment("the heading is too far off", when_s),), plots=evidence.plots),
+            evidence_at(recording, "the heading is too far off", truth[first].time_ns, plot),
         )
-    return Finding.passed(expected, f"heading within {degrees(off_rad)} of the start", evidence)
+    seen = f"heading within {degrees(off_rad)} of the start"
+    return Finding.passed(expected, seen, Evidence(plots=(plot,)))

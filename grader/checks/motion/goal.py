@@ -8,7 +8,7 @@ from itertools import pairwise
 from pydantic import Field, model_validator
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import GoalParameters, RobotParameters
 from grader.checks.wording import percent
@@ -20,14 +20,11 @@ from grader.diagnosis.motion.off_course import why_interrupted, why_off_course, 
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import degrees, metres, point, speed, turn
-from grader.measure.motion.track import final_rest, is_at_rest, speed_plot, way_m
+from grader.measure.motion.track import evidence_at, final_rest, is_at_rest, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, Duration, PositiveLength, Ratio
 from grader.spec.unit import format_duration
-
-# A robot that looks at the goal comes nearer by most of what it drives.
-_ASTRAY_RAD = math.radians(45.0)
 
 
 class Reaches(GoalParameters):
@@ -123,12 +120,11 @@ def settles(recording: Recording, parameters: Settles) -> Finding:
         deeper = _restless(recording, end, f"after {format_duration(took_s)}")
     if deeper is not None:
         return deeper.finding(expected)
-    moment = Moment("at rest", recording.since_launch_s(end.time_ns))
     return Finding.failed(
         expected,
         f"after {format_duration(took_s)}",
         "Larger gains are faster, until it overshoots.",
-        Evidence(moments=(moment,), plots=evidence.plots),
+        evidence_at(recording, "at rest", end.time_ns, *evidence.plots),
     )
 
 
@@ -177,34 +173,26 @@ def path_length(recording: Recording, parameters: PathLength) -> Finding:
         )
     return Finding.failed(
         expected,
-        f"{seen}; {metres(_astray_m(run, parameters.position))} of it with the goal more than "
-        f"{degrees(_ASTRAY_RAD)} to the side",
+        seen,
         "Look at its heading on the way: does it turn to the goal at once, and by the short way? "
         "The error atan2(dy, dx) - yaw is wrapped, and its gain is large against that of the "
         "distance.",
-        Evidence(moments=(_farthest(run),), plots=evidence.plots),
+        evidence_at(
+            recording,
+            "farthest from the straight line to the goal",
+            _farthest(run).time_ns,
+            *evidence.plots,
+        ),
     )
 
 
-def _astray_m(run: Approach, position_m: float) -> float:
-    """Way that was driven before the arrival while the robot did not look at the goal."""
-    before = run.truth[: run.arrival(position_m)]
-    return sum(
-        math.hypot(b.x_m - a.x_m, b.y_m - a.y_m)
-        for a, b in pairwise(before)
-        if abs(run.bearing_error_rad(a)) > _ASTRAY_RAD
-    )
-
-
-def _farthest(run: Approach) -> Moment:
+def _farthest(run: Approach) -> Truth:
     """Where the robot was farthest from the straight line to the goal."""
     first, goal = run.truth[0], run.goal
     dx, dy = goal.x_m - first.x_m, goal.y_m - first.y_m
-    worst = max(
+    return max(
         run.truth, key=lambda step: abs(dx * (step.y_m - first.y_m) - dy * (step.x_m - first.x_m))
     )
-    when_s = run.recording.since_launch_s(worst.time_ns)
-    return Moment("farthest from the straight line to the goal", when_s)
 
 
 class Overshoot(GoalParameters):
@@ -258,19 +246,13 @@ def overshoot(recording: Recording, parameters: Overshoot) -> Finding:
     evidence = Evidence(plots=tuple(plots))
     if (most_m is None or past_m <= most_m) and (most_rad is None or beyond_rad <= most_rad):
         return Finding.passed(expected, " and ".join(seen), evidence)
-    deeper = why_off_course(recording)
-    if deeper is not None:
-        return deeper.finding(expected)
-    return Finding.failed(
-        expected,
+    cause = why_off_course(recording) or Cause(
         " and ".join(seen),
         "Compute linear.x as a gain times the distance: then the robot slows down before the goal. "
         "Make the gain smaller, so that linear.x is below its limit before the robot arrives.",
-        Evidence(
-            moments=(Moment("at the goal", recording.since_launch_s(run.truth[arrival].time_ns)),),
-            plots=evidence.plots,
-        ),
+        evidence_at(recording, "at the goal", run.truth[arrival].time_ns, *evidence.plots),
     )
+    return cause.finding(expected)
 
 
 def _past_m(run: Approach, arrival: int) -> float:

@@ -1,34 +1,39 @@
-"""Checks of stopping in front of an obstacle, and of staying there."""
+"""Checks of stopping in front of an obstacle, of staying there, and of touching nothing."""
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Literal
 
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import until_the_end
 from grader.checks.motion.robot_check import RobotParameters
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
+from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short, why_not_judged, why_not_moved
 from grader.diagnosis.motion.off_course import why_interrupted
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_it_exited
-from grader.measure.motion.command import commands, scans, stolen_s
+from grader.measure.motion.command import scans, stolen_s
 from grader.measure.motion.ground import Sight, ahead
 from grader.measure.motion.quantities import metres, speed
 from grader.measure.motion.scan import misreading
-from grader.measure.motion.track import REST_M_S, first_rest, over_time, speed_plot, way_m
+from grader.measure.motion.track import (
+    REST_M_S,
+    evidence_at,
+    first_rest,
+    has_moved,
+    over_time,
+    speed_plot,
+    way_m,
+)
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
 from grader.spec.quantity import Length, PositiveLength, Speed
 from grader.spec.unit import format_duration
-
-# A callback that sleeps, or a slow timer, answers fewer scans than come.
-_ANSWERED = 3
 
 
 class Stops(RobotParameters):
@@ -129,29 +134,19 @@ def _late(recording: Recording, scene: Scene, rest: int, sight: Sight, parameter
             "which may explain it"
         )
     shown = [one.stamp_ns for one in scans(recording) if begin_ns <= one.stamp_ns <= end_ns]
-    driving = [item.time_ns for item in commands(recording) if item.twist.linear_m_s > 0.0]
-    answered = sum(
-        any(before_ns <= time_ns < after_ns for time_ns in driving)
-        for before_ns, after_ns in pairwise(shown)
-    )
-    drove_on = answered >= _ANSWERED and answered == len(shown) - 1
     within = f"; {counted(len(shown), 'scan')} showed it meanwhile" if shown else ""
     return Cause(
         f"{seen}: it came to rest {format_duration((end_ns - begin_ns) / NS)} after that distance "
-        f"was reached, at up to {speed(fastest)}{within}"
-        f"{', and commands to drive on followed them' if drove_on else ''}",
-        "Which number does the callback compare the front range with? Ranges are in metres, -inf "
-        "is nearer than the LiDAR can measure, and an average of several scans comes late."
-        if drove_on
-        else "Publish the stop in the scan callback itself, from the newest scan: a sleep, a slow "
-        "timer or an old stored value costs way.",
+        f"was reached, at up to {speed(fastest)}{within}",
+        "Which number does the callback compare the front range with? Ranges are in metres, and "
+        "-inf is nearer than the LiDAR can measure. Publish the stop in the scan callback itself, "
+        "from the newest scan: a sleep, a slow timer or an average of several scans costs way.",
         _evidence(recording, scene, rest, parameters),
     )
 
 
 def _evidence(recording: Recording, scene: Scene, rest: int, parameters: Stops) -> Evidence:
-    when_s = recording.since_launch_s(recording.truth[rest].time_ns)
-    wanted_m = parameters.distance
+    rest_ns, wanted_m = recording.truth[rest].time_ns, parameters.distance
     band = (wanted_m - parameters.late, wanted_m + parameters.early)
 
     def distance_m(step: Truth) -> float | None:
@@ -160,10 +155,8 @@ def _evidence(recording: Recording, scene: Scene, rest: int, parameters: Stops) 
 
     title = "Distance to what is straight ahead"
     distance_plot = over_time(recording, title, "distance (m)", distance_m, band)
-    return Evidence(
-        moments=(Moment("the robot came to rest", when_s),),
-        plots=(distance_plot, speed_plot(recording)),
-    )
+    plots = distance_plot, speed_plot(recording)
+    return evidence_at(recording, "the robot came to rest", rest_ns, *plots)
 
 
 class StaysAtRest(RobotParameters):
@@ -218,7 +211,7 @@ def _set_off(
 ) -> Cause:
     """How a robot that was at rest began to move."""
     when_s = recording.since_launch_s(step.time_ns)
-    sight = None if recording.scene is None else ahead(recording.scene, step)
+    sight = ahead(recording.scene, step)
     words = "set off" if is_start else "set off again"
     if abs(step.linear_m_s) < REST_M_S:
         words = "turned on the spot"
@@ -237,5 +230,38 @@ def _set_off(
         if is_start
         else "Remember that the robot has stopped, or compare the same range in every callback: "
         "two places that publish contradict each other.",
-        Evidence(moments=(Moment("the robot set off", when_s),), plots=(speed_plot(recording),)),
+        evidence_at(recording, "the robot set off", step.time_ns, speed_plot(recording)),
     )
+
+
+class NoContact(RobotParameters):
+    """Parameters of motion.no_contact."""
+
+    moving: bool = Field(
+        True,
+        description="Whether the robot must also have moved: a robot that always stands touches "
+        "nothing.",
+    )
+
+
+@check("motion.no_contact", Subject.RECORDING, NoContact)
+def no_contact(recording: Recording, parameters: NoContact) -> Finding:
+    """The robot touches nothing.
+
+    Judged by the simulator. Something that runs into a robot at rest does not count.
+    A robot that never moved does not pass, unless `moving` is false.
+    """
+    expected = "touches nothing"
+    touched = why_touched(recording)
+    if touched is not None:
+        cause = why_cut_short(recording)
+        return (cause.after(touched.observed) if cause else touched).finding(expected)
+    cause = why_not_moved(recording) if parameters.moving else why_not_judged(recording)
+    if cause is None and not parameters.moving:
+        cause = why_no_node(recording)
+        if cause is None and not has_moved(recording.truth):
+            cause = why_cut_short(recording)
+    if cause is not None:
+        return cause.finding(expected)
+    evidence = Evidence(plots=(speed_plot(recording),))
+    return Finding.passed(expected, f"no contact on {metres(way_m(recording.truth))}", evidence)

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pydantic import Field
 
 from grader.checks.check import Subject, check
-from grader.checks.finding import Evidence, Finding, Moment
+from grader.checks.finding import Evidence, Finding
 from grader.checks.motion.robot_check import GoalParameters
 from grader.checks.wording import counted
 from grader.diagnosis.cause import Cause
@@ -17,7 +17,7 @@ from grader.diagnosis.motion.no_motion import approach
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.quantities import degrees, metres, speed
-from grader.measure.motion.track import speed_plot, way_m
+from grader.measure.motion.track import evidence_at, speed_plot, way_m
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 from grader.spec.quantity import Angle, PositiveLength, Speed
@@ -64,20 +64,17 @@ def two_phases(recording: Recording, parameters: TwoPhases) -> Finding:
     fastest = 0.0 if recording.scene is None else recording.scene.max_linear_m_s
     if way <= max(_RUN_OUT_M, _RUN_OUT_S * fastest):
         return Finding.passed(expected, f"{metres(way)} after it had begun to turn", evidence)
-    deeper = why_off_course(recording)
-    if deeper is not None:
-        return deeper.finding(expected)
     first = stray[0][1]
     fastest = max((abs(after.command_m_s) for _, after in stray))
     when_s = recording.since_launch_s(first.time_ns)
-    return Finding.failed(
-        expected,
+    cause = why_off_course(recording) or Cause(
         f"drove {metres(way)} while it turned at the goal, commanded with up to {speed(fastest)} "
         f"(from {when_s:.2f} s after launch)",
         "In the second phase linear.x is 0.0. Remember that the position was reached: a flag that "
         "is set once does not fall back into the first phase.",
-        Evidence(moments=(Moment("drives again", when_s),), plots=evidence.plots),
+        evidence_at(recording, "drives again", first.time_ns, *evidence.plots),
     )
+    return cause.finding(expected)
 
 
 def _stray(run: Approach, arrival: int, none_m_s: float) -> list[tuple[Truth, Truth]]:
@@ -149,20 +146,17 @@ def short_way(recording: Recording, parameters: ShortWay) -> Finding:
         if cause is not None:
             return cause.finding(expected)
         return Finding.passed(expected, "no long way", evidence)
-    deeper = why_off_course(recording)
-    if deeper is not None:
-        return deeper.finding(expected)
     what, error_rad, step = detours[0]
     when_s = recording.since_launch_s(step.time_ns)
     more = f", and {counted(len(detours) - 1, 'more time')}" if len(detours) > 1 else ""
-    return Finding.failed(
-        expected,
+    cause = why_off_course(recording) or Cause(
         f"turned away from {what} through half a turn: {degrees(math.tau - abs(error_rad))} "
         f"{_sense(-error_rad)} where {degrees(abs(error_rad))} {_sense(error_rad)} would do "
         f"({when_s:.2f} s after launch{more})",
         WRAP_HINT,
-        Evidence(moments=(Moment("turns the long way", when_s),), plots=evidence.plots),
+        evidence_at(recording, "turns the long way", step.time_ns, *evidence.plots),
     )
+    return cause.finding(expected)
 
 
 def _sense(angle_rad: float) -> str:

@@ -65,33 +65,15 @@ def late_joiner(recording: Recording, parameters: LateJoiner) -> Finding:
     that the publisher's middleware gives them. So a publisher is found out that publishes only
     while there is a subscription.
     """
-    expected = parameters.words
     join = next((item for item in recording.joins if item.name == parameters.joiner), None)
     if join is None:
-        return _why_not_judged(recording, parameters, "the run ended before it joined").finding(
-            expected
-        )
+        cause = _why_not_judged(recording, parameters, "the run ended before it joined")
+        return cause.finding(parameters.words)
     case = _Case.of(recording, parameters, join)
-    if case.number <= parameters.last:
-        heard = recording.on(parameters.topic)
-        if not heard and recording.joined.get(join.name):
-            return _why_unpublished_before(case).finding(expected)
-        seen = (
-            f"when it joined, only {counted(case.number, 'message')} had been published of the "
-            f"{parameters.last + 1} that are needed to judge"
-        )
-        return _why_not_judged(recording, parameters, seen).finding(expected)
-    number = len(case.history)
-    if case.least <= number <= parameters.last and case.is_newest:
-        return Finding.passed(expected, case.seen, case.evidence)
-    if number > parameters.last:
-        return _why_too_many(case).finding(expected)
-    if not case.is_newest:
-        cause = Cause.to_repeat(
-            f"{case.seen}, but not the newest ones: some were lost on their way"
-        )
-        return cause.finding(expected)
-    return _why_too_few(case).finding(expected)
+    wrong = _why_wrong(case)
+    if wrong is not None:
+        return wrong.finding(parameters.words)
+    return Finding.passed(parameters.words, case.seen, case.evidence)
 
 
 @dataclass(frozen=True)
@@ -151,13 +133,6 @@ class _Case:
         return [queue.depth for queue in queues if queue.depth is not None]
 
     @property
-    def destroyed(self) -> int:
-        """How many publishers were destroyed before it joined, while another one was there."""
-        ends = [item.vanished_ns or math.inf for item in self.publishers]
-        gone = sum(end_ns <= self.join.joined_ns for end_ns in ends)
-        return gone if gone < len(ends) else 0
-
-    @property
     def hint(self) -> str:
         if self.parameters.last == 0:
             return "A volatile publisher keeps nothing for late joiners: that is the default."
@@ -190,16 +165,15 @@ class _Case:
         return Evidence(moments, tables=(table,))
 
     def why_destroyed(self, seen: str) -> Cause | None:
-        """The cause if earlier publishers took along what they kept, or nothing."""
-        if not self.destroyed:
+        """The cause if publishers were destroyed before it joined, while another one was there."""
+        ends = [item.vanished_ns or math.inf for item in self.publishers]
+        gone = sum(end_ns <= self.join.joined_ns for end_ns in ends)
+        if gone in (0, len(ends)):
             return None
-        number = counted(self.destroyed, "publisher was", "publishers were")
-        return Cause(
-            f"{seen}: what a publisher keeps is lost with it, and {number} destroyed before it "
-            "joined",
-            _ONE_PUBLISHER_HINT,
-            self.evidence,
-        )
+        number = counted(gone, "publisher was", "publishers were")
+        lost = "what a publisher keeps is lost with it"
+        observed = f"{seen}: {lost}, and {number} destroyed before it joined"
+        return Cause(observed, _ONE_PUBLISHER_HINT, self.evidence)
 
 
 def _published_until(messages: tuple[Message, ...], time_ns: int) -> list[Message]:
@@ -215,6 +189,23 @@ def _why_not_judged(recording: Recording, parameters: LateJoiner, seen: str) -> 
     if len(recording.on(parameters.topic)) < needed:
         return why_few(recording, parameters.topic, needed)
     return why_ended(recording, seen) or Cause(seen, ours=True)
+
+
+def _why_wrong(case: _Case) -> Cause | None:
+    """Why it did not get what it should, or None."""
+    number, last = len(case.history), case.parameters.last
+    if case.number <= last:
+        heard = case.recording.on(case.parameters.topic)
+        if not heard and case.recording.joined.get(case.join.name):
+            return _why_unpublished_before(case)
+        published_before = f"only {counted(case.number, 'message')} had been published"
+        seen = f"when it joined, {published_before} of the {last + 1} that are needed to judge"
+        return _why_not_judged(case.recording, case.parameters, seen)
+    if number > last:
+        return _why_too_many(case)
+    if not case.is_newest:
+        return Cause.to_repeat(f"{case.seen}, but not the newest ones: some were lost on their way")
+    return _why_too_few(case) if number < case.least else None
 
 
 def _why_unpublished_before(case: _Case) -> Cause:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
 from statistics import median
 
 from pydantic import Field, model_validator
@@ -13,7 +12,6 @@ from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.need import Published, Recorded
 from grader.checks.wording import code, counted
-from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_messages import why_not_sent, why_silent
 from grader.diagnosis.process.blocked_executor import left_s
 from grader.recording.model import NS, Message, Recording
@@ -24,35 +22,23 @@ from grader.spec.unit import format_duration
 _MS = 1e3
 
 
-@dataclass(frozen=True)
-class Reaction:
-    """A message that the probe sent, and the first message that may answer it, or None."""
-
-    sent: Message
-    answer: Message | None
-
-    def end_ns(self, within_s: float) -> int:
-        """When the answer was published, or was due at the latest."""
-        return self.answer.stamp_ns if self.answer else self.sent.stamp_ns + round(within_s * NS)
-
-
-def reactions(
+def answers_to(
     sent: Sequence[Message], answers: Sequence[Message], within_ns: int
-) -> tuple[Reaction, ...]:
-    """Pair what was sent with the answers, in the order of both.
+) -> list[Message | None]:
+    """The answer to each message, or None, in the order of both.
 
     An answer belongs to one message: the oldest that is still unanswered when it comes. A
     message whose time has passed when the next answer comes was not answered.
     """
     stamps = [message.stamp_ns for message in answers]
-    found = []
+    found: list[Message | None] = []
     free = 0
     for message in sent:
         first = max(free, bisect_left(stamps, message.stamp_ns))
         in_time = first < len(stamps) and stamps[first] <= message.stamp_ns + within_ns
-        found.append(Reaction(message, answers[first] if in_time else None))
+        found.append(answers[first] if in_time else None)
         free = first + 1 if in_time else free
-    return tuple(found)
+    return found
 
 
 class Latency(Parameters):
@@ -114,50 +100,41 @@ def latency(recording: Recording, parameters: Latency) -> Finding:
         return why_silent(recording, parameters.topic).finding(expected)
     if not sent:
         return why_not_sent(recording, parameters.stimulus).finding(expected)
-    found = reactions(sent, answers, round(parameters.within * NS))
-    answered = [item for item in found if item.answer is not None]
-    missing = [item for item in found if item.answer is None]
-    waits = [(item.sent.stamp_ns, item.end_ns(parameters.within)) for item in answered]
+    within_ns = round(parameters.within * NS)
+    found = answers_to(sent, answers, within_ns)
+    waits = [(a.stamp_ns, b.stamp_ns) for a, b in zip(sent, found, strict=True) if b is not None]
     times = [(end_ns - begin_ns) / NS for begin_ns, end_ns in waits]
+    missing = [a.stamp_ns for a, b in zip(sent, found, strict=True) if b is None]
     figures = _figures(times)
-    evidence = _evidence(recording, parameters, answered, times, missing)
+    evidence = _evidence(recording, parameters, waits, missing)
     is_missing = len(missing) > parameters.unanswered
     if not is_missing and not parameters.is_too_slow(times):
         return Finding.passed(expected, figures, evidence)
-    observed = (
-        f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
-        f"had no answer within {format_duration(parameters.within)}"
-    )
-    if is_missing:
-        last_ns = missing[-1 - parameters.unanswered].sent.stamp_ns
-        destroyed = why_unsubscribed(recording, parameters.stimulus, observed, last_ns)
-        if destroyed is not None:
-            return destroyed.finding(expected)
     own_s = [max(0.0, left_s(recording, *wait)) for wait in waits]
-    unexcused = [
-        item
-        for item in missing
-        if recording.stolen_s(item.sent.stamp_ns, item.end_ns(parameters.within)) <= 0.0
-    ]
-    if len(unexcused) <= parameters.unanswered and not parameters.is_too_slow(own_s):
+    unexcused = sum(recording.stolen_s(at, at + within_ns) <= 0.0 for at in missing)
+    if unexcused <= parameters.unanswered and not parameters.is_too_slow(own_s):
         stolen_s = recording.stolen_s(sent[0].stamp_ns, recording.stop_ns)
         return Finding.to_repeat(
             expected,
             f"{figures}; the machine took up to {format_duration(stolen_s)} from the process "
             "meanwhile, which may explain it",
         )
-    if is_missing:
+    if not is_missing:
         hint = (
-            "Publish one answer in every call of the subscription's callback, with no condition "
-            "that leaves one out."
+            "Publish the answer in the subscription's callback itself, not from a timer. Let the "
+            "callback return soon: no time.sleep(), no wait, no loop over what is there already."
         )
-        observed += f"; of the others {figures}" if times else ""
-        return Finding.failed(expected, observed, hint, evidence)
+        return Finding.failed(expected, figures, hint, evidence)
     hint = (
-        "Publish the answer in the subscription's callback itself, not from a timer. Let the "
-        "callback return soon: no time.sleep(), no wait, no loop over what is there already."
+        "Publish one answer in every call of the subscription's callback, with no condition that "
+        "leaves one out."
     )
-    return Finding.failed(expected, figures, hint, evidence)
+    observed = (
+        f"{len(missing)} of {counted(len(found), 'message')} on {code(parameters.stimulus)} "
+        f"had no answer within {format_duration(parameters.within)}"
+    )
+    observed += f"; of the others {figures}" if times else ""
+    return Finding.failed(expected, observed, hint, evidence)
 
 
 def _figures(times_s: Sequence[float]) -> str:
@@ -172,26 +149,24 @@ def _figures(times_s: Sequence[float]) -> str:
 def _evidence(
     recording: Recording,
     parameters: Latency,
-    answered: Sequence[Reaction],
-    times_s: Sequence[float],
-    missing: Sequence[Reaction],
+    waits: Sequence[tuple[int, int]],
+    missing: Sequence[int],
 ) -> Evidence:
-    late = [(f"sent on {parameters.stimulus}, not answered", item) for item in missing[:10]]
-    if times_s:
-        worst_s = max(times_s)
-        slowest = f"slowest answer: after {format_duration(worst_s)}"
-        late.append((slowest, answered[times_s.index(worst_s)]))
+    moments = [
+        Moment(f"sent on {parameters.stimulus}, not answered", recording.since_launch_s(at))
+        for at in missing[:10]
+    ]
+    if not waits:
+        return Evidence(moments=tuple(moments))
+    begin_ns, end_ns = max(waits, key=lambda wait: wait[1] - wait[0])
+    slowest = f"slowest answer: after {format_duration((end_ns - begin_ns) / NS)}"
+    moments.append(Moment(slowest, recording.since_launch_s(begin_ns)))
     plot = Plot(
         title=f"From a message on {parameters.stimulus} to its answer",
         x_label="time since launch (s)",
         y_label="latency (ms)",
-        x=tuple(recording.since_launch_s(item.sent.stamp_ns) for item in answered),
-        y=tuple(seconds * _MS for seconds in times_s),
+        x=tuple(recording.since_launch_s(begin_ns) for begin_ns, _ in waits),
+        y=tuple((end_ns - begin_ns) / NS * _MS for begin_ns, end_ns in waits),
         band=(0.0, (parameters.most or parameters.median or 0.0) * _MS),
     )
-    return Evidence(
-        moments=tuple(
-            Moment(label, recording.since_launch_s(item.sent.stamp_ns)) for label, item in late
-        ),
-        plots=(plot,) if times_s else (),
-    )
+    return Evidence(moments=tuple(moments), plots=(plot,))

@@ -68,12 +68,8 @@ class Period(Parameters):
     @property
     def limits(self) -> PeriodLimits:
         """The same in seconds."""
-        return PeriodLimits(
-            period_s=self.period,
-            median_s=self.tolerance.of(self.period),
-            spread_s=self.spread.of(self.period),
-            outliers=self.outliers,
-        )
+        median_s, spread_s = self.tolerance.of(self.period), self.spread.of(self.period)
+        return PeriodLimits(self.period, median_s, spread_s, self.outliers)
 
 
 @check("timing.period", Subject.RECORDING, Period)

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from grader.checks.finding import Evidence, Moment
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.process.blocked_executor import stuck_callback
-from grader.measure.motion.command import VelocityCommand, commands, is_zero, scans
+from grader.measure.motion.command import VelocityCommand, commands, is_zero
 from grader.measure.motion.quantities import speed, turn
 from grader.measure.motion.scan import newest
-from grader.measure.motion.track import is_at_rest, speed_plot
+from grader.measure.motion.track import evidence_at, is_at_rest, speed_plot
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Truth
 
@@ -22,9 +21,6 @@ _LATELY_NS = NS
 _CONTRADICTIONS = 3
 # A command that is older did not answer one of the last two scans of the slowest LiDAR.
 _HELD_NS = NS // 2
-# So many scans, of which so many had an answer, are no chance.
-_FEW_SCANS = 10
-_ANSWERED = 0.8
 # Several scans of any LiDAR.
 _BLIND_NS = NS
 # Rest before something moving ran into the robot.
@@ -74,7 +70,7 @@ def why_touched(recording: Recording) -> Cause | None:
     return Cause(
         f"drove into {code(name)} {motion}, {when_s:.2f} s after launch, {command}{reason.words}",
         reason.hint,
-        Evidence(moments=(Moment(f"contact with {name}", when_s),), plots=(speed_plot(recording),)),
+        evidence_at(recording, f"contact with {name}", step.time_ns, speed_plot(recording)),
     )
 
 
@@ -134,22 +130,6 @@ def contradicting_commands(symptom: Contact) -> Reason | None:
     )
 
 
-@explanation(Contact)
-def fewer_commands_than_scans(symptom: Contact) -> Reason | None:
-    """A slow callback or timer decides by old scans."""
-    sent = symptom.sent
-    begin_ns, end_ns = sent[0].time_ns if sent else symptom.step.time_ns, symptom.step.time_ns
-    seen = [item for item in scans(symptom.recording) if begin_ns <= item.stamp_ns <= end_ns]
-    if len(seen) < _FEW_SCANS or len(sent) >= _ANSWERED * len(seen):
-        return None
-    return Reason(
-        f"; only {counted(len(sent), 'command')} followed the {len(seen)} scans until then",
-        "A time.sleep() in the callback lets scans wait in the queue, and a slow timer reads them "
-        "late: the decision is made by an old scan. Publish in the callback of the scan, and "
-        "return at once.",
-    )
-
-
 @explanation(Contact, general=True)
 def decided_to_drive(symptom: Contact) -> Reason:
     """It went on deciding to drive, or stopped too late."""
@@ -157,8 +137,8 @@ def decided_to_drive(symptom: Contact) -> Reason:
         "",
         "Log the range that you compare. Is it the beam straight ahead, whose angle is 0, of the "
         "newest scan, and is your limit in metres? Where it is within the limit, publish "
-        "linear.x = 0.0. Stop early enough: the robot needs time to see (a scan comes every "
-        "0.2 s) and to brake.",
+        "linear.x = 0.0. A time.sleep() in the callback or a slow timer decides by an old scan. "
+        "The robot needs time to see (a scan comes every 0.2 s) and to brake.",
     )
 
 

@@ -73,11 +73,6 @@ _READINGS = (
         f"asin and atan know only half of the circle: {_FORMULA}, with atan2.",
         lambda yaw_rad: math.asin(math.sin(yaw_rad)),
     ),
-    Reading(
-        "never negative",
-        f"acos loses the sign, and asin does where w is negative: {_FORMULA}.",
-        abs,
-    ),
 )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from grader.checks.finding import Evidence, Moment
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.motion.misread_yaw import misread_yaw
@@ -14,7 +13,7 @@ from grader.diagnosis.process.blocked_executor import stuck_callback
 from grader.measure.motion.approach import WRAP_HINT, Approach, long_turns
 from grader.measure.motion.command import stolen_s
 from grader.measure.motion.quantities import metres, point, speed, turn
-from grader.measure.motion.track import is_at_rest, turned_rad
+from grader.measure.motion.track import evidence_at, is_at_rest, turned_rad
 from grader.recording.model import NS, Ending, Recording
 from grader.recording.simulated import Truth
 from grader.spec.unit import format_duration
@@ -46,14 +45,14 @@ class GoalMissed(Symptom[Cause]):
         return min(self.run.truth, key=self.run.distance_m)
 
     @property
-    def watched_s(self) -> float:
-        """How long the run was observed."""
-        return (self.last.time_ns - self.run.truth[0].time_ns) / NS
-
-    @property
     def is_at_rest(self) -> bool:
         """Whether the robot stands in the end."""
         return is_at_rest(self.last)
+
+    @property
+    def watched_s(self) -> float:
+        """How long the run was observed."""
+        return (self.last.time_ns - self.run.truth[0].time_ns) / NS
 
     @property
     def seen(self) -> str:
@@ -68,11 +67,10 @@ class GoalMissed(Symptom[Cause]):
 
     def cause(self, words: str, hint: str) -> Cause:
         """The symptom in words, followed by more, with the distance over time."""
-        when_s = self.recording.since_launch_s(self.nearest.time_ns)
-        moments = (Moment("nearest to the goal", when_s),)
-        return Cause(
-            f"{self.seen}{words}", hint, Evidence(moments, plots=(self.run.distance_plot,))
+        evidence = evidence_at(
+            self.recording, "nearest to the goal", self.nearest.time_ns, self.run.distance_plot
         )
+        return Cause(f"{self.seen}{words}", hint, evidence)
 
 
 def why_not_there(run: Approach, position_m: float) -> Cause | None:
@@ -127,21 +125,6 @@ def wrong_place(symptom: GoalMissed) -> Cause | None:
         if symptom.is_at_rest and is_another and is_there:
             return symptom.cause(f": that is {words}", hint)
     return None
-
-
-@explanation(GoalMissed)
-def pushed_away(symptom: GoalMissed) -> Cause | None:
-    """It was pushed on its way, and did not look where it was afterwards."""
-    incidents = symptom.recording.incidents
-    pushed = next((item for item in incidents if item.kind == "pushed"), None)
-    if pushed is None or not symptom.is_at_rest:
-        return None
-    when_s = symptom.recording.since_launch_s(pushed.time_ns)
-    return symptom.cause(
-        f": it was pushed {when_s:.2f} s after launch, and its commands since then lead elsewhere",
-        "Compute every command from the newest odometry: earlier commands do not tell where the "
-        "robot is.",
-    )
 
 
 @explanation(GoalMissed)
@@ -207,7 +190,7 @@ def stopped_elsewhere(symptom: GoalMissed) -> Cause | None:
     return symptom.cause(
         "",
         "Print the goal that your node reads, and drive on until math.hypot(goal's x - x, "
-        "goal's y - y), in metres, is smaller than the tolerance.",
+        "goal's y - y), in metres and from the newest odometry, is smaller than the tolerance.",
     )
 
 

@@ -19,10 +19,6 @@ from sim.motion import wrap_angle
 
 # How far from the heading that it was sent to a robot rests: the default of angle_tolerance.
 _AS_SENT_RAD = 0.06
-_RADIANS_HINT = (
-    "Angles in ROS are radians (REP-103), and so is the goal's heading already. Log the value that "
-    "your node has read: that of a float parameter is get_parameter_value().double_value."
-)
 
 
 @dataclass(frozen=True)
@@ -83,28 +79,20 @@ def turns_for_ever(symptom: HeadingMissed) -> Cause | None:
 
 @explanation(HeadingMissed)
 def another_heading(symptom: HeadingMissed) -> Cause | None:
-    """The goal's heading is taken for degrees, has the wrong sign, or is the opposite."""
+    """The goal's heading is taken for degrees or 0, or has the wrong sign."""
     goal_rad = symptom.run.goal.yaw_rad
     headings = (
         (
             math.radians(goal_rad),
             "as if the goal's heading were 0, or were taken for degrees",
-            _RADIANS_HINT,
-        ),
-        (
-            math.degrees(goal_rad),
-            "as if the goal's heading were converted to degrees",
-            _RADIANS_HINT,
+            "Angles in ROS are radians (REP-103), and so is the goal's heading already. Log the "
+            "value that your node has read: that of a float parameter is "
+            "get_parameter_value().double_value.",
         ),
         (
             -goal_rad,
             "that is the goal's heading with its sign changed",
             "Counter-clockwise is positive (REP-103): error = goal's heading - yaw.",
-        ),
-        (
-            goal_rad + math.pi,
-            "that is the opposite of the goal's heading",
-            "Look at how you normalise the angle, and at the arguments of atan2(y, x).",
         ),
     )
     near_rad = min(symptom.heading_rad, _AS_SENT_RAD)

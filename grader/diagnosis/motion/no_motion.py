@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
-from grader.checks.finding import Evidence, Moment
+from grader.checks.finding import Evidence
 from grader.checks.first_seen import endpoints_seen, first_seen
 from grader.checks.reference import Goal, UnknownValue
 from grader.checks.wording import code, codes, counted
@@ -25,10 +25,9 @@ from grader.measure.motion.command import (
     is_zero,
     stolen_s,
 )
-from grader.measure.motion.ground import ahead
-from grader.measure.motion.quantities import metres, speed
+from grader.measure.motion.quantities import speed
 from grader.measure.motion.scan import misreading
-from grader.measure.motion.track import has_moved, index_at, is_at_rest
+from grader.measure.motion.track import evidence_at, has_moved, index_at, is_at_rest
 from grader.recording.model import NS, Kind, Owner, Recording
 from grader.spec.unit import format_duration
 
@@ -58,9 +57,16 @@ class NotMoved(Symptom[Cause]):
         """The velocity commands."""
         return commands(self.recording)
 
-    def moment(self, label: str, command: VelocityCommand) -> Evidence:
-        """Evidence at a command."""
-        return Evidence(moments=(Moment(label, self.recording.since_launch_s(command.time_ns)),))
+    @cached_property
+    def first(self) -> VelocityCommand:
+        """The first command to move, or else the first of all."""
+        moving = (item for item in self.sent if not is_zero(item.twist))
+        return next(moving, self.sent[0])
+
+    @property
+    def evidence(self) -> Evidence:
+        """When that command came."""
+        return evidence_at(self.recording, "first command to move", self.first.time_ns)
 
 
 def why_not_moved(recording: Recording) -> Cause | None:
@@ -102,13 +108,12 @@ def why_rejected(recording: Recording) -> Cause | None:
         return None
     first = refused[0]
     were = "was" if len(refused) == 1 else "were"
-    when_s = recording.since_launch_s(first.time_ns)
     return Cause(
         f"{counted(len(refused), 'command')} on {code(command_topic(recording))} {were} not finite "
         f"(first: {first.text}); the robot stops instead",
         "A command must be finite: look for a division by zero, for inf from a range that sees "
         "nothing, and for sqrt or acos of a number out of range.",
-        Evidence(moments=(Moment("command rejected", when_s),)),
+        evidence_at(recording, "command rejected", first.time_ns),
     )
 
 
@@ -180,35 +185,31 @@ def only_zeros(symptom: NotMoved) -> Cause | None:
     recording, sent = symptom.recording, symptom.sent
     if not all(is_zero(item.twist) for item in sent):
         return None
-    evidence = symptom.moment("first command", sent[0])
     topic = code(command_topic(recording))
     seen = f"{_STILL}: all of {counted(len(sent), 'command')} on {topic} are zero"
     last = recording.truth[-1]
     misread = misreading(recording, last)
     if misread is not None:
-        return Cause(f"{seen}; {misread.words}", misread.hint, evidence)
-    sight = None if recording.scene is None else ahead(recording.scene, last)
-    where = f"; {code(sight.name)} is {metres(sight.distance_m)} straight ahead" if sight else ""
+        return Cause(f"{seen}; {misread.words}", misread.hint, symptom.evidence)
     return Cause(
-        f"{seen}{where}",
+        seen,
         "Which branch of the callback publishes? Log what it compares. The speed ahead is "
         "linear.x, the turn is angular.z.",
-        evidence,
+        symptom.evidence,
     )
 
 
 @explanation(NotMoved)
 def integer_in_command(symptom: NotMoved) -> Cause | None:
     """A field of floats was given an integer, which ROS misreads."""
-    first, evidence = _first_to_move(symptom)
-    fields = {"linear.x": first.twist.linear_m_s, "angular.z": first.twist.angular_rad_s}
-    for field, number in fields.items():
+    twist = symptom.first.twist
+    for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
         if was_integer(number):
             return Cause(
                 f"{_STILL}: {what_was_put(number)} was put into {code(field)}, a float field, "
                 "which ROS misreads",
                 "A number in a message must be a float: write 1.0 instead of 1, or float(value).",
-                evidence,
+                symptom.evidence,
             )
     return None
 
@@ -216,8 +217,7 @@ def integer_in_command(symptom: NotMoved) -> Cause | None:
 @explanation(NotMoved, general=True)
 def moves_too_late(symptom: NotMoved) -> Cause:
     """The first command to move came at the very end, or was too slow."""
-    recording = symptom.recording
-    first, evidence = _first_to_move(symptom)
+    recording, first = symptom.recording, symptom.first
     left_s = (recording.truth[-1].time_ns - first.time_ns) / NS
     begin_ns = recording.truth[0].time_ns
     lost_s = stolen_s(recording, begin_ns, recording.truth[-1].time_ns)
@@ -229,10 +229,5 @@ def moves_too_late(symptom: NotMoved) -> Cause:
         f"{_STILL}: the first command to move, {speed(first.twist.linear_m_s)} ahead, came "
         f"{format_duration(max(left_s, 0.0))} before the end",
         "A speed below 1 mm/s, or one that holds for a moment only, does not move the robot.",
-        evidence,
+        symptom.evidence,
     )
-
-
-def _first_to_move(symptom: NotMoved) -> tuple[VelocityCommand, Evidence]:
-    first = next(item for item in symptom.sent if not is_zero(item.twist))
-    return first, symptom.moment("first command to move", first)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from grader.checks.finding import Evidence, Moment
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.explanation import Symptom, explain, explanation
 from grader.diagnosis.motion.contact import why_touched
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.measure.motion.command import commands, is_zero
-from grader.measure.motion.track import speed_plot
+from grader.measure.motion.track import evidence_at, speed_plot
 from grader.recording.model import NS, Recording
 from grader.spec.unit import format_duration
 
@@ -18,33 +14,14 @@ from grader.spec.unit import format_duration
 _UNSTEERED_S = 2.0
 
 
-@dataclass(frozen=True)
-class OffCourse(Symptom[Cause]):
-    """The robot does not drive as it should."""
-
-    recording: Recording
-
-
-def why_off_course(recording: Recording) -> Cause | None:
-    """A cause that lies deeper than the way in which the robot is steered, or None."""
-    return explain(OffCourse(recording))
-
-
 def why_interrupted(recording: Recording) -> Cause | None:
     """Why the way ended early: a process ended, commands not finite, or a contact; or None."""
     return why_cut_short(recording) or why_touched(recording)
 
 
-@explanation(OffCourse)
-def interrupted(symptom: OffCourse) -> Cause | None:
-    """The process ended, sent commands that are not finite, or the robot touched something."""
-    return why_interrupted(symptom.recording)
-
-
-@explanation(OffCourse)
-def no_command_for_long(symptom: OffCourse) -> Cause | None:
-    """No command came for a long time, and the robot moved on."""
-    return why_unsteered(symptom.recording)
+def why_off_course(recording: Recording) -> Cause | None:
+    """A cause that lies deeper than the way in which the robot is steered, or None."""
+    return why_interrupted(recording) or why_unsteered(recording)
 
 
 def why_unsteered(recording: Recording) -> Cause | None:
@@ -68,7 +45,5 @@ def why_unsteered(recording: Recording) -> Cause | None:
         "on, and the robot moved on by its last command",
         "Publish a command for each odometry: look for time.sleep() and for a loop in a "
         "callback, which keep the next one waiting, and for a condition before publish().",
-        Evidence(
-            moments=(Moment("no command from here on", when_s),), plots=(speed_plot(recording),)
-        ),
+        evidence_at(recording, "no command from here on", begin_ns, speed_plot(recording)),
     )

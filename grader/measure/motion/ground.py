@@ -17,20 +17,17 @@ from sim.shapes import Capsule, point_clearance_m
 
 @dataclass(frozen=True)
 class Sight:
-    """Something as seen from the robot.
-
-    Attributes:
-        name: Such as ``boxes[2]``.
-        bearing_rad: In the robot's frame, counter-clockwise from straight ahead.
-    """
+    """Something such as ``boxes[2]``, with its bearing from straight ahead."""
 
     name: str
     distance_m: float
     bearing_rad: float = 0.0
 
 
-def ahead(scene: Scene, step: Truth) -> Sight | None:
+def ahead(scene: Scene | None, step: Truth) -> Sight | None:
     """The nearest thing straight ahead of the robot, or None where there is nothing."""
+    if scene is None:
+        return None
     eye = _eye(scene, step)
     cos, sin = math.cos(step.yaw_rad), math.sin(step.yaw_rad)
 
@@ -61,12 +58,6 @@ def nearest(scene: Scene, step: Truth) -> Sight | None:
             bearing_rad = math.atan2(y - eye.y_m, x - eye.x_m) - step.yaw_rad
             found = Sight(name, distance_m, math.remainder(bearing_rad, math.tau))
     return found
-
-
-def edge_m(scene: Scene) -> float:
-    """Distance from the LiDAR straight ahead to the robot's own edge."""
-    x_m, y_m = scene.lidar.x_m, scene.lidar.y_m
-    return math.sqrt(max(scene.radius_m**2 - y_m**2, 0.0)) - x_m
 
 
 def _eye(scene: Scene, step: Truth) -> Pose:

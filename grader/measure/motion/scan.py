@@ -43,7 +43,9 @@ def misreading(recording: Recording, step: Truth) -> Misreading | None:
         return None
     # Before the nearest of all: where a beam is 0.0, so is min(ranges).
     seen = _front(recording, scan)
-    if seen == 0.0 and not _drove_on(recording, step, lambda one: _reported_zero(recording, one)):
+    if seen == 0.0 and not _drove_on(
+        recording, step, lambda one: _front(recording, newest(recording, one.time_ns)) == 0.0
+    ):
         return Misreading(
             "the beam straight ahead reported 0.0 then, which means that nothing came back",
             "A range below range_min is no obstacle: ignore ranges outside of range_min to "
@@ -59,19 +61,16 @@ def misreading(recording: Recording, step: Truth) -> Misreading | None:
     return beside
 
 
-def _front(recording: Recording, scan: Message) -> float | None:
+def _front(recording: Recording, scan: Message | None) -> float | None:
     """What the beam straight ahead reports, in metres; may be inf, NaN or 0.0."""
+    if scan is None:
+        return None
     ranges = scan.value.get("ranges")
     start, increment = number(scan.value, "angle_min"), number(scan.value, "angle_increment")
     if not isinstance(ranges, list | tuple) or not ranges or start is None or not increment:
         return None
     turned_rad = 0.0 if recording.scene is None else recording.scene.lidar.yaw_rad
     return float(ranges[round((-start - turned_rad) / increment) % len(ranges)])
-
-
-def _reported_zero(recording: Recording, step: Truth) -> bool:
-    scan = newest(recording, step.time_ns)
-    return scan is not None and _front(recording, scan) == 0.0
 
 
 def _beside(recording: Recording, scan: Message, step: Truth) -> Misreading | None:

@@ -6,12 +6,18 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import VelocityCommand, commands, number, odometry
 from grader.measure.motion.track import pose_at
 from grader.recording.model import NS, Message, Recording
 from sim.motion import Pose
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[Any]
 
 MOST_BEHIND = 2
 """Messages of odometry that are on their way, or wait for a busy callback, at most."""
@@ -93,67 +99,51 @@ def fit(samples: Sequence[Sample], limit_rad_s: float) -> Line:
     """Lay a line through the origin and the commands that are at no limit.
 
     A command at a limit is left out only if the line asks for at least that much there, so that
-    a step does not pass for a clamp.
-
-    Args:
-        samples: At least one.
+    a step does not pass for a clamp. There must be a command.
     """
-    sizes = [abs(item.command_rad_s) for item in samples]
-    highest = max(sizes)
-    lowest = min((size for size in sizes if size > ZERO_RAD_S), default=0.0)
+    import numpy as np
+
+    errors = np.array([item.error_rad for item in samples])
+    commands = np.array([item.command_rad_s for item in samples])
+    sizes, wanted = np.abs(commands), np.abs(errors)
+    highest = sizes.max()
+    lowest = sizes[sizes > ZERO_RAD_S].min(initial=highest)
     clamp = highest if _count(sizes, highest) >= _PLATEAU else math.inf
     floor = lowest if _count(sizes, lowest) >= _PLATEAU and lowest < highest else 0.0
     clamp = min(clamp, limit_rad_s * 0.999)
     high, low = clamp * (1.0 - _SAME), floor * (1.0 + _SAME)
-    inside = [item for item in samples if low < abs(item.command_rad_s) < high]
-    if len(inside) < LEAST_FIT:
+    inside = (low < sizes) & (sizes < high)
+    if inside.sum() < LEAST_FIT:
         # Without a clamp of its own the law shows in what was asked for beyond the limit too.
-        inside, high, low = list(samples), math.inf, 0.0
-    slope = _gain(inside)
-
-    def counts(item: Sample) -> bool:
-        size, wanted = abs(item.command_rad_s), slope * abs(item.error_rad)
-        if size >= high:
-            return wanted < _SHORT_OF * clamp
-        return size > low or wanted > floor / _SHORT_OF
-
-    kept = _without_strays([item for item in samples if counts(item)])
-    gain = _gain(kept)
-    return Line(gain, _r2(kept, gain), len(kept))
-
-
-def _without_strays(samples: list[Sample]) -> list[Sample]:
-    """Leave out the few commands that fit worst.
-
-    Where one phase ends and the next begins, a command or two answer the error of the other.
-    """
-    if len(samples) < _LEAST_TRIMMED:
-        return samples
-    gain = _gain(samples)
-    by_rest = sorted(samples, key=lambda item: abs(item.command_rad_s - gain * item.error_rad))
-    return by_rest[: len(samples) - math.ceil(FEW_STRAYS * len(samples))]
+        inside, high, low = sizes >= 0.0, math.inf, 0.0
+    wanted = wanted * _gain(errors[inside], commands[inside])
+    kept = (sizes > low) | (wanted > floor / _SHORT_OF)
+    kept &= (sizes < high) | (wanted < _SHORT_OF * clamp)
+    errors, commands = errors[kept], commands[kept]
+    if len(errors) >= _LEAST_TRIMMED:
+        # Where one phase ends and the next begins, a command or two answer the error of the other.
+        fitting = abs(commands - _gain(errors, commands) * errors).argsort(kind="stable")
+        fitting = fitting[: len(errors) - math.ceil(FEW_STRAYS * len(errors))]
+        errors, commands = errors[fitting], commands[fitting]
+    gain = _gain(errors, commands)
+    return Line(gain, _r2(errors, commands, gain), len(errors))
 
 
-def _count(sizes: Sequence[float], size: float) -> int:
-    return sum(math.isclose(item, size, rel_tol=_SAME) for item in sizes)
+def _count(sizes: Numbers, size: float) -> int:
+    return int((abs(sizes - size) <= _SAME * size).sum())
 
 
-def _gain(samples: Sequence[Sample]) -> float:
-    square = sum(item.error_rad**2 for item in samples)
-    product = sum(item.error_rad * item.command_rad_s for item in samples)
-    return product / square if square > 0.0 else 0.0
+def _gain(errors: Numbers, commands: Numbers) -> float:
+    square = float(errors @ errors)
+    return float(errors @ commands) / square if square > 0.0 else 0.0
 
 
-def _r2(samples: Sequence[Sample], gain: float) -> float:
+def _r2(errors: Numbers, commands: Numbers, gain: float) -> float:
     # In shares of the largest command, so that the squares of huge ones are still numbers.
-    largest = max(abs(item.command_rad_s) for item in samples) or 1.0
-    shares = [item.command_rad_s / largest for item in samples]
-    mean = sum(shares) / len(samples)
-    total = sum((share - mean) ** 2 for share in shares)
-    rest = sum(
-        (share - gain / largest * item.error_rad) ** 2
-        for share, item in zip(shares, samples, strict=True)
-    )
+    largest = float(abs(commands).max(initial=0.0)) or 1.0
+    shares = commands / largest
+    total = float(((shares - shares.mean()) ** 2).sum())
+    rest = float(((shares - gain / largest * errors) ** 2).sum())
     if total <= 0.0:
         return 1.0 if rest <= 0.0 else 0.0
     return 1.0 - rest / total

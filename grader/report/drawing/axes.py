@@ -19,14 +19,7 @@ TIME_AXIS = 40
 
 @dataclass(frozen=True)
 class Scale:
-    """A linear map from values to pixels.
-
-    Attributes:
-        low: Value at ``begin``.
-        high: Value at ``end``, more than ``low``.
-        begin: Pixel.
-        end: Pixel.
-    """
+    """A linear map from values, from ``low`` up to ``high``, to pixels."""
 
     low: float
     high: float
@@ -43,13 +36,8 @@ class Scale:
         return self(min(max(value, self.low), self.high))
 
     def all_clipped(self, values: Iterable[float]) -> list[float]:
-        """:meth:`clipped` of many values, in a fraction of the time."""
-        low, high, begin = self.low, self.high, self.begin
-        span, width = high - low, self.end - begin
-        return [
-            begin + ((low if value < low else high if value > high else value) - low) / span * width
-            for value in values
-        ]
+        """:meth:`clipped` of many values."""
+        return list(map(self.clipped, values))
 
 
 def ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:

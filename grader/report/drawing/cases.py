@@ -10,18 +10,8 @@ from markupsafe import Markup
 
 from grader.checks.finding import Case, Cases
 from grader.checks.wording import counted
+from grader.report.drawing import svg
 from grader.report.drawing.axes import RIGHT, Scale, unit_of, value_axis
-from grader.report.drawing.svg import (
-    LETTER,
-    Figure,
-    Point,
-    crosses,
-    dots,
-    element,
-    figure,
-    label,
-    line,
-)
 from grader.safe_text import one_line
 
 HEIGHT, LEFT, TOP, BOTTOM = 250, 62, 26, 42
@@ -30,7 +20,7 @@ FLOOR = 1e-9
 CEILING = 1e9
 
 
-def draw_cases(cases: Cases, name: str) -> Figure:
+def draw_cases(cases: Cases, name: str) -> svg.Figure:
     """Draw the error of each case."""
     errors = [_power_of(case.error) for case in cases.cases if case.error is not None]
     limit = _power_of(cases.limit)
@@ -45,34 +35,34 @@ def draw_cases(cases: Cases, name: str) -> Figure:
         x = Scale(0.5, max(1, len(cases.cases)) + 0.5, LEFT, width - RIGHT)
         at, span = y(limit), {"x": LEFT, "width": x.end - LEFT}
         return HEIGHT, [
-            label(cases.label, 0, 12),
-            label("case", x.end, HEIGHT - 4, anchor="end"),
-            element("rect", y=at, height=y.begin - at, class_="band", **span),
+            svg.label(cases.label, 0, 12),
+            svg.label("case", x.end, HEIGHT - 4, anchor="end"),
+            svg.element("rect", y=at, height=y.begin - at, class_="band", **span),
             *value_axis(y, LEFT, x.end, powers),
             *_groups(cases.cases, x, y),
-            line(LEFT, at, x.end, at, "band-edge"),
-            line(LEFT, y.begin, x.end, y.begin, "axis"),
+            svg.line(LEFT, at, x.end, at, "band-edge"),
+            svg.line(LEFT, y.begin, x.end, y.begin, "axis"),
             *_marks(cases, x, y),
-            label(f"limit {of_limit}", x.end, at - 5, anchor="end"),
+            svg.label(f"limit {of_limit}", x.end, at - 5, anchor="end"),
         ]
 
-    return figure(name, cases.title, _caption(cases, of_limit), draw)
+    return svg.figure(name, cases.title, _caption(cases, of_limit), draw)
 
 
 def _marks(cases: Cases, x: Scale, y: Scale) -> list[Markup]:
-    good: list[Point] = []
-    bad: list[Point] = []
+    good: list[svg.Point] = []
+    bad: list[svg.Point] = []
     drawn: list[Markup] = []
     for index, case in enumerate(cases.cases, 1):
         if case.error is None:
-            drawn.append(label("?", x(index), TOP + 9, "missing", "middle"))
+            drawn.append(svg.label("?", x(index), TOP + 9, "missing", "middle"))
             continue
         point = x(index), y.clipped(_power_of(case.error))
         (bad if _is_wrong(case, cases.limit) else good).append(point)
     if good:
-        drawn.append(dots(good, "dots"))
+        drawn.append(svg.dots(good, "dots"))
     if bad:
-        drawn.append(crosses(bad, "out"))
+        drawn.append(svg.crosses(bad, "out"))
     return drawn
 
 
@@ -82,11 +72,11 @@ def _groups(cases: Sequence[Case], x: Scale, y: Scale) -> list[Markup]:
     for group, members in groupby(cases, key=lambda case: case.group):
         last = first + len(list(members))
         if first:
-            drawn.append(line(x(first + 0.5), y.end, x(first + 0.5), y.begin, "leader"))
+            drawn.append(svg.line(x(first + 0.5), y.end, x(first + 0.5), y.begin, "leader"))
         text = one_line(group)
-        if len(text) * LETTER < x(last) - x(first):
+        if len(text) * svg.LETTER < x(last) - x(first):
             centre = (x(first + 0.5) + x(last + 0.5)) / 2.0
-            drawn.append(label(text, centre, y.begin + 18, anchor="middle"))
+            drawn.append(svg.label(text, centre, y.begin + 18, anchor="middle"))
         first = last
     return drawn
 

@@ -16,7 +16,7 @@ from grader.recording.model import NS
 from grader.recording.simulated import Scene
 from grader.report.drawing.svg import Point, element, label, line, simplified
 from sim.motion import Pose
-from sim.script import MovingObstacle
+from sim.shapes import MovingObstacle
 
 MARGIN_M = 0.15
 """Shown around what matters."""
@@ -27,13 +27,7 @@ PX = "non-scaling-stroke"
 
 @dataclass(frozen=True)
 class View:
-    """What part of a world is shown, and how large.
-
-    Attributes:
-        scale: Pixels for a metre.
-        width: Pixels.
-        height: Pixels.
-    """
+    """What part of a world is shown, and how large; ``scale`` is in pixels for a metre."""
 
     left_m: float
     top_m: float
@@ -57,9 +51,7 @@ def fit(points: Iterable[Point], scene: Scene, width: float, lowest: float, high
 
     Args:
         points: Positions that must be seen, in metres; at least one.
-        width: Of the drawing, in pixels.
-        lowest: Its least height, in pixels.
-        highest: Its greatest height, in pixels.
+        lowest: The least height of the drawing in pixels; ``width`` and ``highest`` likewise.
     """
     found = list(points)
     reach = scene.radius_m + MARGIN_M

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from grader.measure.motion.track import REST_M_S, REST_RAD_S
 from grader.recording.model import Recording
 from grader.recording.simulated import Truth
+from grader.report.drawing import svg
 from grader.report.drawing.axes import (
     LEFT,
     RIGHT,
@@ -20,16 +21,6 @@ from grader.report.drawing.axes import (
     time_axis,
     unit_of,
     value_axis,
-)
-from grader.report.drawing.svg import (
-    LETTER,
-    Figure,
-    Point,
-    curve,
-    element,
-    figure,
-    label,
-    line,
 )
 
 STRIP, PANEL, BETWEEN = 18, 110, 34
@@ -61,7 +52,7 @@ class _Speed:
     limit: float
 
 
-def draw_motion(recording: Recording, name: str) -> Figure | None:
+def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
     """Draw commands and speeds of a run; None in one without a simulated robot."""
     scene = recording.scene
     if scene is None or len(recording.truth) < 2:
@@ -101,7 +92,7 @@ def draw_motion(recording: Recording, name: str) -> Figure | None:
         f"{phase.what} from {phase.begin_s:.1f} to {phase.end_s:.1f} s" for phase in found[:20]
     )
     title = f"Commands and true speeds in the scenario {recording.scenario}"
-    return figure(name, title, caption, draw, f"{caption} The robot {described}.")
+    return svg.figure(name, title, caption, draw, f"{caption} The robot {described}.")
 
 
 def phases(recording: Recording) -> list[Phase]:
@@ -130,9 +121,9 @@ def _strip(found: Sequence[Phase], x: Scale) -> list[Markup]:
         begin, end = x.clipped(phase.begin_s), x.clipped(phase.end_s)
         width = max(1.0, end - begin - 1.5)
         kind = f"phase {phase.what.replace(' ', '-')}"
-        drawn.append(element("rect", x=begin, y=0, width=width, height=STRIP, class_=kind))
-        if len(phase.what) * LETTER + 8 < width:
-            drawn.append(label(phase.what, (begin + end) / 2.0, 13, "on-phase", "middle"))
+        drawn.append(svg.element("rect", x=begin, y=0, width=width, height=STRIP, class_=kind))
+        if len(phase.what) * svg.LETTER + 8 < width:
+            drawn.append(svg.label(phase.what, (begin + end) / 2.0, 13, "on-phase", "middle"))
     return drawn
 
 
@@ -146,22 +137,22 @@ def _panel(speed: _Speed, times_s: Sequence[float], x: Scale, top: float) -> lis
     y = Scale(low - room, high + room, top + PANEL, top)
     at = x.all_clipped(times_s)
     return [
-        label(speed.title, 0, y.end - 8),
+        svg.label(speed.title, 0, y.end - 8),
         *value_axis(y, LEFT, x.end),
-        *(line(LEFT, y(limit), x.end, y(limit), "limit") for limit in limits),
-        curve(_steps(at, y.all_clipped(speed.commands)), "command"),
-        curve(list(zip(at, y.all_clipped(speed.true), strict=True)), "true"),
+        *(svg.line(LEFT, y(limit), x.end, y(limit), "limit") for limit in limits),
+        svg.curve(_steps(at, y.all_clipped(speed.commands)), "command"),
+        svg.curve(list(zip(at, y.all_clipped(speed.true), strict=True)), "true"),
         # Over the lines, which run through the label of the lower limit.
         *(
-            label(f"limit {limit:.3g}{unit_of(speed.title)}", x.end, y(limit) - 4, anchor="end")
+            svg.label(f"limit {limit:.3g}{unit_of(speed.title)}", x.end, y(limit) - 4, anchor="end")
             for limit in limits
         ),
     ]
 
 
-def _steps(times: Sequence[float], values: Sequence[float]) -> list[Point]:
+def _steps(times: Sequence[float], values: Sequence[float]) -> list[svg.Point]:
     """A command holds until the next: no slopes between two."""
-    points: list[Point] = []
+    points: list[svg.Point] = []
     for time, value in zip(times, values, strict=True):
         if points and points[-1][1] != value:
             points.append((time, points[-1][1]))

@@ -16,18 +16,8 @@ from grader.measure.motion.quantities import metres
 from grader.measure.motion.track import first_rest, has_moved
 from grader.recording.model import NS, Recording
 from grader.recording.simulated import Scene, Truth
-from grader.report.drawing import ground_plan
+from grader.report.drawing import ground_plan, svg
 from grader.report.drawing.ground_plan import View, disc, track
-from grader.report.drawing.svg import (
-    NARROW,
-    Figure,
-    crosses,
-    element,
-    figure,
-    label,
-    line,
-    simplified,
-)
 from grader.safe_text import one_line
 from sim.motion import Pose, compose
 
@@ -48,13 +38,13 @@ class Target:
     radius_m: float
 
 
-def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Figure | None:
+def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> svg.Figure | None:
     """Draw the path of the robot; None in a scenario without a simulated robot."""
     scene, truth = recording.scene, recording.truth
     if scene is None or not truth:
         return None
     stride = max(STRIDE, len(truth) // MOST_POINTS)
-    outline = simplified(
+    outline = svg.simplified(
         [(step.x_m, step.y_m) for step in (*truth[::stride], truth[-1])], TOLERANCE_M
     )
     gone_m = [*accumulate(map(_step_m, truth, truth[1:]), initial=0.0)]
@@ -63,7 +53,7 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Fig
     shown = [*outline, *((one.pose.x_m, one.pose.y_m) for one in targets)]
 
     def draw(width: float) -> tuple[float, list[Markup]]:
-        view = ground_plan.fit(shown, scene, width, 150.0, 340.0 if width > NARROW else 300.0)
+        view = ground_plan.fit(shown, scene, width, 150.0, 340.0 if width > svg.NARROW else 300.0)
         in_world = [
             *ground_plan.world(scene, view),
             *ground_plan.moving(scene, (truth[-1].time_ns - scene.began_ns) / NS),
@@ -73,24 +63,24 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Fig
             *_robot(truth[0], scene, "robot at-start"),
             *_robot(truth[-1], scene, "robot"),
         ]
-        content = [element("g", *in_world, transform=view.matrix)]
-        content.append(element("path", d=_arrows(truth, gone_m, view), class_="arrow"))
+        content = [svg.element("g", *in_world, transform=view.matrix)]
+        content.append(svg.element("path", d=_arrows(truth, gone_m, view), class_="arrow"))
         if stopped:
             content += _stop(*stopped, scene, view)
         if touched:
             at = [view.pixel(step.x_m, step.y_m) for step in touched]
-            content.append(crosses(at, "out", 6.0))
+            content.append(svg.crosses(at, "out", 6.0))
         content += ground_plan.scale_bar(view)
         for one in targets:
             # Above its circle: below it stands the name of the robot that has come there.
             x, y = view.pixel(one.pose.x_m, one.pose.y_m)
             y = max(12.0, y - one.radius_m * view.scale - 6.0)
-            content.append(label("goal", x, y, "lane", "middle"))
+            content.append(svg.label("goal", x, y, "lane", "middle"))
         for step, text in ((truth[0], "start"), (truth[-1], "end"))[not has_moved(truth) :]:
             x, y = view.pixel(step.x_m, step.y_m)
             radius = scene.radius_m * view.scale
             y = y + radius + 15.0 if y + radius + 15.0 < view.height - 22.0 else y - radius - 6.0
-            content.append(label(text, x, y, "lane", "middle"))
+            content.append(svg.label(text, x, y, "lane", "middle"))
         return view.height, content
 
     goal = "".join(_from_goal(truth[-1], target) for target in targets)
@@ -100,7 +90,7 @@ def draw_path(recording: Recording, targets: Sequence[Target], name: str) -> Fig
     else:
         caption = f"The robot did not move.{goal}"
     title = f"Path of the robot in the scenario {recording.scenario}"
-    return figure(name, title, caption, draw)
+    return svg.figure(name, title, caption, draw)
 
 
 def _step_m(before: Truth, step: Truth) -> float:
@@ -157,8 +147,8 @@ def _stop(step: Truth, distance_m: float, scene: Scene, view: View) -> list[Mark
     x2, y2 = view.pixel(eye.x_m + distance_m * cos, eye.y_m + distance_m * sin)
     above = max(12.0, min(y1, y2) - scene.radius_m * view.scale - 8.0)
     return [
-        line(x1, y1, x2, y2, "measure"),
-        label(metres(distance_m), (x1 + x2) / 2.0, above, "lane", "middle"),
+        svg.line(x1, y1, x2, y2, "measure"),
+        svg.label(metres(distance_m), (x1 + x2) / 2.0, above, "lane", "middle"),
     ]
 
 

@@ -10,19 +10,8 @@ from markupsafe import Markup
 
 from grader.checks.finding import Plot
 from grader.checks.wording import counted
+from grader.report.drawing import svg
 from grader.report.drawing.axes import LEFT, RIGHT, Scale, ticks, unit_of, value_axis
-from grader.report.drawing.svg import (
-    NARROW,
-    Figure,
-    Point,
-    crosses,
-    curve,
-    dots,
-    element,
-    figure,
-    label,
-    line,
-)
 from grader.safe_text import one_line
 
 HEIGHT, TOP, BOTTOM = 232, 26, 42
@@ -40,7 +29,7 @@ DOTS = 120
 """Points that are still told apart; more are a line."""
 
 
-def draw_plot(plot: Plot, name: str) -> Figure:
+def draw_plot(plot: Plot, name: str) -> svg.Figure:
     """Draw a plot.
 
     Args:
@@ -62,32 +51,32 @@ def draw_plot(plot: Plot, name: str) -> Figure:
         aside = width * ASIDE if plot.histogram and points else 0.0
         x = Scale(*_span([x for x, _ in points], 0.0), LEFT, end - aside)
         content = [
-            label(plot.y_label, 0, 12),
-            label(plot.x_label, x.end, HEIGHT - 4, anchor="end"),
+            svg.label(plot.y_label, 0, 12),
+            svg.label(plot.x_label, x.end, HEIGHT - 4, anchor="end"),
         ]
         if band:
             top, bottom = y.clipped(high), y.clipped(low)
             height = max(1.0, bottom - top)
             content.append(
-                element("rect", x=LEFT, y=top, width=end - LEFT, height=height, class_="band")
+                svg.element("rect", x=LEFT, y=top, width=end - LEFT, height=height, class_="band")
             )
-            content += [line(LEFT, y(edge), end, y(edge), "band-edge") for edge in edges]
+            content += [svg.line(LEFT, y(edge), end, y(edge), "band-edge") for edge in edges]
         content += value_axis(y, LEFT, end)
-        content.append(line(LEFT, y.begin, end, y.begin, "axis"))
-        for value, text in ticks(x.low, x.high, 8 if width > NARROW else 3):
-            content.append(line(x(value), y.begin, x(value), y.begin + 5, "axis"))
-            content.append(label(text, x(value), y.begin + 18, anchor="middle"))
+        content.append(svg.line(LEFT, y.begin, end, y.begin, "axis"))
+        for value, text in ticks(x.low, x.high, 8 if width > svg.NARROW else 3):
+            content.append(svg.line(x(value), y.begin, x(value), y.begin + 5, "axis"))
+            content.append(svg.label(text, x(value), y.begin + 18, anchor="middle"))
         content += _series(points, (low, high), x, y)
         if aside:
             content += _bars(ordinates, y, x.end + GAP, end)
-            content.append(label("how many", end, HEIGHT - 4, anchor="end"))
+            content.append(svg.label("how many", end, HEIGHT - 4, anchor="end"))
         return HEIGHT, content
 
     lost = max(len(plot.x), len(plot.y)) - len(points)
-    return figure(name, plot.title, _caption(plot, ordinates, band, lost), draw)
+    return svg.figure(name, plot.title, _caption(plot, ordinates, band, lost), draw)
 
 
-def _series(points: Sequence[Point], band: Point, x: Scale, y: Scale) -> list[Markup]:
+def _series(points: Sequence[svg.Point], band: svg.Point, x: Scale, y: Scale) -> list[Markup]:
     shown = _thinned(points, x) if len(points) > MANY else points
     across, down = x.all_clipped([a for a, _ in shown]), y.all_clipped([b for _, b in shown])
     placed = list(zip(across, down, strict=True))
@@ -95,19 +84,19 @@ def _series(points: Sequence[Point], band: Point, x: Scale, y: Scale) -> list[Ma
     dense = len(placed) > DOTS
     drawn = []
     if len(placed) > 1:
-        drawn.append(curve(placed, "series dense" if dense else "series"))
+        drawn.append(svg.curve(placed, "series dense" if dense else "series"))
     good = [point for point, fits in zip(placed, inside, strict=True) if fits]
     if good and not dense:
-        drawn.append(dots(good, "dots"))
+        drawn.append(svg.dots(good, "dots"))
     if len(good) < len(placed):
         bad = [point for point, fits in zip(placed, inside, strict=True) if not fits]
-        drawn.append(crosses(_apart(bad), "out"))
+        drawn.append(svg.crosses(_apart(bad), "out"))
     return drawn
 
 
-def _apart(points: Sequence[Point]) -> list[Point]:
+def _apart(points: Sequence[svg.Point]) -> list[svg.Point]:
     """Points that are still told apart as crosses; the last of a run always stays."""
-    kept: list[Point] = []
+    kept: list[svg.Point] = []
     for point in points:
         if len(kept) > 1 and math.dist(kept[-2], point) < APART:
             kept.pop()
@@ -115,9 +104,9 @@ def _apart(points: Sequence[Point]) -> list[Point]:
     return kept
 
 
-def _thinned(points: Sequence[Point], x: Scale) -> list[Point]:
+def _thinned(points: Sequence[svg.Point], x: Scale) -> list[svg.Point]:
     """The lowest and the highest point of every pixel column, by abscissa."""
-    columns: dict[int, tuple[Point, Point]] = {}
+    columns: dict[int, tuple[svg.Point, svg.Point]] = {}
     for column, point in zip(
         map(round, x.all_clipped([a for a, _ in points])), points, strict=True
     ):
@@ -134,15 +123,15 @@ def _bars(values: Sequence[float], y: Scale, left: float, right: float) -> list[
     """How often each value occurs, as bars beside the plot, with the counts to the right."""
     counts = Counter(int((y.begin - pixel) // BIN) for pixel in y.all_clipped(values))
     most = max(counts.values())
-    drawn = [line(left, y.begin, left, y.end, "axis")]
+    drawn = [svg.line(left, y.begin, left, y.end, "axis")]
     for row, count in sorted(counts.items()):
         top = max(y.end, y.begin - (row + 1) * BIN)
         width = max(1.5, (right - left) * count / most)
         drawn.append(
-            element("rect", x=left, y=top + 1, width=width, height=BIN - 2, class_="count")
+            svg.element("rect", x=left, y=top + 1, width=width, height=BIN - 2, class_="count")
         )
-    drawn.append(label("0", left, y.begin + 18, anchor="middle"))
-    drawn.append(label(str(most), right, y.begin + 18, anchor="end"))
+    drawn.append(svg.label("0", left, y.begin + 18, anchor="middle"))
+    drawn.append(svg.label(str(most), right, y.begin + 18, anchor="end"))
     return drawn
 
 
@@ -157,7 +146,7 @@ def _span(values: Sequence[float], margin: float) -> tuple[float, float]:
     return low - room, high + room
 
 
-def _caption(plot: Plot, values: Sequence[float], band: Point | None, lost: int) -> str:
+def _caption(plot: Plot, values: Sequence[float], band: svg.Point | None, lost: int) -> str:
     parts = []
     if not values:
         parts.append("no values")
@@ -176,7 +165,7 @@ def _caption(plot: Plot, values: Sequence[float], band: Point | None, lost: int)
     return f"{one_line(plot.title)}: {', '.join(parts)}."
 
 
-def _allowed(band: Point) -> str:
+def _allowed(band: svg.Point) -> str:
     low, high = band
     if math.isinf(low):
         return f"allowed up to {high:.6g}"

@@ -34,11 +34,7 @@ _FACTORS = (1, 2, 4, 5, 10, 20, 25, 50, 100)
 
 
 def identity(environment: Mapping[str, str]) -> dict[str, str]:
-    """What the runner of Classroom 50 says of the submission, by its variables.
-
-    Raises:
-        UsageError: It is not the runner of Classroom 50 that started this.
-    """
+    """What the runner of Classroom 50 says of the submission, by its variables."""
     missing = [name for name in _IDENTITY.values() if not environment.get(name)]
     if missing:
         raise UsageError(f"not started by Classroom 50: the environment lacks {', '.join(missing)}")
@@ -51,9 +47,6 @@ def render_result(result: Result, identity: Mapping[str, str], committed: str) -
 
     Args:
         committed: When the graded commit was made, ISO 8601 in UTC; a regrade does not move it.
-
-    Raises:
-        GraderFault: There is no grade; Classroom 50 learns that from the exit code.
     """
     copy = for_student(result)
     if not copy.graded:

@@ -21,11 +21,7 @@ _SPEEDS = ("linear_m_s", "command_m_s", "angular_rad_s", "command_rad_s")
 
 
 def render_layout(recordings: Iterable[Recording]) -> str:
-    """Render the layout for the recordings of one submission.
-
-    Args:
-        recordings: All of them; a panel shows nothing where its topic was not recorded.
-    """
+    """Render the layout for all recordings of one submission, as JSON that Foxglove imports."""
     panels: dict[str, dict[str, Any]] = {}
     runs = tuple(recordings)
     if any(run.truth for run in runs):

@@ -29,14 +29,12 @@ _LEFT_OUT = ("where", "printed")
 def annotation_lines(result: Result, prefix: str | None = "") -> tuple[str, ...]:
     """Workflow commands that put the most useful findings at the student's lines.
 
+    At most :data:`MOST_ANNOTATIONS` lines: the check to fix first, then those that cost the most
+    points, and only what students get to see. What is not graded is one warning.
+
     Args:
-        result: What to tell of; only what students get to see is told.
         prefix: Folder of the submission in the repository, such as ``src/``; empty for its top,
             None where its files are not in the repository.
-
-    Returns:
-        At most :data:`MOST_ANNOTATIONS` lines: the check to fix first, then those that cost the
-        most points. What is not graded is one warning.
     """
     copy = for_student(result)
     if not copy.graded:
@@ -51,11 +49,7 @@ def annotation_lines(result: Result, prefix: str | None = "") -> tuple[str, ...]
 
 
 def summary(result: Result, used_bytes: int = 0) -> str:
-    """Markdown for ``$GITHUB_STEP_SUMMARY``.
-
-    Args:
-        result: What to tell of; only what students get to see is told.
-    """
+    """Markdown for ``$GITHUB_STEP_SUMMARY``, only of what students get to see."""
     return render_markdown(for_student(result), SUMMARY_BYTES - used_bytes)
 
 
@@ -92,11 +86,7 @@ def resume_commands(token: str) -> str:
 
 
 def command(name: str, message: str, **properties: str) -> str:
-    """Write a workflow command.
-
-    Args:
-        properties: Such as ``file``; the runner decodes them.
-    """
+    """Write a workflow command; its properties, such as ``file``, are decoded by the runner."""
     told = ",".join(f"{key}={_property(value)}" for key, value in properties.items())
     return f"::{name}{' ' if told else ''}{told}::{_data(clean(message)[:MOST_CHARACTERS])}"
 

@@ -45,12 +45,9 @@ _OPTIONAL = ("SIS User ID", "SIS Login ID", "Integration ID", "Root Account")
 class CanvasExport:
     """A gradebook as Canvas exported it.
 
-    Attributes:
-        identity: Titles of the first columns, which say who a student is.
-        points: What it says of the points of each other column: a number, ``(read only)``, or
-            nothing.
-        students: The first columns of each student.
-        excused: Of each student, the columns that Canvas excuses from.
+    ``identity`` titles the first columns, which say who a student is. ``points`` are those of each
+    other column: a number, ``(read only)``, or nothing. ``excused`` are the columns that Canvas
+    excuses each student from.
     """
 
     identity: tuple[str, ...]
@@ -63,9 +60,7 @@ class CanvasExport:
 class CanvasFile:
     """A gradebook to import into Canvas.
 
-    Attributes:
-        problems: Who could not be matched, is not graded, or is left out.
-        doubts: What an instructor should know of the column.
+    ``problems`` name who has no score in it, ``doubts`` what is odd about the column.
     """
 
     text: str
@@ -81,9 +76,6 @@ def grades_csv(rows: Sequence[ClassRow], zero: Collection[RowStatus] = ()) -> st
 
     Args:
         zero: What gets 0 points of the rows without a grade.
-
-    Raises:
-        UsageError: The results are of several assignments.
     """
     results = [row.result for row in rows if row.result is not None]
     if results:
@@ -125,11 +117,7 @@ def _score(row: ClassRow, zero: Collection[RowStatus]) -> float | None:
 
 
 def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
-    """Read a gradebook as Canvas exports it, with commas or with semicolons.
-
-    Raises:
-        UsageError: It is not one.
-    """
+    """Read a gradebook as Canvas exports it, with commas or with semicolons."""
     text = text.removeprefix("\N{BYTE ORDER MARK}")
     first = text.partition("\n")[0]
     delimiter = ";" if first.count(";") > first.count(",") else ","
@@ -184,9 +172,6 @@ def canvas_csv(
             title of the column that the export has for the assignment's id.
         zero: What gets 0 points of the rows without a grade. Students of the gradebook that no
             row fits handed in nothing too.
-
-    Raises:
-        UsageError: Canvas would drop the column or skip it, or no row fits a student.
     """
     results = [row.result for row in rows if row.result is not None]
     assignment = _one_assignment(results)

@@ -16,7 +16,7 @@ from grader.report.formats.options import FormatOptions
 from grader.report.model.result_model import CheckPart, Result
 from grader.report.model.student import for_student
 from grader.report.text import explanation
-from grader.report.text.words import STATUS
+from grader.report.text.words import STATUS, cut
 from grader.safe_text import clean, one_line
 
 # Within a word an underscore is no markup; names would be hard to read with it escaped.
@@ -42,7 +42,7 @@ def render_markdown(result: Result, most_bytes: int | None = None) -> str:
     """Render a result.
 
     Args:
-        most_bytes: Length as UTF-8 that must not be exceeded; what comes last is left out.
+        most_bytes: As UTF-8; what comes last is left out.
     """
     title = f"## {literal(result.assignment.id)}: {explanation.score(result)}"
     head = [title, "", explanation.headline(result), *first_to_fix(result), ""]
@@ -94,15 +94,11 @@ def explained(check: CheckPart, result: Result) -> str:
     lines: list[str] = []
     for row in explanation.explain(check, result):
         if row.name == "printed":
-            printed = [_cut(line) for line in row.text.splitlines()[-_LOG_LINES:]]
+            printed = [cut(line, _LINE_CHARACTERS) for line in row.text.splitlines()[-_LOG_LINES:]]
             lines += ["", fence("\n".join(printed)), ""]
         else:
             lines.append(f"- **{row.name}:** {prose(row.text)}")
     return "\n".join(lines).strip("\n")
-
-
-def _cut(line: str) -> str:
-    return line if len(line) <= _LINE_CHARACTERS else f"{line[: _LINE_CHARACTERS - 1]}…"
 
 
 def first_to_fix(result: Result) -> list[str]:

@@ -11,15 +11,11 @@ from dataclasses import dataclass
 from statistics import fmean, median
 from urllib.parse import quote
 
-from markupsafe import Markup
-
 from grader.checks.finding import Status
 from grader.report.drawing.distribution import draw_distribution
-from grader.report.drawing.svg import element
 from grader.report.html.page import render_page
 from grader.report.model.class_row import ClassRow, RowStatus
-from grader.report.model.result_model import CheckPart, ScenarioPart
-from grader.report.text.words import STATUS, number
+from grader.report.model.result_model import ScenarioPart
 from grader.safe_text import one_line
 
 MOST_DISTURBED = 50
@@ -49,7 +45,7 @@ def render_overview(rows: Sequence[ClassRow]) -> str:
         rows=rows,
         columns=columns,
         failed_most=sorted(failed, key=lambda column: -column.counts[Status.FAILED]),
-        lines=[_line(row, columns) for row in rows],
+        cells=[{check.id: check for check in row.judged} for row in rows],
         scores=scores,
         middle=median(scores) if scores else 0.0,
         mean=fmean(scores) if scores else 0.0,
@@ -72,29 +68,6 @@ def _columns(rows: Sequence[ClassRow]) -> list[Column]:
             column = found.setdefault(check.id, Column(check.id, check.title, Counter()))
             column.counts[check.status] += 1
     return list(found.values())
-
-
-def _line(row: ClassRow, columns: Sequence[Column]) -> Markup:
-    """The cells of a row, each a link to the check in the report.
-
-    Made by hand and not by the template: a class has tens of thousands of them.
-    """
-    checks = {check.id: check for check in row.judged}
-    page = _link(row)
-    return Markup("").join(_cell(checks.get(column.id), page) for column in columns)
-
-
-def _cell(check: CheckPart | None, page: str) -> Markup:
-    if check is None:
-        return Markup("<td></td>")
-    status, word = check.status.value, STATUS[check.status].word
-    partial = check.status is Status.FAILED and check.points > 0.0
-    said = f"{word}, {number(check.points)}" if partial else word
-    kind = f"{status} partial" if partial else status
-    if not page:
-        return element("td", element("span", said, class_=kind))
-    anchor = f"{page}#check-{quote(check.id)}"
-    return element("td", element("a", said, class_=kind, href=anchor))
 
 
 def _link(row: ClassRow) -> str:

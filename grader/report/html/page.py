@@ -38,16 +38,9 @@ def render_page(
         values: What the template prints.
     """
     style, code = "".join(map(_asset, styles)), _asset(script) if script else ""
-    return (
-        environment()
-        .get_template(template)
-        .render(
-            values,
-            style=Markup(style),
-            script=Markup(code),
-            policy=_content_security_policy(style, code) + policy,
-        )
-    )
+    values |= {"style": Markup(style), "script": Markup(code)}
+    values["policy"] = _content_security_policy(style, code) + policy
+    return environment().get_template(template).render(values)
 
 
 @cache
@@ -60,15 +53,14 @@ def _content_security_policy(style: str, script: str) -> str:
 
     https://www.w3.org/TR/CSP3/
     """
-    scripts = _hash_of(script) if script else "'none'"
+    sources = [
+        f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'" if text else "'none'"
+        for text in (style, script)
+    ]
     return (
-        f"default-src 'none'; style-src {_hash_of(style)}; script-src {scripts}; "
+        f"default-src 'none'; style-src {sources[0]}; script-src {sources[1]}; "
         "base-uri 'none'; form-action 'none'"
     )
-
-
-def _hash_of(text: str) -> str:
-    return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
 @cache

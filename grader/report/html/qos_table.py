@@ -16,9 +16,7 @@ POLICIES = ("reliability", "durability", "deadline", "liveliness")
 class Pair:
     """A publisher and a subscription on one topic, each its node or ``the grader``.
 
-    Attributes:
-        cells: Policy, what is offered, what is requested.
-        refused: Policies that keep messages from passing.
+    ``cells`` are policy, what is offered and what is requested.
     """
 
     topic: str

@@ -42,11 +42,7 @@ _NUMBERS = tuple(high + low for high in DIGITS for low in DIGITS)
 
 
 def make_replay(recording: Recording, scenario: Scenario) -> Replay | None:
-    """Make the replay of a run, or None in a scenario without a simulated robot.
-
-    Args:
-        scenario: What was run; it knows the units of the random values.
-    """
+    """Make the replay of a run, or None in a scenario without a simulated robot."""
     scene, truth = recording.scene, recording.truth
     if scene is None or len(truth) < 2:
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import accumulate
+from functools import partial
 
 from markupsafe import Markup
 
@@ -13,19 +13,22 @@ from grader.recording.event import Breach
 from grader.recording.model import Recording
 from grader.report.drawing.callbacks import draw_callbacks
 from grader.report.drawing.cases import draw_cases
+from grader.report.drawing.motion import draw_motion
+from grader.report.drawing.path import draw_path
 from grader.report.drawing.plot import draw_plot
 from grader.report.drawing.svg import Figure
+from grader.report.drawing.timeline import draw_timeline
 from grader.report.html.comparison import SIGNS, align
 from grader.report.html.page import render_page
+from grader.report.html.qos_table import pairs
 from grader.report.html.replay import Replay, embedded, make_replay, with_goals
-from grader.report.html.sections import Section, draw_run, make_sections
+from grader.report.html.sections import Section, make_sections
 from grader.report.model.output import shorten
 from grader.report.model.result_model import Result
+from grader.report.model.target import targets
 from grader.submission.record import BuildRecord
 
 NO_REFERENCE: Mapping[str, Replay] = {}
-NO_POINTS = 0.15
-"""Width of a check without points, as if it gave these."""
 CONTEXT = 6
 """Lines of a build log that are shown around the student's own."""
 MOST_PLACES = 3
@@ -57,11 +60,6 @@ def render_report(
         first=next((one for one in result.checks if one.id == result.first_to_fix), None),
         titles={check.id: check.title for check in result.checks},
         sections=sections,
-        pictures={
-            section.id: draw_run(section, result, assignment, alone=len(runs) == 1)
-            for section in sections
-        },
-        shares=shares(result),
         faults=_faults(result),
         replays=_replays(grade, sections, references),
         runs=runs,
@@ -74,6 +72,11 @@ def render_report(
         build_lines=build_lines,
         draw_callbacks=draw_callbacks,
         draw_cases=draw_cases,
+        draw_motion=draw_motion,
+        draw_path=draw_path,
+        draw_timeline=draw_timeline,
+        pairs=pairs,
+        targets=partial(targets, assignment),
         limit_reached=_limit_reached,
         shorten=shorten,
     )
@@ -103,17 +106,6 @@ class Gallery:
         if folded:
             self._folded.add(name)
         return name, draw_plot(plot, name)
-
-
-def shares(result: Result) -> list[tuple[float, float, Status]]:
-    """Begin and width of the part of a bar, 1000 wide, that stands for the points of each check."""
-    widths = [max(check.max_points, NO_POINTS) for check in result.checks]
-    scale = 1000.0 / (sum(widths) or 1.0)
-    begins = accumulate(widths, initial=0.0)
-    return [
-        (begin * scale, max(1.0, width * scale - 4.0), check.status)
-        for begin, width, check in zip(begins, widths, result.checks, strict=False)
-    ]
 
 
 def _faults(result: Result) -> list[str]:

@@ -3,36 +3,45 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from grader.assignment.model import Assignment, Scenario
+from grader.assignment.model import Scenario
 from grader.checks.finding import Status
 from grader.grade.model import Grade, total
 from grader.recording.model import Recording
-from grader.report.drawing.motion import draw_motion
-from grader.report.drawing.path import draw_path
-from grader.report.drawing.svg import Figure
-from grader.report.drawing.timeline import draw_timeline
-from grader.report.html.qos_table import Pair, pairs
 from grader.report.model.result_model import CheckPart, FindingPart, Result
-from grader.report.model.target import targets
 
 
 @dataclass(frozen=True)
 class Section:
-    """Checks that belong together.
-
-    Attributes:
-        scenario: The scenario, or None.
-        recording: Its recording, or None where there is none.
-    """
+    """Checks that belong together; of a scenario with its recording and all its findings."""
 
     id: str
     title: str
     checks: tuple[CheckPart, ...]
     scenario: Scenario | None = None
     recording: Recording | None = None
+    findings: tuple[FindingPart, ...] = ()
+
+    @property
+    def lost(self) -> bool:
+        """Whether something was lost in the run, or a limit reached."""
+        reached = self.recording is not None and bool(self.recording.breaches)
+        return reached or any(
+            finding.status in (Status.FAILED, Status.ERROR) for finding in self.findings
+        )
+
+    @property
+    def moments_s(self) -> list[float]:
+        """Times that findings which did not pass point at, in seconds since launch."""
+        return [
+            moment.time_s
+            for finding in self.findings
+            if finding.status is not Status.PASSED
+            for moment in finding.evidence.moments
+            if math.isfinite(moment.time_s)
+        ]
 
     @property
     def points(self) -> float:
@@ -43,21 +52,6 @@ class Section:
     def max_points(self) -> float:
         """Points that it gives."""
         return total(check.max_points for check in self.checks)
-
-
-@dataclass(frozen=True)
-class Pictures:
-    """What is shown of a run; None or nothing where there is nothing to show.
-
-    Attributes:
-        open: Whether they are shown at once: something was lost in this run, or a limit reached.
-    """
-
-    open: bool
-    path: Figure | None
-    motion: Figure | None
-    timeline: Figure | None
-    qos: tuple[Pair, ...]
 
 
 def make_sections(
@@ -84,36 +78,12 @@ def make_sections(
         title = scenario.title.rstrip(".") or f"Scenario {scenario.id}"
         # What no visible check judges, a student does not get to see.
         recording = None if is_copy and scenario.id not in seen else recordings.get(scenario.id)
-        sections.append(Section(f"run-{scenario.id}", title, of(scenario.id), scenario, recording))
+        found = tuple(
+            finding
+            for check in result.checks
+            for finding in check.findings
+            if finding.scenario == scenario.id
+        )
+        checks = of(scenario.id)
+        sections.append(Section(f"run-{scenario.id}", title, checks, scenario, recording, found))
     return [section for section in sections if section.checks or section.recording]
-
-
-def draw_run(
-    section: Section, result: Result, assignment: Assignment, *, alone: bool
-) -> Pictures | None:
-    """Draw what there is of a section's run, or None where it has none."""
-    if section.scenario is None or section.recording is None:
-        return None
-    name, recording = section.scenario.id, section.recording
-    findings = [
-        finding for check in result.checks for finding in check.findings if finding.scenario == name
-    ]
-    lost = any(finding.status in (Status.FAILED, Status.ERROR) for finding in findings)
-    return Pictures(
-        alone or bool(recording.breaches) or lost,
-        draw_path(recording, targets(assignment, name, recording.values), f"path-{name}"),
-        draw_motion(recording, f"motion-{name}"),
-        draw_timeline(recording, _moments(findings), f"line-{name}"),
-        pairs(recording),
-    )
-
-
-def _moments(findings: Collection[FindingPart]) -> list[float]:
-    """Times that findings which did not pass point at, in seconds since launch."""
-    return [
-        moment.time_s
-        for finding in findings
-        if finding.status is not Status.PASSED
-        for moment in finding.evidence.moments
-        if math.isfinite(moment.time_s)
-    ]

@@ -1,7 +1,7 @@
 """The part of a result that is the grade, and what of two grades differs.
 
-Whoever grades the same submission again, on a busier machine or beside other submissions, gets
-the same grade, byte for byte. Times, paths, logs, observed figures and the evidence that holds
+The same submission graded again, on a busier machine or beside other submissions, gets the same
+grade, byte for byte. Times, paths, logs, observed figures and the evidence that holds
 them are measurements: they are never twice the same.
 """
 
@@ -25,7 +25,7 @@ _CHECK = _FINDING | {
 }
 GRADE: dict[str, Any] = {
     "assignment": {"id", "sha256"},
-    # Its name is not among it: the same submission of somebody else gets the same grade.
+    # Its name is not among it: the same submission of another student gets the same grade.
     "submission": {"sha256", "problem"},
     "score": True,
     "max_score": True,
@@ -48,11 +48,7 @@ def grade_json(result: Result) -> str:
 
 
 def differences(one: str, other: str) -> list[str]:
-    """Say what differs between two grades.
-
-    Returns:
-        One line each; nothing where they are identical.
-    """
+    """Say what differs between two grades, one line each."""
     return list(_differences("", json.loads(one), json.loads(other)))
 
 

@@ -40,10 +40,8 @@ def shorten(recording: Recording) -> Output:
     """The output of a run, without its middle where it is long."""
     lines = tuple(replace(entry, text=_cut(entry.text)) for entry in printed(recording))
     dropped = sum(process.dropped_bytes for process in recording.processes)
-    left_out = max(0, len(lines) - 2 * KEPT_LINES)
-    if not left_out:
-        return Output(lines, (), 0, dropped)
-    return Output(lines[:KEPT_LINES], lines[-KEPT_LINES:], left_out, dropped)
+    tail = lines[KEPT_LINES:][-KEPT_LINES:]
+    return Output(lines[:KEPT_LINES], tail, max(0, len(lines) - 2 * KEPT_LINES), dropped)
 
 
 def _cut(text: str) -> str:

@@ -13,21 +13,10 @@ from grader.checks.finding import Status
 from grader.errors import UsageError
 from grader.grade.model import CheckResult, Grade, ScenarioFinding
 from grader.recording.model import NS, Recording
+from grader.report.model import result_model as model
 from grader.report.model.facts import RunFacts
 from grader.report.model.remarks import remarks
-from grader.report.model.result_model import (
-    SCHEMA,
-    AssignmentPart,
-    CheckPart,
-    DisturbancePart,
-    FindingPart,
-    Result,
-    ResultSchema,
-    ScenarioPart,
-    SubmissionPart,
-    WithheldPart,
-    jsonable,
-)
+from grader.report.model.result_model import SCHEMA, Result
 
 
 def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFacts) -> Result:
@@ -41,12 +30,12 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
     return Result(
         schema_=SCHEMA,
         rosgrade_version=facts.rosgrade_version,
-        assignment=AssignmentPart(
+        assignment=model.AssignmentPart(
             id=grade.assignment.id,
             sha256=grade.assignment_sha256,
             location=grade.assignment_location,
         ),
-        submission=SubmissionPart(
+        submission=model.SubmissionPart(
             id=submission.id, sha256=submission.sha256, problem=submission.problem
         ),
         score=grade.score if grade.graded else None,
@@ -54,7 +43,7 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
         graded=grade.graded,
         first_to_fix=first.id if first else None,
         checks=tuple(map(_check, grade.results)),
-        withheld=WithheldPart(checks=grade.withheld.checks, points=grade.withheld.points),
+        withheld=model.WithheldPart(checks=grade.withheld.checks, points=grade.withheld.points),
         scenarios=tuple(
             _scenario(recordings[scenario.id], facts)
             for scenario in grade.assignment.scenarios
@@ -69,16 +58,12 @@ def make_result(grade: Grade, recordings: Mapping[str, Recording], facts: RunFac
 
 def result_json(result: Result) -> str:
     """Write a result as JSON; keys are always in the same order."""
-    data = jsonable(result.model_dump(mode="json", by_alias=True))
+    data = model.jsonable(result.model_dump(mode="json", by_alias=True))
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def read_result(file: Path) -> Result:
-    """Read a ``result.json``.
-
-    Raises:
-        UsageError: There is none, it is not one, or it has a schema that is not ours.
-    """
+    """Read a ``result.json`` of the schema that this rosgrade writes."""
     data = read_json(file)
     schema = data.get("schema") if isinstance(data, dict) else None
     if schema != SCHEMA:
@@ -95,11 +80,7 @@ def read_result(file: Path) -> Result:
 
 
 def read_json(file: Path) -> Any:
-    """Read JSON.
-
-    Raises:
-        UsageError: The file cannot be read, or is not JSON.
-    """
+    """Read JSON."""
     try:
         return json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
@@ -110,13 +91,13 @@ def read_json(file: Path) -> Any:
 
 def result_schema() -> dict[str, Any]:
     """The JSON Schema of ``result.json``."""
-    return Result.model_json_schema(schema_generator=ResultSchema, mode="serialization")
+    return Result.model_json_schema(schema_generator=model.ResultSchema, mode="serialization")
 
 
-def _check(result: CheckResult) -> CheckPart:
+def _check(result: CheckResult) -> model.CheckPart:
     decisive = result.decisive
     missed = result.status in (Status.FAILED, Status.SKIPPED)
-    return CheckPart(
+    return model.CheckPart(
         **_finding(decisive),
         id=result.id,
         title=result.title,
@@ -126,7 +107,7 @@ def _check(result: CheckResult) -> CheckPart:
         author_hint=result.hint if missed else "",
         waits_for=result.waits_for,
         other_scenarios=tuple(
-            FindingPart(**_finding(item)) for item in result.findings if item is not decisive
+            model.FindingPart(**_finding(item)) for item in result.findings if item is not decisive
         ),
     )
 
@@ -142,15 +123,15 @@ def _finding(item: ScenarioFinding) -> dict[str, Any]:
     }
 
 
-def _scenario(recording: Recording, facts: RunFacts) -> ScenarioPart:
+def _scenario(recording: Recording, facts: RunFacts) -> model.ScenarioPart:
     name, begin, end = recording.scenario, recording.launched_ns, recording.end_ns
-    return ScenarioPart(
+    return model.ScenarioPart(
         id=name,
         seed=recording.seed,
         recording=facts.recordings.get(name),
         ending=recording.ending.value,
         duration_s=(end - begin) / NS,
-        disturbance=DisturbancePart(
+        disturbance=model.DisturbancePart(
             taken_s=recording.stolen_s(begin, end),
             worst_late_s=max((item.late_ns for item in recording.disturbance), default=0) / NS,
         ),

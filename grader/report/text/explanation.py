@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from grader.checks.finding import Status
 from grader.checks.wording import counted, listing
 from grader.grade import model as grades
 from grader.grade.model import total
 from grader.report.model.result_model import CheckPart, FindingPart, Result
-from grader.report.text.words import ADVICE, STATUS, counted_points, number
+from grader.report.text.words import ADVICE, STATUS, counted_points, cut, number
 from grader.safe_text import clean, one_line
 from grader.submission.record import SourceError
 
@@ -20,15 +20,8 @@ MOST_CHARACTERS = 500
 """Of a note; names in it are the student's."""
 
 
-@dataclass(frozen=True)
-class Row:
-    """One thing that is said.
-
-    Attributes:
-        name: What it is: ``scenario``, ``expected``, ``observed``, ``try next``, ``also``,
-            ``where``, ``printed`` or ``waiting``.
-        text: Cleaned; ``printed`` has several lines.
-    """
+class Row(NamedTuple):
+    """One thing that is said, such as what was ``observed``; ``printed`` has several lines."""
 
     name: str
     text: str
@@ -90,13 +83,8 @@ def plain(check: CheckPart, result: Result) -> str:
     )
 
 
-@dataclass(frozen=True)
-class Notes:
-    """What is worth knowing of the runs, beside the checks.
-
-    Attributes:
-        lines: One line each; between backticks stands code.
-    """
+class Notes(NamedTuple):
+    """What is worth knowing of the runs, a line each; between backticks stands code."""
 
     title: str
     lines: tuple[str, ...]
@@ -115,15 +103,11 @@ def _lines(found: Sequence[tuple[str, str]]) -> tuple[str, ...]:
     for text, run in found:
         runs.setdefault(one_line(text), []).append(one_line(run))
     lines = [
-        f"scenario{'s' if len(names) > 1 else ''} {listing(names)}: {_cut(text)}"
+        f"scenario{'s' if len(names) > 1 else ''} {listing(names)}: {cut(text, MOST_CHARACTERS)}"
         for text, names in list(runs.items())[:MOST_NOTES]
     ]
     left_out = len(runs) - len(lines)
     return (*lines, f"{left_out} more: see the report") if left_out else tuple(lines)
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= MOST_CHARACTERS else f"{text[: MOST_CHARACTERS - 1]}…"
 
 
 def points(check: CheckPart) -> str:

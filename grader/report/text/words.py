@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from grader.checks.finding import Status
 from grader.recording.model import Ending
 
 
-@dataclass(frozen=True)
-class StatusWords:
+class StatusWords(NamedTuple):
     """A status for people; the symbol tells it without colour, and in ASCII too."""
 
     word: str
@@ -59,3 +58,8 @@ def number(value: float) -> str:
 def counted_points(points: float) -> str:
     """``1 point``, ``2.5 points``."""
     return f"{number(points)} point{'' if points == 1 else 's'}"
+
+
+def cut(text: str, most: int) -> str:
+    """The beginning of a text that is too long."""
+    return text if len(text) <= most else f"{text[: most - 1]}…"

@@ -128,7 +128,7 @@ class Cell:
             self._faults += self._students.faults()
             breaches = self._watchdog.stop() if self._watchdog is not None else ()
         written = self._output.close(_PIPES_LIMIT_S)
-        log = sorted((*written, *self._probe.rosout.lines), key=lambda line: line.time_ns)
+        log = sorted((*written, *self._probe.logs), key=lambda line: line.time_ns)
         disturbance = self._meter.stop()
         processes = self._students.records()
         out_of_memory = machine_faults.out_of_memory(processes, breaches)

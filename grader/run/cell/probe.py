@@ -79,41 +79,6 @@ def told_of_matches(on_match: Callable[[Any], None]) -> SubscriptionEventCallbac
     return SubscriptionEventCallbacks(matched=on_match, use_default_callbacks=False)
 
 
-class RosoutLog:
-    """Subscribes to /rosout; the probe itself publishes nothing there."""
-
-    def __init__(self) -> None:
-        self._kept = KeptLines(0)
-
-    def listen(self, node: Node, limit_bytes: int, on_match: Callable[[Any], None]) -> None:
-        """Keep what comes from now on, and what was published before a logger was matched."""
-        self._kept = KeptLines(limit_bytes)
-        profile = QoSProfile(
-            depth=_ROSOUT_DEPTH,
-            reliability=ReliabilityPolicy.RELIABLE,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL,
-        )
-        events = told_of_matches(on_match)
-        node.create_subscription(Log, _ROSOUT, self._take, profile, event_callbacks=events)
-
-    @property
-    def lines(self) -> tuple[LogLine, ...]:
-        """Everything kept so far, in the order of its arrival."""
-        return tuple(self._kept.lines)
-
-    def _take(self, record: Any) -> None:
-        stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
-        if stamp_ns < 0:
-            # What is recorded has a time after 1970.
-            stamp_ns = time.time_ns()
-        name, text = (
-            str(value)[:longest].encode(errors="replace").decode()
-            for value, longest in ((record.name, _LONGEST_NAME), (record.msg, _LONGEST))
-        )
-        level = _LEVELS.get(int(record.level), str(record.level))
-        self._kept.add(LogLine(stamp_ns, name, "rosout", text, level))
-
-
 class Probe:
     """Subscribes to the scenario's topics and calls parameter services.
 
@@ -142,7 +107,7 @@ class Probe:
         self._clients: dict[str, Any] = {}
         self._calls: dict[str, list[_Pending]] = {}
         self.messages: list[RawMessage] = []
-        self.rosout = RosoutLog()
+        self._logs = KeptLines(0)
         self.counts: dict[str, int] = {}
         self._kept: dict[tuple[str, str], int] = {}
         self.last_message_ns: int | None = None
@@ -153,7 +118,11 @@ class Probe:
     def listen(self, topics: tuple[Topic, ...], limits: RunLimits) -> None:
         """Record topics from now on."""
         self._limits = limits
-        self.rosout.listen(self.node, limits.output_bytes, self._note_match)
+        self._logs = KeptLines(limits.output_bytes)
+        # Also what was published before the probe was matched.
+        profile = qos_profile("reliable", "transient_local", _ROSOUT_DEPTH)
+        events = told_of_matches(self._note_match)
+        self.node.create_subscription(Log, _ROSOUT, self._take_log, profile, event_callbacks=events)
         for topic in topics:
             self._topics[topic.name] = topic
             if not topic.ours:
@@ -267,6 +236,22 @@ class Probe:
         return self.node.create_subscription(
             import_interface(type), topic, receive, profile, event_callbacks=events, raw=True
         )
+
+    @property
+    def logs(self) -> list[LogLine]:
+        """What loggers published on /rosout so far, within bounds."""
+        return self._logs.lines
+
+    def _take_log(self, record: Any) -> None:
+        stamp_ns = record.stamp.sec * NS + record.stamp.nanosec
+        name, text = (
+            str(value)[:longest].encode(errors="replace").decode()
+            for value, longest in ((record.name, _LONGEST_NAME), (record.msg, _LONGEST))
+        )
+        level = _LEVELS.get(int(record.level), str(record.level))
+        # What is recorded has a time after 1970.
+        time_ns = stamp_ns if stamp_ns >= 0 else time.time_ns()
+        self._logs.add(LogLine(time_ns, name, "rosout", text, level))
 
     def _note_match(self, _: Any) -> None:
         self._has_met = True

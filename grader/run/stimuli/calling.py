@@ -6,10 +6,9 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from grader.recording.event import Wait
 from grader.recording.model import NS
 from grader.run.host.disturbance import Stopwatch
-from grader.run.stimuli.context import Playing, StimulusContext, plays
+from grader.run.stimuli.context import Patience, Playing, StimulusContext, plays
 from grader.run.stimuli.service_calls import NO_SERVER
 
 _POLL_S = 0.02
@@ -42,18 +41,21 @@ class Readiness:
     """Waits until a server of the student's is there and its node spins."""
 
     def __init__(self, what: str, service: str, context: StimulusContext) -> None:
-        self._what = what
         self._service = service
         self._context = context
-        self._began_ns = 0
+        self._patience = Patience(what, context)
         self._there: Stopwatch | None = None
         self.there_ns = 0
-        self.given_up = False
+
+    @property
+    def given_up(self) -> bool:
+        """Whether the server is not expected any more."""
+        return self._patience.given_up
 
     @property
     def is_in_vain(self) -> bool:
         """Whether the server is waited for, and is not there."""
-        return self._began_ns > 0 and self._there is None
+        return self._patience.began_ns > 0 and self._there is None
 
     @property
     def never_answered(self) -> bool:
@@ -72,15 +74,9 @@ class Readiness:
         A request during a constructor would be late through no fault of the server's: its node
         has to answer another call first, unless it does not in the time that it has to start.
         """
-        self._began_ns = self._began_ns or time.time_ns()
-        if not is_there:
+        if not self._patience.look(is_there):
             self._there = None
-            settle_s = self._context.limits.settle_s
-            if not self.given_up and self._context.calm_s > settle_s:
-                self.given_up = True
-                self._context.waits.append(Wait(self._what, settle_s, self._began_ns))
             return False
-        self.given_up = False
         if self._there is None:
             self._there, self.there_ns = Stopwatch(self._context.meter), time.time_ns()
         if self._there.elapsed_s < _GRACE_S:

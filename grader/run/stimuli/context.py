@@ -103,6 +103,27 @@ class StimulusContext:
         ) or self.is_set_up
 
 
+class Patience:
+    """Waits for something of the student's, until nothing in the graph has changed for long."""
+
+    def __init__(self, what: str, context: StimulusContext) -> None:
+        self._what = what
+        self._context = context
+        self.began_ns = 0
+        self.given_up = False
+
+    def look(self, is_there: bool) -> bool:
+        """Note whether it is there; when it is given up, the wait is recorded."""
+        self.began_ns = self.began_ns or time.time_ns()
+        settle_s = self._context.limits.settle_s
+        if is_there:
+            self.given_up = False
+        elif not self.given_up and self._context.calm_s > settle_s:
+            self.given_up = True
+            self._context.waits.append(Wait(self._what, settle_s, self.began_ns))
+        return is_there
+
+
 class Playing:
     """One stimulus being played; its clock starts with the first match.
 

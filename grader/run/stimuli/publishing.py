@@ -9,13 +9,12 @@ from typing import Any
 from rclpy.serialization import serialize_message
 
 from grader.measure.compatibility import refusals
-from grader.recording.event import Wait
 from grader.recording.mcap_writer import RawMessage
 from grader.recording.model import Kind, Qos
 from grader.run.cell.probe import import_interface, qos_profile
 from grader.run.host.disturbance import Stopwatch
 from grader.run.stimuli.answers import Answers
-from grader.run.stimuli.context import Playing, StimulusContext, plays
+from grader.run.stimuli.context import Patience, Playing, StimulusContext, plays
 from grader.run.stimuli.filling import filled
 
 _POLL_S = 0.02
@@ -63,14 +62,13 @@ class Publishing(Playing):
             qos_profile(order.reliability, order.durability, order.depth),
         )
         self._sent = 0
-        self._began_ns = 0
+        self._patience = Patience(f"a subscription on {order.topic}", context)
         self._ready_s: float | None = None
         self._next_s: float | None = None
         self._answers = Answers(order.within_s)
         self._since_sent = Stopwatch(context.meter)
         self._read = 0
         self._now_s = 0.0
-        self._given_up = False
         for _ in range(min(order.before_launch, len(order.messages))):
             self._publish()
 
@@ -78,7 +76,7 @@ class Publishing(Playing):
     def is_done(self) -> bool:
         """Whether everything was published, with its answer; or nothing ever subscribed."""
         order = self._order
-        if order.repeat_s is not None or self._given_up:
+        if order.repeat_s is not None or self._patience.given_up:
             return True
         if self._sent < len(order.messages):
             return False
@@ -121,17 +119,9 @@ class Publishing(Playing):
         return self._order.repeat_s or 0.0
 
     def _await_listener(self, elapsed_s: float) -> None:
-        if not self._began_ns:
-            self._began_ns = time.time_ns()
-        if not self._is_listened_to():
+        if not self._patience.look(self._is_listened_to()):
             self._ready_s = None
-            settle_s = self._context.limits.settle_s
-            if not self._given_up and self._context.calm_s > settle_s:
-                self._given_up = True
-                what = f"a subscription on {self._order.topic}"
-                self._context.waits.append(Wait(what, settle_s, self._began_ns))
             return
-        self._given_up = False
         if self._ready_s is None:
             self._ready_s = elapsed_s
         if elapsed_s - self._ready_s >= _GRACE_S:

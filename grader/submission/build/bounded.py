@@ -24,12 +24,7 @@ _LONGEST_LINE = 4096
 
 @dataclass(frozen=True)
 class OutputLimits:
-    """How much of the output is kept, and how much ends the command.
-
-    Attributes:
-        head: Bytes kept of its beginning.
-        tail: Bytes kept of its end.
-    """
+    """How many bytes of the output are kept at its beginning and end, and how many end it."""
 
     head: int = 64 * 1024
     tail: int = 64 * 1024
@@ -101,9 +96,6 @@ def run_bounded(
     Args:
         excess: Called several times a second with the id of the process that everything
             descends from; names the limit that was passed, which ends the command.
-
-    Raises:
-        GraderFault: It could not be started or supervised.
     """
     limits = output or OutputLimits()
     kept = CappedOutput(limits, on_line)

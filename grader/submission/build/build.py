@@ -44,11 +44,7 @@ class BuildKilled(GraderFault):
 
 
 def once_more(attempt: Callable[[bool], _T]) -> _T:
-    """Build, and build again if the first build was killed.
-
-    Args:
-        attempt: Builds from the beginning; gets whether it is the second time.
-    """
+    """Build, and build again if the first build was killed."""
     try:
         return attempt(False)
     except BuildKilled:
@@ -59,10 +55,7 @@ def once_more(attempt: Callable[[bool], _T]) -> _T:
 class Builder(BuildSetting):
     """Builds submissions in one setting, or takes them from the cache.
 
-    Attributes:
-        cache: Where builds are kept; failed ones too, but not those that were ended by the
-            time limit.
-        is_second: Whether the first attempt was killed.
+    The cache keeps failed builds, too, but not those that the time limit ended.
     """
 
     cache: BuildCache
@@ -80,14 +73,11 @@ class Builder(BuildSetting):
         """Build all packages of a submission, unless just this was built before.
 
         Args:
-            located: The submission; its private copy is where the build runs, so read from it
-                what you need before.
+            located: The submission; the build runs in its private copy and may change it.
             standalone: Packages that are built for themselves, as if handed in alone.
 
         Raises:
             BuildKilled: It was ended by no limit of ours.
-            GraderFault: It could not be built here, for no fault of the student: colcon is
-                missing, the disk is full.
         """
         wall_s = self.limits.python_s if only_python else self.limits.other_s
         key = build_key(located.sha256, self.ros, self.limits, self.sandbox, is_standalone)

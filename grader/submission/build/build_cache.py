@@ -36,19 +36,10 @@ _PRUNED = "pruned.stamp"
 _PRUNE_EACH_S = 600.0
 _LOCK_POLL_S = 0.05
 _STALE_S = 24 * 3600.0
-
-
-@dataclass(frozen=True)
-class CacheLimits:
-    """When old builds are thrown away.
-
-    Attributes:
-        safe_s: A build that was used within this time is never thrown away: it may be running.
-    """
-
-    total_bytes: int = 2 * 2**30
-    age_s: float = 30 * 24 * 3600.0
-    safe_s: float = 3600.0
+_MOST_BYTES = 2 * 2**30
+_MOST_AGE_S = 30 * 24 * 3600.0
+# A build that was used within this time may be running.
+_IN_USE_S = 3600.0
 
 
 @dataclass(frozen=True)
@@ -82,10 +73,9 @@ class BuildCache:
     A folder that cannot be used is a :class:`GraderFault`.
     """
 
-    def __init__(self, folder: Path, limits: CacheLimits | None = None) -> None:
+    def __init__(self, folder: Path) -> None:
         """Name the folder; it is made when something is stored."""
         self._folder = folder / BUILDS
-        self._limits = limits or CacheLimits()
 
     @contextlib.contextmanager
     def locked(self, key: str, wait_s: float) -> Iterator[None]:
@@ -170,12 +160,12 @@ class BuildCache:
             if folder.name.startswith(_UNFINISHED):
                 if now - used > _STALE_S:
                     remove_tree(folder)
-            elif folder.is_dir() and folder.name != keep and now - used > self._limits.safe_s:
+            elif folder.is_dir() and folder.name != keep and now - used > _IN_USE_S:
                 entry = _read(folder)
                 builds.append((used, folder, entry.size if entry else 0))
         total = sum(size for _, _, size in builds)
         for used, folder, size in sorted(builds, key=lambda item: item[0]):
-            if now - used > self._limits.age_s or total > self._limits.total_bytes:
+            if now - used > _MOST_AGE_S or total > _MOST_BYTES:
                 remove_tree(folder)
                 (self._folder / f"{folder.name}.lock").unlink(missing_ok=True)
                 total -= size

@@ -41,12 +41,7 @@ _PROGRESS = re.compile(r"(Starting|Finished|Failed|Aborted) +(?:>>>|<<<) (\S+)")
 
 @dataclass(frozen=True)
 class BuildLimits:
-    """How much a build may take.
-
-    Attributes:
-        python_s: Wall time where every package is pure Python.
-        other_s: Wall time where one is not.
-    """
+    """How much a build may take: wall time of pure Python packages, and of others, and space."""
 
     python_s: float = 120.0
     other_s: float = 300.0
@@ -76,12 +71,7 @@ class BuildSetting:
 
 @dataclass(frozen=True)
 class Colcon:
-    """colcon for one submission.
-
-    Attributes:
-        folders: Of its packages, relative to ``root``.
-        scratch: For what a build leaves behind; exists.
-    """
+    """colcon for one submission, with a scratch folder for what a build leaves behind."""
 
     setting: BuildSetting
     root: Path
@@ -93,14 +83,7 @@ class Colcon:
     wall_s: float
 
     def build(self, finished: set[str]) -> Outcome:
-        """Build what can be built.
-
-        Args:
-            finished: Packages that are built already; what is built is added.
-
-        Raises:
-            GraderFault: colcon is not installed, or the build is no longer wanted.
-        """
+        """Build what can be built, and add it to the packages that are finished already."""
         started: set[str] = set()
 
         def on_output(text: str) -> None:

@@ -33,12 +33,12 @@ class InstallSpace:
     """The facts of one install space (merged layout).
 
     Attributes:
-        executables: Package -> what is in ``lib/<package>``, sorted.
-        in_bin: What is in ``bin``, sorted.
+        executables: Package -> what is in ``lib/<package>``.
+        in_bin: What is in ``bin``.
         python: Path of each Python file -> hash of its content; relative to site-packages, or
             ``lib/<package>/...`` for scripts.
-        definitions: Package -> the interfaces that it generates, such as ``msg/Bot.msg``, with
-            their definitions.
+        origins: Path of each Python file -> the student's file that it was copied from.
+        definitions: Package -> the interfaces that it generates.
         registered: Packages that are in ament's index of packages, where ROS looks for them.
     """
 
@@ -152,12 +152,7 @@ def _is_text(name: str) -> bool:
 
 
 def match_files(python: Mapping[str, str], sources: Mapping[str, str]) -> dict[str, str]:
-    """Find for each installed Python file the student's file that it was copied from.
-
-    Returns:
-        Installed path -> student's path: of those with the same content the one whose path ends
-        most alike. Files that the build changed or made are left out.
-    """
+    """Installed path -> the student's file of the same content whose path ends most alike."""
     same: dict[str, list[str]] = {}
     for path, digest in sorted(sources.items()):
         same.setdefault(digest, []).append(path)

@@ -34,14 +34,7 @@ def install_prefix(
     cache: BuildCache,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> Path:
-    """Build interface packages of ours, unless that was done before.
-
-    Returns:
-        Their install space (merged layout).
-
-    Raises:
-        GraderFault: They do not build on this machine.
-    """
+    """The install space (merged layout) of interface packages of ours, built if need be."""
     check_toolchain(ros.environment({})["PATH"])
 
     def attempt(is_second: bool) -> CachedBuild:
@@ -73,14 +66,7 @@ def completed(
     cache: BuildCache,
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> RosInstallation:
-    """Add to an installation what it lacks of the packages that rosgrade carries.
-
-    Args:
-        named: Packages that are used; what is not among them is not built.
-
-    Raises:
-        GraderFault: It does not build on this machine.
-    """
+    """Add to an installation what it lacks of the packages of ours that are named."""
     if missing_tools(ros.environment({})["PATH"]):
         # What needs them will say so, and the rest of the submission is graded.
         return ros

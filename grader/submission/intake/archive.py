@@ -65,7 +65,6 @@ def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> No
     Raises:
         SubmissionError: It is no archive, broken, encrypted, unsafe or too large; names the
             archive and the member. ``into`` may then hold some of its files.
-        GraderFault: It could not be read or written here (permissions, disk full).
     """
     limits = limits or ArchiveLimits()
     name = shown(archive.name)

@@ -26,11 +26,9 @@ _CHANGED = frozenset({errno.ENOENT, errno.ENOTDIR, errno.ELOOP, errno.ESTALE})
 
 @dataclass(frozen=True)
 class SubmissionFile:
-    """A file of the submission.
+    """A file of the submission; its path is relative, with undecodable bytes as surrogates.
 
     Attributes:
-        path: Relative, forward slashes, undecodable bytes as surrogates.
-        size: In bytes; 0 for a link.
         link: Where a symbolic link leads, relative to the link's folder; None for a file.
     """
 
@@ -83,7 +81,6 @@ def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
     Raises:
         SubmissionError: Too many or too large files, a file that cannot be read, or a symbolic
             link that leads out of the folder.
-        GraderFault: This machine cannot read it now.
     """
     limits = limits or ArchiveLimits()
     listing = Listing()
@@ -165,8 +162,7 @@ def wrapper_of(files: Sequence[SubmissionFile]) -> str:
     The same work is packed under another name by everybody who hands it in.
 
     Returns:
-        The deepest one. ``src`` and what is in it belong to the submission; ``.`` where there is
-        no such folder, or no package, or where links may need it.
+        The deepest one that is not ``src``; ``.`` where there is none, or where links may need it.
     """
     packages = find_packages(file.path for file in files)
     wrapper = "."
@@ -182,12 +178,7 @@ def wrapper_of(files: Sequence[SubmissionFile]) -> str:
 
 
 def find_packages(paths: Iterable[str]) -> list[str]:
-    """Find the package folders, as colcon would.
-
-    Returns:
-        Folders with a ``package.xml``, sorted, without those inside another package, in hidden
-        folders, or below a ``COLCON_IGNORE``, ``AMENT_IGNORE`` or ``CATKIN_IGNORE``.
-    """
+    """Find the package folders, as colcon would: sorted, and none inside of another."""
     folders, ignored = set(), set()
     for path in paths:
         folder, _, name = path.rpartition("/")

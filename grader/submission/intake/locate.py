@@ -28,7 +28,6 @@ from grader.submission.intake.listing import (
     unreadable,
     wrapper_of,
 )
-from grader.submission.intake.members import ArchiveLimits
 from grader.submission.intake.paths import is_within, shown
 
 NO_FILES = hashlib.sha256().hexdigest()
@@ -45,8 +44,7 @@ class Located:
 
     Attributes:
         sha256: Hash over the files' paths, contents and executable bits, as hex.
-        root: The private copy; holds exactly ``files``.
-        files: Sorted by path; folders that are just around all of it are left out of the paths.
+        root: The private copy; holds exactly ``files``, which are sorted by path.
         packages: Folders with a ``package.xml``, sorted; ``.`` for the submission itself.
         skipped: Folders that were left out, such as ``build`` and ``install``.
     """
@@ -60,7 +58,7 @@ class Located:
 
 
 @contextmanager
-def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Located]:
+def opened(path: Path | str) -> Iterator[Located]:
     """Open a folder, or an archive of one, for as long as the context lasts.
 
     Raises:
@@ -68,16 +66,15 @@ def opened(path: Path | str, limits: ArchiveLimits | None = None) -> Iterator[Lo
         SubmissionError: It cannot be read as a submission.
         GraderFault: This machine cannot hold the copy.
     """
-    limits = limits or ArchiveLimits()
     source = check_path(path)
     with Scratch("submission") as scratch:
         listed = source
         if not source.is_dir():
             listed = scratch / "unpacked"
             listed.mkdir()
-            archive.unpack(source, listed, limits)
+            archive.unpack(source, listed)
         root = scratch / "submission"
-        listing, sha256 = _snapshot(listed, root, limits)
+        listing, sha256 = _snapshot(listed, root)
         yield Located(
             id=submission_id(source),
             sha256=sha256,
@@ -106,11 +103,7 @@ def only(located: Located, folder: str, name: str) -> Iterator[Located]:
 
 
 def check_path(path: Path | str) -> Path:
-    """Return the path of a submission that exists.
-
-    Raises:
-        UsageError: Nothing is there, it is a URL, or neither a folder nor a file.
-    """
+    """The path of a submission that exists; anything else is a wrong use."""
     text = os.fspath(path)
     if _URL.match(text):
         # A Path holds one of the two slashes.
@@ -133,11 +126,11 @@ def submission_id(source: Path) -> str:
     return shown(name)
 
 
-def _snapshot(source: Path, root: Path, limits: ArchiveLimits) -> tuple[Listing, str]:
+def _snapshot(source: Path, root: Path) -> tuple[Listing, str]:
     """Copy a folder as it was at one moment, as far as one can tell."""
     for pause_s in (*_PAUSES_S, None):
         try:
-            listing = list_files(source, limits)
+            listing = list_files(source)
             wrapper = wrapper_of(listing.files)
             listing = listing.inside(wrapper)
             return listing, _copy(source / wrapper, listing.files, root)

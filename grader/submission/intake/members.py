@@ -55,7 +55,6 @@ class Member:
 
     Attributes:
         place: Where its reader finds it again: index in a zip, offset of the data in a tar.
-        size: Declared size in bytes.
     """
 
     place: int
@@ -76,8 +75,7 @@ def admit(
     """Check every member; nothing may be unpacked when one of them is refused.
 
     Returns:
-        What to unpack, with safe relative paths as names. Folders above a file are implied. Links
-        that lead to nothing inside the archive are left out.
+        What to unpack, with safe relative paths as names. Links to nothing are left out.
 
     Raises:
         SubmissionError: A member is unsafe or too much; names the archive and the member.
@@ -185,11 +183,10 @@ def links_inside(
 
 
 def resolve_link(path: str, links: Mapping[str, str]) -> str | None:
-    """Follow a link, and the links on its way, as the file system would.
+    """The path at which a link ends, as the file system would follow it.
 
     Returns:
-        The path it ends at, whether or not something is there; None for a loop and for the
-        root itself.
+        None for a loop and for the root itself.
 
     Raises:
         LeadsOut: A target on the way is absolute or goes above the root.
