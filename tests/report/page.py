@@ -1,8 +1,10 @@
-"""Reading an HTML report as a browser would, strictly."""
+"""Reading an HTML report and its drawings as a browser would, strictly."""
 
 from __future__ import annotations
 
+import re
 from html.parser import HTMLParser
+from xml.etree import ElementTree
 
 VOID = {"meta", "link", "img", "br", "hr", "input", "base", "source"}
 
@@ -61,3 +63,29 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if not {"style", "script"} & set(self._open):
             self._text.append(data)
+
+
+def parsed(svg):
+    return ElementTree.fromstring(str(svg))
+
+
+def of_class(svg, name):
+    return [item for item in parsed(svg).iter() if name in (item.get("class") or "").split()]
+
+
+def marks(svg, name):
+    """How many dots, strokes or crosses the paths of a class draw."""
+    return sum(path.get("d").count("M") for path in of_class(svg, name))
+
+
+def words(svg):
+    return " ".join(item.text or "" for item in parsed(svg).iter("text"))
+
+
+def description(svg):
+    return next(item.text for item in parsed(svg).iter() if item.tag.endswith("desc"))
+
+
+def is_finite(svg):
+    """Whether every number of a drawing is one."""
+    return not re.search(r"nan|inf", re.sub(r">[^<]*<", "><", str(svg).lower()))

@@ -12,13 +12,6 @@ from grader.errors import GraderFault, UsageError
 from grader.report.files import check_folder, refuse_inputs, write_whole
 
 
-def test_folders_are_made_and_text_is_utf_8(tmp_path):
-    file = tmp_path / "reports" / "ada" / "result.json"
-    write_whole(file, "π\n")
-    assert file.read_bytes() == b"\xcf\x80\n"
-    assert list(file.parent.iterdir()) == [file]
-
-
 def test_the_users_umask_decides_who_may_read_it(tmp_path):
     file = tmp_path / "result.json"
     before = os.umask(0o027)

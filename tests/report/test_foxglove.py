@@ -59,9 +59,5 @@ def test_every_panel_has_its_place(run):
     assert {name.partition("!")[0] for name in placed} <= {"Plot", "RawMessages", "3D"}
 
 
-def test_the_same_recordings_give_the_same_bytes(run):
-    assert render_layout([run]) == render_layout([run])
-
-
 def test_without_a_recording_there_is_still_a_layout():
     assert leaves(json.loads(render_layout([]))["layout"]) == ["RawMessages!log"]

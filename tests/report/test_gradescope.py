@@ -27,46 +27,41 @@ from tests.report.sample import (
     reached_limits,
 )
 
+
+def obj(**properties):
+    return {"type": "object", "additionalProperties": False, "properties": properties}
+
+
 # Written from https://gradescope-autograders.readthedocs.io/en/latest/specs/
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 VISIBILITY = {"enum": ["hidden", "after_due_date", "after_published", "visible"]}
 FORMAT = {"enum": ["text", "html", "simple_format", "md", "ansi"]}
-SCHEMA = {
-    "type": "object",
-    "required": ["score"],
-    "additionalProperties": False,
-    "properties": {
-        "score": {"type": "number"},
-        "execution_time": {"type": "number"},
-        "output": {"type": "string"},
-        "output_format": FORMAT,
-        "test_output_format": FORMAT,
-        "test_name_format": FORMAT,
-        "visibility": VISIBILITY,
-        "stdout_visibility": VISIBILITY,
-        "extra_data": {"type": "object"},
-        "leaderboard": {"type": "array"},
-        "tests": {
-            "type": "array",
-            "items": {
-                "type": "object",
-                "additionalProperties": False,
-                "properties": {
-                    "score": {"type": "number"},
-                    "max_score": {"type": "number"},
-                    "status": {"enum": ["passed", "failed"]},
-                    "name": {"type": "string"},
-                    "name_format": FORMAT,
-                    "number": {"type": "string"},
-                    "output": {"type": "string"},
-                    "output_format": FORMAT,
-                    "tags": {"type": "array", "items": {"type": "string"}},
-                    "visibility": VISIBILITY,
-                    "extra_data": {"type": "object"},
-                },
-            },
-        },
-    },
-}
+TEST = obj(
+    score=NUMBER,
+    max_score=NUMBER,
+    status={"enum": ["passed", "failed"]},
+    name=TEXT,
+    name_format=FORMAT,
+    number=TEXT,
+    output=TEXT,
+    output_format=FORMAT,
+    tags={"type": "array", "items": TEXT},
+    visibility=VISIBILITY,
+    extra_data={"type": "object"},
+)
+SCHEMA = obj(
+    score=NUMBER,
+    execution_time=NUMBER,
+    output=TEXT,
+    output_format=FORMAT,
+    test_output_format=FORMAT,
+    test_name_format=FORMAT,
+    visibility=VISIBILITY,
+    stdout_visibility=VISIBILITY,
+    extra_data={"type": "object"},
+    leaderboard={"type": "array"},
+    tests={"type": "array", "items": TEST},
+) | {"required": ["score"]}
 
 
 def rendered(make, **options):

@@ -140,21 +140,10 @@ class TestContent:
         assert "When: 0.750 s a gap of 612 ms begins" in first
         assert "Where: src/bot_publisher/bot_publisher/node.py:18 time.sleep(0.3)" in first
 
-    def test_a_status_is_told_in_words(self):
-        text = squeezed(page(lost_points()).text)
-        assert "passed The package builds" in text
-        assert "failed It publishes every 300 ms" in text
-        assert "skipped The period is steady waits for “It publishes every 300 ms”" in text
-
     def test_a_check_that_waits_for_several_names_each(self):
         checks = [Told("a", FAIL), Told("b", FAIL), Told("c", requires=("a", "b"))]
         text = squeezed(page(judged(checks)).text)
         assert "skipped Title of c waits for “Title of a” and “Title of b”" in text
-
-    def test_the_check_to_fix_first_is_linked(self):
-        found = page(lost_points())
-        assert found.all("a", href="#check-period")
-        assert found.all("article", id="check-period")
 
     def test_a_check_that_students_do_not_see_says_so(self):
         assert "never shown to students" in page(lost_points()).text

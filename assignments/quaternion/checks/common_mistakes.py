@@ -30,6 +30,8 @@ _EXPLAINS = 0.9
 _COMPONENT = 1e-5
 # Between an angle that is right and one that is not.
 _ANGLE_RAD = 1e-3
+_CONJUGATE = np.array((-1.0, -1.0, -1.0, 1.0))
+_PITCH_MIRRORED = np.array((1.0, -1.0, 1.0))
 _ANGLES = (
     ("roll", "atan2(2 (w x + y z), 1 - 2 (x x + y y))"),
     ("pitch", "asin(2 (w y - z x))"),
@@ -73,41 +75,29 @@ class Mistake:
 def explain(
     conversion: str, questions: Rows, answers: Rows, tolerance_rad: float
 ) -> tuple[Mistake, float] | None:
-    """The mistake that gives these answers.
+    """The mistake that gives most of these answers, with their share, or None.
 
     Args:
         questions: Of the wrong cases, shape (n, k).
         answers: The wrong answers, finite, shape (n, l).
-
-    Returns:
-        The mistake that explains the most, with the share that it explains; None if none
-        explains enough.
     """
     if not len(questions):
         return None
     best: tuple[Mistake, float] | None = None
     right = oracle(conversion, questions)
-    for slip in MISTAKES[conversion]:
+    for mistake in MISTAKES[conversion]:
         with np.errstate(all="ignore"):
-            given = slip.formula(questions)
+            given = mistake.formula(questions)
         # Where the mistake does no harm, it explains nothing.
         explained = _same(given, answers, tolerance_rad) & ~_right(given, right, tolerance_rad)
         share = float(np.mean(explained))
         if share >= _EXPLAINS and (best is None or share > best[1]):
-            best = (slip, share)
+            best = (mistake, share)
     return best
 
 
 def wrong_part(conversion: str, questions: Rows, answers: Rows) -> tuple[str, str] | None:
-    """The only one of roll, pitch and yaw that is wrong, as a clause and what to try.
-
-    Args:
-        questions: Of the wrong cases, shape (n, k).
-        answers: The wrong answers, finite, shape (n, l).
-
-    Returns:
-        None where more than one of them is wrong, and for what is no conversion to angles.
-    """
+    """The only one of roll, pitch and yaw that is wrong, and what to try; None without one."""
     if conversion != "quaternion_to_rpy" or not len(questions):
         return None
     off = answers - rpy_of(unit_quaternions(questions))
@@ -117,7 +107,11 @@ def wrong_part(conversion: str, questions: Rows, answers: Rows) -> tuple[str, st
         return None
     name, formula = _ANGLES[bad[0]]
     others = " and ".join(other for other, _ in _ANGLES if other != name)
-    return f"{others} are right, the {name} is not", f"Compare term by term: {name} = {formula}."
+    return (
+        f"{others} are right, the {name} is not",
+        f"Compare term by term: {name} = {formula}. Use atan2(a, b), for asin and atan(a / b) give "
+        "angles from -90 to 90 deg only.",
+    )
 
 
 def _same(given: Rows, answers: Rows, tolerance_rad: float) -> Flags:
@@ -169,10 +163,6 @@ def _right_quaternion(rows: Rows) -> Rows:
     return _turn(_axis(rows), _half(rows), _half(rows))
 
 
-def _angle_first(rows: Rows) -> Rows:
-    return _right_quaternion(rows[:, [1, 2, 3, 0]])
-
-
 def _angle_scaled(factor: float) -> Callable[[Rows], Rows]:
     def formula(rows: Rows) -> Rows:
         return _right_quaternion(np.column_stack((rows[:, :3], factor * rows[:, 3])))
@@ -194,7 +184,7 @@ def _w_first(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
 
 
 def _conjugate(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
-    return lambda rows: formula(rows) * np.array([-1.0, -1.0, -1.0, 1.0])
+    return lambda rows: formula(rows) * _CONJUGATE
 
 
 def _sine_halved(rows: Rows) -> Rows:
@@ -256,8 +246,6 @@ _AXIS_ANGLE = (
     Mistake("the angle is converted as if it came in degrees", _RADIANS_HINT,
          _angle_scaled(np.pi / 180.0)),
     Mistake("the angle is converted to degrees", _RADIANS_HINT, _angle_scaled(180.0 / np.pi)),
-    Mistake("the first number is taken for the angle",
-         "The message holds [x, y, z, angle]: the angle is data[3].", _angle_first),
 )  # fmt: skip
 
 
@@ -274,32 +262,16 @@ def _intrinsic(rows: Rows) -> Rows:
     return np.asarray(Rotation.from_euler("XYZ", rows).as_quat()).reshape(-1, 4)
 
 
-def _rpy_times(factors: Sequence[float]) -> Callable[[Rows], Rows]:
-    return lambda rows: rotations_of_rpy(rows * np.array(factors))
+def _rpy_times(factors: float | Rows) -> Callable[[Rows], Rows]:
+    return lambda rows: rotations_of_rpy(rows * factors)
 
 
-def _each_angle(
-    times: Callable[[Sequence[float]], Callable[[Rows], Rows]],
-    mistakes: Sequence[tuple[str, float, str]],
+def _scaled(
+    times: Callable[[float], Callable[[Rows], Rows]], mistakes: Sequence[tuple[str, float, str]]
 ) -> tuple[Mistake, ...]:
-    """A factor on all three angles, or on one of them.
-
-    Args:
-        mistakes: What is wrong, to follow "the angles are"; the factor; what to try.
-    """
+    """A factor on all angles: what is wrong, to follow "the angles are"; the factor; a hint."""
     return tuple(
-        Mistake(
-            f"{subject} {predicate}",
-            hint,
-            times([factor if applies else 1.0 for applies in which]),
-        )
-        for predicate, factor, hint in mistakes
-        for subject, which in (
-            ("the angles are", (True, True, True)),
-            ("only the roll is", (True, False, False)),
-            ("only the pitch is", (False, True, False)),
-            ("only the yaw is", (False, False, True)),
-        )
+        Mistake(f"the angles are {words}", hint, times(factor)) for words, factor, hint in mistakes
     )
 
 
@@ -316,7 +288,7 @@ _RPY = (
     *(Mistake(words, _SWAP_HINT, _mixed(order)) for words, order in _SWAPPED),
     Mistake("it turns about the axes that turn with the body (intrinsic), not about fixed ones",
          _FIXED_HINT, _intrinsic),
-    *_each_angle(
+    *_scaled(
         _rpy_times,
         (
             ("not halved", 2.0, _HALF_ANGLES_HINT),
@@ -331,8 +303,8 @@ _RPY = (
     Mistake("w has lost its sign", _SIGN_HINT, _w_without_sign(rotations_of_rpy)),
     Mistake("it is the conjugate, the inverse rotation", _INVERSE_HINT,
          _conjugate(rotations_of_rpy)),
-    Mistake("only the yaw is used", _SWAP_HINT, _rpy_times((0.0, 0.0, 1.0))),
-    Mistake("the pitch has the wrong sign", _SWAP_HINT, _rpy_times((1.0, -1.0, 1.0))),
+    Mistake("only the yaw is used", _SWAP_HINT, _rpy_times(np.array((0.0, 0.0, 1.0)))),
+    Mistake("the pitch has the wrong sign", _SWAP_HINT, _rpy_times(_PITCH_MIRRORED)),
 )  # fmt: skip
 
 
@@ -340,14 +312,7 @@ _RPY = (
 
 
 def rpy_of(quaternions: Rows) -> Rows:
-    """Roll, pitch and yaw by the textbook's formula, which takes unit quaternions.
-
-    Args:
-        quaternions: Shape (n, 4), as they are.
-
-    Returns:
-        Shape (n, 3); the pitch clamped to 90 deg.
-    """
+    """Roll, pitch and yaw, shape (n, 3), by the textbook's formula for unit quaternions."""
     x, y, z, w = quaternions.T
     return np.column_stack(
         (
@@ -362,13 +327,13 @@ def _right_rpy(rows: Rows) -> Rows:
     return rpy_of(unit_quaternions(rows))
 
 
-def _times(factors: Sequence[float]) -> Callable[[Rows], Rows]:
-    return lambda rows: _right_rpy(rows) * np.array(factors)
+def _times(factors: float | Rows) -> Callable[[Rows], Rows]:
+    return lambda rows: _right_rpy(rows) * factors
 
 
 def _intrinsic_rpy(rows: Rows) -> Rows:
     # The inverse turns backwards: intrinsic angles are those of the inverse, with their signs.
-    return np.asarray(-_right_rpy(rows * np.array([-1.0, -1.0, -1.0, 1.0])))
+    return np.asarray(-_right_rpy(rows * _CONJUGATE))
 
 
 def _tangent(rows: Rows) -> Rows:
@@ -380,15 +345,7 @@ def _tangent(rows: Rows) -> Rows:
 
 
 def _reordered_rpy(order: Sequence[int], rows: Rows) -> Rows:
-    """Roll, pitch and yaw in another order."""
     return _right_rpy(rows)[:, order]
-
-
-def _folded(columns: list[int], rows: Rows) -> Rows:
-    """Some of the angles as the arc sine gives them."""
-    angles = _right_rpy(rows)
-    angles[:, columns] = np.arcsin(np.sin(angles[:, columns]))
-    return angles
 
 
 _TO_RPY = (
@@ -407,18 +364,13 @@ _TO_RPY = (
     Mistake("w is read without its sign", _SIGN_HINT,
          lambda rows: _right_rpy(np.column_stack((rows[:, :3], np.abs(rows[:, 3]))))),
     Mistake("it is the inverse rotation", "The conjugate of a quaternion turns backwards: look for "
-         "a wrong sign.", lambda rows: _right_rpy(rows * np.array([-1.0, -1.0, -1.0, 1.0]))),
+         "a wrong sign.", lambda rows: _right_rpy(rows * _CONJUGATE)),
     Mistake("the pitch has the wrong sign", "The pitch is asin(2 (w y - z x)).",
-         _times((1.0, -1.0, 1.0))),
+         _times(_PITCH_MIRRORED)),
     Mistake(
          "roll and yaw lose their quadrant", "Use math.atan2(a, b) and not math.atan(a / b): only "
          "the two signs tell the quadrant.", _tangent),
-    Mistake(
-         "the yaw loses its quadrant", "Use math.atan2(a, b) for the yaw: math.asin and math.atan "
-         "give angles from -90 to 90 deg only.", partial(_folded, [2])),
-    Mistake("the roll loses its quadrant", "Use math.atan2(a, b) for the roll: math.asin and "
-         "math.atan give angles from -90 to 90 deg only.", partial(_folded, [0])),
-    *_each_angle(
+    *_scaled(
         _times,
         (
             ("in degrees", 180.0 / np.pi, _RADIANS_HINT),

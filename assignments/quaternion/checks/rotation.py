@@ -281,19 +281,15 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
         # There, several mistakes give the same: at gimbal lock the usual formula does so by
         # rounding errors, and of a zero axis nothing is left that could be normalized.
         return _by_kind(parameters, wrong)
-    if all(case.group is Group.SCALED and _none(case.answers[0].row) for case in wrong):
-        return (
-            "the answer is no rotation at all",
-            "Only a length of 0 is no rotation. A short axis or quaternion has a direction too: "
-            "do not take it for a zero one, and divide it by its length.",
-        )
-    if all(_none(row) for _, row in bad) and len(bad) < len(judged):
-        # Before the formulas: of a tiny angle, taken for degrees, as little is left.
+    # Before the formulas: of a tiny angle, taken for degrees, as little is left.
+    if all(_none(row) for _, row in bad) and (
+        len(bad) < len(judged) or all(case.group is Group.SCALED for case in wrong)
+    ):
         return (
             "the answer is no rotation at all",
             "Only a zero axis, a quaternion of zeros and an angle of 0 are no rotation: look for "
-            "the condition that takes something else for one, such as a small angle, a sum or a "
-            "product that is 0.",
+            "the condition that takes something else for one, such as a short axis, a small "
+            "angle, a sum or a product that is 0.",
         )
     if parameters.conversion == "quaternion_to_rpy" and all(
         math.isclose(abs(answer[1]), 0.5 * math.pi, abs_tol=1e-6) for _, answer in bad
@@ -312,9 +308,9 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
         parameters.tolerance,
     )
     if found is not None:
-        slip, share = found
+        mistake, share = found
         of = f"all {len(bad)}" if share == 1.0 else f"{round(share * len(bad))} of {len(bad)}"
-        return f"{slip.words} (that gives {of} of these answers)", slip.hint
+        return f"{mistake.words} (that gives {of} of these answers)", mistake.hint
     part = wrong_part(parameters.conversion, questions, np.array([row for _, row in bad]))
     return part or _by_kind(parameters, wrong)
 
@@ -337,41 +333,22 @@ def _by_kind(parameters: Answers, wrong: list[Case]) -> tuple[str, str]:
                 "Normalize what you compute with, and compute in double precision.",
             )
         return "the rotation is a little off", "Compute in double precision, and round nothing."
-    if groups == {Group.GIMBAL_LOCK}:
-        return _at_gimbal_lock(parameters, wrong)
-    if groups == {Group.SCALED}:
-        return "", "Divide by the length first: the axis and the quaternion may have any length."
     if groups == {Group.ZERO}:
         return (
             "",
             "Answer with no rotation (x = y = z = 0, w = 1) or with nothing: test whether the "
             "length is 0 before you divide by it.",
         )
-    return "", "Work the first wrong case out by hand and compare term by term."
-
-
-def _at_gimbal_lock(parameters: Answers, wrong: list[Case]) -> tuple[str, str]:
-    """What is wrong at a pitch of 90 or -90 deg, as far as the answers tell."""
-    if parameters.conversion != "quaternion_to_rpy":
-        return "", "A quaternion knows no gimbal lock: the usual formula holds at every pitch."
-    rows = [case.answers[0].row for case in wrong]
-    if any(0.0 not in (row[0], row[2]) for row in rows):
+    if groups == {Group.SCALED}:
+        return "", "Divide by the length first: the axis and the quaternion may have any length."
+    if groups == {Group.GIMBAL_LOCK} and parameters.conversion == "quaternion_to_rpy":
         return (
             "",
             "The usual formulas divide 0 by 0 there: where abs(sin_pitch) > 0.9999999, answer "
-            "with roll 0 and yaw 2 * math.atan2(z, w).",
+            "with the pitch asin(2 (w y - z x)), which has a sign, roll 0 and yaw "
+            "2 * math.atan2(z, w).",
         )
-    pitches = (math.asin(max(-1.0, min(1.0, sine_of_pitch(case.right)))) for case in wrong)
-    if any(abs(row[1] - right) > _LITTLE_RAD for row, right in zip(rows, pitches, strict=True)):
-        return (
-            "the pitch is not that of the rotation",
-            "The pitch is asin(2 (w y - z x)), 90 deg or -90 deg: it has a sign.",
-        )
-    return (
-        "the pitch is right, roll and yaw are not",
-        "Where roll is 0, yaw is 2 * math.atan2(z, w); where yaw is 0, roll is "
-        "2 * math.atan2(x, w).",
-    )
+    return "", "Work the first wrong case out by hand and compare term by term."
 
 
 def _unprompted(parameters: Answers, observed: str, evidence: Evidence) -> Finding:
@@ -429,15 +406,11 @@ def _too_few(
     if cause is not None:
         return cause
     if any(case.behind_s is not None for case in found) or _is_slow(recording, found):
+        sent = Moment(f"case {found[0].number} is sent", recording.since_launch_s(found[0].asked_ns))
         return Cause(
             f"{seen}, because the answers come late",
             "A callback must return soon: no time.sleep() and no loop that waits.",
-            Evidence(
-                moments=tuple(
-                    Moment(f"case {case.number} is sent", recording.since_launch_s(case.asked_ns))
-                    for case in found[:2]
-                )
-            ),
+            Evidence(moments=(sent,)),
         )
     return Cause.to_repeat(seen)
 

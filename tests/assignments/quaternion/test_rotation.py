@@ -166,7 +166,7 @@ class TestByHand:
             assert finding.status is Status.PASSED
         words = failed("quaternion_to_rpy", [asked], [[0.6, math.pi / 2, 0.0]])
         assert "roll 0 deg, pitch 90 deg, yaw 34.38 deg, or other angles" in words
-        assert "the pitch is right, roll and yaw are not" in words
+        assert "roll 0 and yaw 2 * math.atan2(z, w)" in words
 
     def test_a_quaternion_of_another_length_is_the_same_rotation(self):
         answered = [math.pi / 2, 0, 0]
@@ -254,16 +254,16 @@ ELSEWHERE = {"the quaternion is not scaled to length 1 before": "scaled"}
 
 @pytest.mark.parametrize("seed", [1])
 @pytest.mark.parametrize(
-    ("conversion", "slip"),
-    [(name, slip) for name, slips in MISTAKES.items() for slip in slips],
+    ("conversion", "mistake"),
+    [(name, mistake) for name, mistakes in MISTAKES.items() for mistake in mistakes],
     ids=lambda item: item if isinstance(item, str) else item.words[:40],
 )
-def test_each_mistake_fails_and_is_named(conversion, slip, seed):
-    function = ELSEWHERE.get(slip.words, ORDINARY[conversion])
+def test_each_mistake_fails_and_is_named(conversion, mistake, seed):
+    function = ELSEWHERE.get(mistake.words, ORDINARY[conversion])
     _, asked = asked_of(function, seed)
-    words = failed(conversion, asked, list(slip.formula(asked)))
-    assert slip.words in words
-    assert slip.hint in words
+    words = failed(conversion, asked, list(mistake.formula(asked)))
+    assert mistake.words in words
+    assert mistake.hint in words
 
 
 def test_what_has_no_name_gets_none():
@@ -305,7 +305,7 @@ def test_a_short_axis_that_is_taken_for_a_zero_one():
         for row, answered in zip(asked, right(conversion, asked), strict=True)
     ]
     words = failed(conversion, asked, answers)
-    assert "the answer is no rotation at all" in words and "do not take it for a zero one" in words
+    assert "the answer is no rotation at all" in words and "such as a short axis" in words
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -316,7 +316,7 @@ def test_a_small_angle_that_is_taken_for_none_is_no_matter_of_degrees(seed):
         for row, answered in zip(asked, right(conversion, asked), strict=True)
     ]
     words = failed(conversion, asked, answers, {"cases": ["ordinary"]})
-    assert "the answer is no rotation at all" in words and "such as a small angle" in words
+    assert "the answer is no rotation at all" in words and "a small angle" in words
 
 
 @pytest.mark.parametrize(
@@ -362,20 +362,6 @@ def test_right_answers_on_another_topic_are_found_there():
     )
     assert "the answers to `/rpy` are right, but come on `/quaternion`" in words
     assert "term by term" not in words
-
-
-def test_a_pole_that_is_tested_for_already_is_not_to_be_tested_for():
-    asked = [
-        Rotation.from_euler("xyz", [0.3, side * math.pi / 2, 1.0]).as_quat() for side in (1, -1)
-    ]
-    halved = [
-        [0.0, math.copysign(math.pi / 2, -q[0] * q[2]), math.atan2(q[2], q[3])] for q in asked
-    ]
-    words = failed("quaternion_to_rpy", asked, halved)
-    assert "the pitch is right, roll and yaw are not" in words and "0.9999999" not in words
-    unsigned = [[0.0, math.pi / 2, 2.0 * math.atan2(q[2], q[3])] for q in asked]
-    words = failed("quaternion_to_rpy", asked, unsigned)
-    assert "the pitch is not that of the rotation" in words and "0.9999999" not in words
 
 
 def test_a_quaternion_has_no_pole_to_be_tested_for():
@@ -496,7 +482,7 @@ def test_the_usual_formula_alone_fails_at_gimbal_lock(seed):
     for limit, scale in itertools.product((math.inf, 1.0), (False, True)):
         answers = [usual(row, limit, scale) for row in asked]
         words = failed(conversion, asked, answers, {"tolerance": "0.1 deg"})
-        assert "answer with roll 0 and yaw 2 * math.atan2(z, w)" in words
+        assert "roll 0 and yaw 2 * math.atan2(z, w)" in words
 
 
 # --- Pairing and silence ----------------------------------------------------------------------
@@ -595,7 +581,7 @@ class TestSilence:
             "rpy_to_quaternion", [[1, 0, 0]], [None],
             sent={"/rpy": ()}, endpoints=(endpoint("/orientation"),),
         )  # fmt: skip
-        assert "subscribes to nothing" in words
+        assert "has no subscription of its own" in words
 
     def test_fewer_cases_than_needed(self):
         finding = judged(
@@ -622,8 +608,8 @@ class TestSilence:
 
     def test_only_cases_of_a_kind_are_judged(self):
         conversion, asked = asked_of("axis_angle")
-        slip = next(s for s in MISTAKES[conversion] if s.words == "the axis is not normalized")
-        answers = list(slip.formula(asked))
+        mistake = next(m for m in MISTAKES[conversion] if m.words == "the axis is not normalized")
+        answers = list(mistake.formula(asked))
         only = judged(conversion, asked, answers, {"cases": ["ordinary"]})
         assert only.status is Status.PASSED
         assert "all of 50 cases right" in only.observed
