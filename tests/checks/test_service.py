@@ -22,6 +22,8 @@ from tests.checks.requests import SET_BOOL, action, asked, service, serving
 
 ENABLE = {"service": "/enable"}
 TRUE = {**ENABLE, "response": {"success": True}}
+RANGE = {"contains": {"message": "range"}}
+SPIN_OF_OTHERS = declared("spin", executor="MultiThreadedExecutor", threads=4, tells_added=True)
 SLOW = {**ENABLE, "takes": "400 ms"}
 
 
@@ -85,11 +87,6 @@ class TestResponds:
         finding = judge("service.responds", run, **TRUE, request={"data": True})
         assert finding.status is Status.PASSED
 
-    def test_another_value_is_told_with_the_request(self):
-        run = serving(asked(response={"success": False, "message": ""}))
-        found = failing("service.responds", run, **TRUE)
-        assert "the call (data = true) was answered with success = false instead of true" in found
-
     def test_of_a_long_request_only_what_is_not_zero_is_told(self):
         zeros = {"header": {"stamp": {"sec": 0}, "frame_id": ""}, "d": [], "k": [0.0] * 9}
         request = {**zeros, "width": 640, "rectify": False, "height": 480}
@@ -99,16 +96,22 @@ class TestResponds:
         run = serving(asked(request={**zeros, "a": 0, "b": 0, "c": 0}, response={"success": False}))
         assert "(every field zero or empty)" in failing("service.responds", run, **TRUE)
 
-    def test_a_text_without_the_word(self):
-        found = failing("service.responds", serving(asked()), **TRUE, contains={"message": "range"})
-        assert "message = 'enabled' without “range”" in found
-
-    def test_only_a_response_of_zeros_is_like_a_new_one(self):
-        wrong = serving(asked(response={"success": False, "message": "range"}))
-        assert "new one" not in failing("service.responds", wrong, **TRUE)
-        assert "sets `success`" in failing("service.responds", wrong, **TRUE)
-        zeros = serving(asked(response={"success": False, "message": ""}))
-        assert "as a new one is" in failing("service.responds", zeros, **TRUE)
+    @pytest.mark.parametrize(
+        ("call", "words"),
+        [
+            (
+                asked(response={"success": False, "message": "x"}),
+                "the call (data = true) was answered with",
+            ),
+            (asked(response={"success": False, "message": "x"}), "success = false instead of true"),
+            (asked(), "message = 'enabled' without “range”"),
+            (asked(response={"success": False, "message": "x"}), "sets `success` of the response"),
+            (asked(response={"success": False, "message": ""}), "as a new one is"),
+            (asked(answer_s=1.5), "was not answered for 1.5 s"),
+        ],
+    )
+    def test_a_wrong_or_late_answer_is_told_with_the_request(self, call, words):
+        assert words in failing("service.responds", serving(call), **TRUE, **RANGE)
 
     def test_the_process_died_of_the_call(self):
         run = serving(
@@ -119,34 +122,24 @@ class TestResponds:
         assert "was not answered: the process" in found
         assert f"ZeroDivisionError: division by zero ({SOURCE}:14)" in found
 
-    def test_the_executor_never_spun(self):
-        run = serving(asked(answer_s=None), declarations=(declared("started"),))
-        assert "rclpy.spin() was never called" in failing("service.responds", run, **TRUE)
-
-    def test_a_node_that_no_executor_has(self):
-        spin = declared("spin", executor="MultiThreadedExecutor", threads=4, tells_added=True)
-        told = (declared("started"), declared("node", node=NODE), spin)
-        run = serving(asked(answer_s=None), declarations=told)
-        assert "was not given to it" in failing("service.responds", run, **TRUE)
-
-    def test_a_callback_that_blocks_the_executor(self):
-        silent = tuple(call(1.5 + 0.5 * n, None) for n in range(4))
-        run = serving(asked(answer_s=None), *silent)
-        assert "something blocks the executor" in failing("service.responds", run, **TRUE)
-
-    def test_nothing_is_said_of_an_executor_that_was_not_asked(self):
-        found = failing("service.responds", serving(asked(1.0, None)), **TRUE)
-        assert "was not answered" in found
-        assert "spins" not in found
-
-    def test_a_callback_that_does_not_return_while_the_executor_spins(self):
-        run = serving(asked(answer_s=None), *(call(1.5 + 0.5 * n) for n in range(4)))
-        found = failing("service.responds", run, **TRUE)
-        assert "although the node's executor spins" in found
-
-    def test_too_late(self):
-        found = failing("service.responds", serving(asked(answer_s=1.5)), **TRUE)
-        assert "was not answered for 1.5 s" in found
+    @pytest.mark.parametrize(
+        ("calls", "declarations", "words"),
+        [
+            ((), (declared("started"),), "rclpy.spin() was never called"),
+            (
+                (),
+                (declared("started"), declared("node", node=NODE), SPIN_OF_OTHERS),
+                "was not given to it",
+            ),
+            ([call(1.5 + 0.5 * n, None) for n in range(4)], (), "something blocks the executor"),
+            ([call(1.5 + 0.5 * n) for n in range(4)], (), "although the node's executor spins"),
+            ((), (), "was not answered |"),
+        ],
+    )
+    def test_no_answer_is_explained_by_what_the_executor_does(self, calls, declarations, words):
+        more = {"declarations": declarations} if declarations else {}
+        run = serving(asked(answer_s=None), *calls, **more)
+        assert words in failing("service.responds", run, **TRUE)
 
     def test_the_machine_took_the_time(self):
         run = serving(asked(answer_s=1.5), disturbance=taken(1.0, 2.5, waited_s=0.8))
