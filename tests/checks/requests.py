@@ -83,6 +83,19 @@ def goal(
     return Goal(**{**values, **changes})
 
 
+def canceled(**changes: Any) -> Goal:
+    """A goal that was asked to cancel 0.2 s after it was accepted, and was 0.1 s later."""
+    values = {
+        "status": "canceled",
+        "end_s": 0.31,
+        "cancel_after_s": 0.2,
+        "canceled_ns": at(1.21),
+        "cancel_answered_ns": at(1.22),
+        "cancel_accepted": True,
+    }
+    return goal(**{**values, **changes})
+
+
 def acting(*goals: Goal, **changes: Any) -> Recording:
     """A run of a node that offers /fibonacci, with these goals."""
     return recording(**{"services": (action(),), "goals": goals, **changes})

@@ -17,7 +17,7 @@ from tests.checks.builder import (
     taken,
     traceback,
 )
-from tests.checks.requests import FIBONACCI, acting, action, goal, service
+from tests.checks.requests import FIBONACCI, acting, action, canceled, goal, service
 
 FIB = {"action": "/fibonacci"}
 WRONG_ONES = {**FIB, "goal": {"order": -1}}
@@ -26,19 +26,6 @@ RESULT = {**FIB, "result": SEQUENCE, "within": "2 s"}
 FEEDBACK = {**FIB, "at_least": 3, "rate": "10 Hz"}
 UNANSWERED = {"cancel_accepted": None, "cancel_answered_ns": None}
 UNASKED = {"canceled_ns": None, "cancel_answered_ns": None}
-
-
-def canceled(**changes):
-    """A goal that was asked to cancel 0.2 s after it was accepted, and was 0.1 s later."""
-    values = {
-        "status": "canceled",
-        "end_s": 0.31,
-        "cancel_after_s": 0.2,
-        "canceled_ns": at(1.21),
-        "cancel_answered_ns": at(1.22),
-        "cancel_accepted": True,
-    }
-    return goal(**{**values, **changes})
 
 
 def preempting(new=None, **old):
@@ -211,37 +198,3 @@ def test_a_server_that_dies_is_the_cause_whatever_the_machine_took(check, run, w
     found = failing(f"action.{check}", run, **(RESULT if check == "result" else FIB))
     assert words in found
     assert "SIGABRT (abort)" in found
-
-
-class TestBusyExecutor:
-    """One thread cannot take in the request to cancel while the execute callback runs."""
-
-    BLOCKED = canceled(end_s=None, **UNANSWERED)
-
-    @pytest.mark.parametrize(
-        "late",
-        [
-            canceled(cancel_answered_ns=at(2.0), cancel_accepted=False, status="succeeded"),
-            canceled(**UNANSWERED, status="succeeded"),
-            # An answer at the very end.
-            canceled(
-                status="succeeded", end_s=1.31, cancel_answered_ns=at(2.3), cancel_accepted=False
-            ),
-        ],
-    )
-    def test_it_is_told_by_a_late_answer(self, late):
-        assert "its executor cannot while" in failing("action.cancels", acting(late), **FIB)
-
-    def test_it_is_the_students_on_any_machine_unless_that_took_all_the_time(self):
-        run = acting(self.BLOCKED, calls=(), disturbance=taken(2.0, 2.1, waited_s=0.037))
-        found = failing("action.cancels", run, **FIB)
-        assert "its executor cannot while" in found and "spins" not in found
-        starved = acting(self.BLOCKED, calls=(), disturbance=taken(2.0, 2.1, waited_s=3.0))
-        assert judge("action.cancels", starved, **FIB).status is Status.ERROR
-
-    @pytest.mark.parametrize(("cpus", "status"), [("1", Status.ERROR), ("4", Status.FAILED)])
-    def test_threads_that_only_this_machine_lacks_cost_nothing(self, cpus, status):
-        spin = declared("spin", executor="MultiThreadedExecutor", threads=1)
-        started = (declared("started"), spin)
-        run = acting(self.BLOCKED, declarations=started, environment={"cpus": cpus})
-        assert judge("action.cancels", run, **FIB).status is status

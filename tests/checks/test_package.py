@@ -312,21 +312,22 @@ class TestBuilds:
 
 
 class TestExecutable:
+    WANTED = {"package": NAME, "executable": "bot_pub"}  # noqa: RUF012
+
     def judge(self, **changes):
-        return judge(
-            "package.executable",
-            submission(package(**changes)),
-            package=NAME,
-            executable="bot_pub",
-        )
+        return judge("package.executable", submission(package(**changes)), **self.WANTED)
 
-    def found(self, **changes):
-        finding = self.judge(**{"executables": (), **changes})
-        assert finding.status is Status.FAILED
-        return f"{finding.observed} | {finding.hint}"
-
-    def test_passes(self):
-        finding = self.judge()
+    @pytest.mark.parametrize(
+        "changes",
+        [
+            {},
+            # The missing target of another executable, and a syntax error.
+            {"missing_targets": (("other", SourceError("setup.py", 22, "no module `x`")),)},
+            {"syntax_errors": (SourceError("node.py", 9, "invalid syntax"),)},
+        ],
+    )
+    def test_what_is_installed_passes(self, changes):
+        finding = self.judge(**changes)
         assert finding.status is Status.PASSED
         assert finding.expected == "the executable `bot_pub`, for `ros2 run bot_publisher bot_pub`"
 
@@ -342,75 +343,13 @@ class TestExecutable:
     )
     def test_the_one_program_of_a_package_is_run_in_place_of_what_is_missing(self, there, rule):
         record = submission(package(**{"executables": (), **there}))
-        parameters = {"package": NAME, "executable": "bot_pub"}
-        assert judge("package.executable", record, **parameters, remap=True).remap == rule
-        assert not judge("package.executable", record, **parameters).remap
-
-    def test_a_script_in_bin_shows_the_lines_of_setup_cfg(self):
-        found = self.found(misplaced_executables=("bot_pub",))
-        assert "was installed in bin/, where `ros2 run` does not look" in found
-        assert (
-            "[develop] / script_dir=$base/lib/bot_publisher / "
-            "[install] / install_scripts=$base/lib/bot_publisher"
-        ) in found
-
-    def test_another_package_of_the_submission_has_it(self):
-        own = package(executables=(), entry_points=())
-        other = package("robot")
-        finding = judge(
-            "package.executable", submission(own, other), package=NAME, executable="bot_pub"
-        )
-        assert finding.status is Status.FAILED
-        assert finding.observed == "it is in the package `robot`: `ros2 run robot bot_pub`"
-        assert finding.evidence.places[0].file == "src/robot/setup.py"
-
-    def test_a_misspelt_entry_point(self):
-        found = self.found(entry_points=(("bot_publisher", "bot_publisher.node:main"),))
-        assert "setup.py defines `bot_publisher`" in found
-        assert "'bot_pub = ...'" in found
-
-    def test_no_entry_point(self):
-        found = self.found(entry_points=())
-        assert "setup.py defines no console_scripts" in found
-        assert "'bot_pub = bot_publisher.<your module>:main'" in found
-
-    def test_a_target_that_does_not_exist(self):
-        target = SourceError("src/bot_publisher/setup.py", 22, "no function `main` in node.py")
-        finding = self.judge(missing_targets=(("bot_pub", target),))
-        assert finding.status is Status.FAILED
-        assert "`bot_pub = bot_publisher.node:main` leads nowhere" in finding.observed
-        assert "no function `main` in node.py" in finding.observed
-        assert finding.evidence.places == (target,)
-
-    def test_a_folder_of_modules_without_an_init(self):
-        why = "bot_publisher/node.py is not installed: there is no bot_publisher/__init__.py"
-        target = SourceError("src/bot_publisher/setup.py", 22, why)
-        finding = self.judge(missing_targets=(("bot_pub", target),))
-        assert finding.hint.startswith("find_packages() in setup.py leaves out a folder without")
-
-    def test_the_missing_target_of_another_executable_does_not_count(self):
-        target = SourceError("src/bot_publisher/setup.py", 22, "no module `x`")
-        assert self.judge(missing_targets=(("other", target),)).status is Status.PASSED
-
-    def test_an_executable_with_a_syntax_error_is_there_all_the_same(self):
-        error = SourceError("src/bot_publisher/bot_publisher/node.py", 9, "invalid syntax")
-        assert self.judge(syntax_errors=(error,)).status is Status.PASSED
-
-    def test_defined_but_not_installed(self):
-        assert "the build did not install it" in self.found()
-
-    def test_a_cmake_package(self):
-        found = self.found(build_type="ament_cmake", entry_points=(), executables=("bot_publ",))
-        assert "installed is `bot_publ`" in found
-        assert "install(TARGETS bot_pub DESTINATION lib/${PROJECT_NAME})" in found
-        assert "it was not installed" in self.found(build_type="ament_cmake", entry_points=())
+        assert judge("package.executable", record, **self.WANTED, remap=True).remap == rule
+        assert not judge("package.executable", record, **self.WANTED).remap
 
     def test_a_failed_build_is_the_deeper_cause(self):
         subject = submission(package(executables=()), build=failed_build(NAME, culprit=CULPRIT))
-        found = failing("package.executable", subject, package=NAME, executable="bot_pub")
-        assert str(CULPRIT) in found
+        assert str(CULPRIT) in failing("package.executable", subject, **self.WANTED)
 
     def test_nothing_was_built(self):
-        subject = submission(build=None)
-        finding = judge("package.executable", subject, package=NAME, executable="bot_pub")
+        finding = judge("package.executable", submission(build=None), **self.WANTED)
         assert finding.status is Status.ERROR

@@ -22,6 +22,7 @@ from tests.checks.requests import SET_BOOL, action, asked, service, serving
 
 ENABLE = {"service": "/enable"}
 TRUE = {**ENABLE, "response": {"success": True}}
+REFUSED = {"success": False, "message": "x"}
 RANGE = {"contains": {"message": "range"}}
 SPIN_OF_OTHERS = declared("spin", executor="MultiThreadedExecutor", threads=4, tells_added=True)
 SLOW = {**ENABLE, "takes": "400 ms"}
@@ -105,7 +106,7 @@ class TestResponds:
             ),
             (asked(response={"success": False, "message": "x"}), "success = false instead of true"),
             (asked(), "message = 'enabled' without “range”"),
-            (asked(response={"success": False, "message": "x"}), "sets `success` of the response"),
+            (asked(response=REFUSED), "sets `success` of the response"),
             (asked(response={"success": False, "message": ""}), "as a new one is"),
             (asked(answer_s=1.5), "was not answered for 1.5 s"),
         ],
