@@ -36,6 +36,12 @@ from tests.checks.builder import (
 )
 
 
+def crashed(printed="", exit_code=1, **changes):
+    """A program that ended before it had a node."""
+    ended = {"processes": (died(exit_code),), "ending": Ending.EXITED, "log": output(printed)}
+    return nodeless(**{**ended, **changes})
+
+
 class TestExists:
     @pytest.mark.parametrize("name", ["bot_publisher", "/bot_publisher"])
     def test_plain_and_full_names_mean_the_same(self, name):
@@ -77,8 +83,7 @@ class TestExists:
         assert finding.evidence.places == (culprit,)
 
     def test_an_exception_is_named_with_the_students_own_line(self):
-        log = output(traceback("ValueError: math domain error"))
-        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=log)
+        run = crashed(traceback("ValueError: math domain error"))
         finding = judge("node.exists", run, name=NODE)
         assert "ended 1.20 s after launch with ValueError: math domain error" in finding.observed
         assert f"{SOURCE}:14" in finding.observed
@@ -109,8 +114,7 @@ class TestExists:
         ],
     )
     def test_an_undefined_name_of_ros_comes_with_its_import(self, name, hint):
-        log = output(traceback(f"NameError: name '{name}' is not defined"))
-        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=log)
+        run = crashed(traceback(f"NameError: name '{name}' is not defined"))
         assert hint in judge("node.exists", run, name=NODE).hint
 
     def test_another_process_s_node_in_the_same_namespace_is_no_misspelling(self):
@@ -134,24 +138,11 @@ class TestExists:
             "    raise TypeError()\n"
             "TypeError"
         )
-        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=output(printed))
+        run = crashed(printed)
         finding = judge("node.exists", run, name=NODE)
         assert "with TypeError: a service's callback did not return a response" in finding.observed
         assert "`return response`" in finding.hint
         assert finding.evidence.places == ()
-
-    def test_an_object_of_another_class_that_stops_rclpy_is_named(self):
-        # As rclpy's converter printed it when an execute callback had returned None.
-        printed = (
-            "python: /build/rosidl_generator_py/example_interfaces/action/_fibonacci_s.c:148: "
-            "example_interfaces__action__fibonacci__result__convert_from_py: Assertion "
-            '`strncmp("example_interfaces.action._fibonacci.Fibonacci_Result", '
-            "full_classname_dest, 53) == 0' failed."
-        )
-        run = nodeless(processes=(died(-6),), ending=Ending.EXITED, log=output(printed))
-        finding = judge("node.exists", run, name=NODE)
-        assert "SIGABRT (abort)" in finding.observed
-        assert "something that is no `Fibonacci.Result`" in finding.hint
 
     @pytest.mark.parametrize(
         ("exit_code", "words"),
@@ -164,11 +155,11 @@ class TestExists:
         ],
     )
     def test_a_crash_is_named_by_its_signal(self, exit_code, words):
-        run = nodeless(processes=(died(exit_code),), ending=Ending.EXITED)
+        run = crashed(exit_code=exit_code)
         assert words in failing("node.exists", run, name=NODE)
 
     def test_main_that_returns_before_a_node_was_created(self):
-        run = nodeless(processes=(died(0),), ending=Ending.EXITED)
+        run = crashed(exit_code=0)
         found = failing("node.exists", run, name=NODE)
         assert "main() returned before a node was created" in found
 
@@ -243,12 +234,10 @@ class TestStarts:
         assert "SIGSEGV" in failing("node.starts", run)
 
     def test_the_reason_is_the_one_that_node_exists_gives(self):
-        log = output(traceback("ImportError: cannot import name 'Twists'"))
-        run = nodeless(processes=(died(1),), ending=Ending.EXITED, log=log)
+        run = crashed(traceback("ImportError: cannot import name 'Twists'"))
         assert failing("node.starts", run) == failing("node.exists", run, name=NODE)
 
 
-_IN_QOS = '  File "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/qos.py", line 99, in f\n'
 _IN_RCLPY = (
     '  File "/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/node.py", line 205, in f\n'
     "    raise it\n"
@@ -299,14 +288,6 @@ class TestAlive:
         found = failing("node.alive", run)
         assert f"2.00 s after launch with ZeroDivisionError: division by zero ({SOURCE}:20" in found
 
-    def test_an_entry_point_that_asks_for_arguments(self):
-        raised = "TypeError: main() missing 1 required positional argument: 'args'"
-        at_entry, _ = traceback(raised).split('  File "/w/install/lib/python', 1)
-        run = recording(processes=(died(1),), ending=Ending.EXITED, log=output(at_entry + raised))
-        assert "`ros2 run` calls `main()` without arguments: write `def main(args=None):`" in (
-            failing("node.alive", run)
-        )
-
     @pytest.mark.parametrize(
         ("raised", "source"),
         [
@@ -328,21 +309,6 @@ class TestAlive:
         log = output(traceback(raised, source=source).replace(_IN_RCLPY, ""))
         run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
         assert "Correct the line that is named here." in failing("node.alive", run)
-
-    def test_a_policy_that_is_a_text(self):
-        log = output(traceback("AssertionError").replace(_IN_RCLPY, _IN_QOS))
-        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
-        assert "DurabilityPolicy.TRANSIENT_LOCAL" in failing("node.alive", run)
-
-    def test_a_policy_that_there_is_not(self):
-        raised = (
-            "AssertionError: Invalid arguments passed to constructor: "
-            "dict_keys(['reliability', 'queue_size'])"
-        )
-        log = output(traceback(raised).replace(_IN_RCLPY, _IN_QOS))
-        run = recording(processes=(died(1),), ending=Ending.EXITED, log=log)
-        found = failing("node.alive", run)
-        assert "depth is the queue size" in found and "its name as a text" not in found
 
     def test_the_first_of_chained_exceptions_is_the_cause(self):
         log = output(

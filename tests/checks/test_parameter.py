@@ -43,39 +43,28 @@ class TestDeclared:
         finding = judge("parameter.declared", run, **SPEED, default=0.5)
         assert finding.status is Status.PASSED
 
-    def test_an_integer_default_is_not_the_double(self):
-        found = failing("parameter.declared", read(speed=1), **SPEED, type="double")
-        assert "it is an integer" in found and "1 is an integer, 1.0 is a double" in found
-
-    def test_a_truth_is_no_number(self):
-        found = failing("parameter.declared", read(speed=True), **SPEED, default=1)
-        assert "it is true at first" in found
-
-    def test_another_default(self):
-        found = failing("parameter.declared", read(speed=0.2), **SPEED, default=0.5)
-        assert "it is 0.2 at first" in found
-        assert "self.declare_parameter('speed', 0.5)" in found
-
-    def test_no_range_and_another_range(self):
-        assert "it has no range" in failing(
-            "parameter.declared", read(speed=0.5), **SPEED, range=[0, 1]
-        )
-        run = recording(calls=parameters_read(speed=0.5, ranges=RANGE))
-        found = failing("parameter.declared", run, **SPEED, range=[0, 2])
-        assert "its range is 0 to 1" in found
-
-    def test_read_only(self):
-        run = read(fixed_name="x")
-        wanted = {"node": NODE, "name": "fixed_name", "read_only": False}
-        assert "it is read-only" in failing("parameter.declared", run, **wanted)
-
-    def test_a_near_miss_and_nothing_at_all(self):
-        assert "declared is `sped`" in failing("parameter.declared", read(sped=1.0), **SPEED)
-        assert "declares no parameters" in failing("parameter.declared", read(), **SPEED)
-
-    def test_another_node_name(self):
-        found = failing("parameter.declared", read(speed=0.5), node="bot", name="speed")
-        assert "found the node `/bot_publisher`" in found
+    @pytest.mark.parametrize(
+        ("values", "wanted", "words"),
+        [
+            ({"speed": 1}, {"type": "double"}, "it is an integer"),
+            ({"speed": 1}, {"type": "double"}, "1 is an integer, 1.0 is a double"),
+            ({"speed": True}, {"default": 1}, "it is true at first"),
+            ({"speed": 0.2}, {"default": 0.5}, "it is 0.2 at first"),
+            ({"speed": 0.2}, {"default": 0.5}, "self.declare_parameter('speed', 0.5)"),
+            ({"speed": 0.5}, {"range": [0, 1]}, "it has no range"),
+            ({"speed": 0.5, "ranges": RANGE}, {"range": [0, 2]}, "its range is 0 to 1"),
+            (
+                {"fixed_name": "x"},
+                {"name": "fixed_name", "read_only": False},
+                "it is read-only",
+            ),
+            ({"sped": 1.0}, {}, "declared is `sped`"),
+            ({}, {}, "declares no parameters"),
+            ({"speed": 0.5}, {"node": "bot"}, "found the node `/bot_publisher`"),
+        ],
+    )
+    def test_what_is_declared_otherwise_is_told(self, values, wanted, words):
+        assert words in failing("parameter.declared", read(**values), **{**SPEED, **wanted})
 
     def test_a_node_that_does_not_answer(self):
         silent = asked(
@@ -120,32 +109,37 @@ def setting(value, after=None, start=0.5, **changes):
     )
 
 
+REFUSED = setting(7.0, 0.5, accepted=False, reason="too fast")
+
+
 class TestSet:
-    def test_accepted(self):
-        assert judge("parameter.set", setting(0.9), **SPEED, value=0.9).observed == "accepted"
+    @pytest.mark.parametrize(
+        ("run", "wanted", "observed"),
+        [
+            (setting(0.9), {"value": 0.9}, "accepted"),
+            (REFUSED, {"value": 7.0, "accepted": False, "reason": "Fast"}, "refused: too fast"),
+        ],
+    )
+    def test_what_is_answered_as_asked_for_passes(self, run, wanted, observed):
+        finding = judge("parameter.set", run, **SPEED, **wanted)
+        assert (finding.status, finding.observed) == (Status.PASSED, observed)
 
-    def test_refused_with_its_reason(self):
-        run = setting(7.0, 0.5, accepted=False, reason="too fast")
-        finding = judge("parameter.set", run, **SPEED, value=7.0, accepted=False, reason="Fast")
-        assert finding.status is Status.PASSED
-        assert finding.observed == "refused: too fast"
-
-    def test_refused_although_right(self):
-        run = setting(0.9, 0.5, accepted=False, reason="never")
-        assert "it was refused: never" in failing("parameter.set", run, **SPEED, value=0.9)
-
-    def test_accepted_although_wrong(self):
-        found = failing("parameter.set", setting(7.0), **SPEED, value=7.0, accepted=False)
-        assert "it was accepted" in found and "add_on_set_parameters_callback" in found
-
-    def test_refused_without_the_reason(self):
-        run = setting(7.0, 0.5, accepted=False)
-        found = failing("parameter.set", run, **SPEED, value=7.0, accepted=False, reason="positive")
-        assert "the reason says nothing" in found
-
-    def test_accepted_but_kept_as_it_was(self):
-        found = failing("parameter.set", setting(0.9, 0.5), **SPEED, value=0.9)
-        assert "it was accepted, but is 0.5 then" in found
+    @pytest.mark.parametrize(
+        ("run", "wanted", "words"),
+        [
+            (REFUSED, {"value": 7.0}, "it was refused: too fast"),
+            (setting(7.0), {"value": 7.0, "accepted": False}, "it was accepted"),
+            (setting(7.0), {"value": 7.0, "accepted": False}, "add_on_set_parameters_callback"),
+            (
+                setting(7.0, 0.5, accepted=False),
+                {"value": 7.0, "accepted": False, "reason": "positive"},
+                "the reason says nothing",
+            ),
+            (setting(0.9, 0.5), {"value": 0.9}, "it was accepted, but is 0.5 then"),
+        ],
+    )
+    def test_another_answer_is_told(self, run, wanted, words):
+        assert words in failing("parameter.set", run, **SPEED, **wanted)
 
     def test_a_value_that_was_never_tried(self):
         finding = judge("parameter.set", setting(0.9), **SPEED, value=0.1)
@@ -165,19 +159,29 @@ def moving(then, *, set_s=2.0, until_s=4.4, period_s=0.1, **changes):
 class TestTakesEffect:
     DATA = {"value": 0.9, "topic": "/speed", "fields": {"data": 0.9}}  # noqa: RUF012
 
-    def test_messages_follow(self):
-        finding = judge("parameter.takes_effect", moving(0.9), **SPEED, **self.DATA)
+    PERIOD = {"value": 0.9, "topic": "/speed", "period": "200 ms"}  # noqa: RUF012
+
+    @pytest.mark.parametrize(
+        ("run", "wanted"), [(moving(0.9), DATA), (moving(0.9, period_s=0.2), PERIOD)]
+    )
+    def test_messages_that_follow_pass(self, run, wanted):
+        finding = judge("parameter.takes_effect", run, **SPEED, **wanted)
         assert finding.status is Status.PASSED
 
-    def test_read_once(self):
-        found = failing("parameter.takes_effect", moving(0.5), **SPEED, **self.DATA)
-        assert "after it was set a message has data = 0.5 instead of 0.9" in found
-        assert "The message is as it was before" in found
-
-    def test_another_value_than_before_was_not_read_once(self):
-        found = failing("parameter.takes_effect", moving(0.7), **SPEED, **self.DATA)
-        assert "has data = 0.7 instead of 0.9" in found
-        assert "as it was before" not in found
+    @pytest.mark.parametrize(
+        ("run", "wanted", "words"),
+        [
+            (moving(0.5), DATA, "after it was set a message has data = 0.5 instead of 0.9"),
+            (moving(0.5), DATA, "The message is as it was before"),
+            (moving(0.7), DATA, "Look what the node makes of `speed` where it publishes"),
+            (moving(0.5, after=0.5, accepted=False, reason="no"), DATA, "was refused: no"),
+            (moving(0.9), PERIOD, "messages come every 100 ms"),
+            (moving(0.9, until_s=2.0), DATA, "0 messages in the"),
+            (moving(0.9, until_s=2.0), DATA, "Publish in every call of the callback"),
+        ],
+    )
+    def test_what_does_not_change_is_told(self, run, wanted, words):
+        assert words in failing("parameter.takes_effect", run, **SPEED, **wanted)
 
     def test_an_attempt_that_is_refused_later_changes_nothing(self):
         run = moving(0.9)
@@ -185,24 +189,6 @@ class TestTakesEffect:
         run = recording(calls=(*run.calls, *later), messages=run.messages)
         finding = judge("parameter.takes_effect", run, **SPEED, **self.DATA)
         assert finding.status is Status.PASSED
-
-    def test_refused(self):
-        run = moving(0.5, after=0.5, accepted=False, reason="no")
-        assert "the value was refused: no" in failing(
-            "parameter.takes_effect", run, **SPEED, **self.DATA
-        )
-
-    def test_the_period(self):
-        wanted = {"value": 0.9, "topic": "/speed", "period": "200 ms"}
-        run = moving(0.9, period_s=0.2)
-        assert judge("parameter.takes_effect", run, **SPEED, **wanted).status is Status.PASSED
-        found = failing("parameter.takes_effect", moving(0.9), **SPEED, **wanted)
-        assert "messages come every 100 ms" in found
-
-    def test_silence_after_it(self):
-        run = moving(0.9, until_s=2.0)
-        found = failing("parameter.takes_effect", run, **SPEED, **self.DATA)
-        assert "0 messages in the" in found and "made anew" not in found
 
     def test_late_because_of_the_machine(self):
         run = recording(
