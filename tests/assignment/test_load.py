@@ -16,7 +16,7 @@ from grader.assignment.load import (
     load_assignment,
 )
 from grader.checks.check import Check
-from grader.errors import AssignmentError, UsageError
+from grader.errors import UsageError
 from tests.assignment.lessons import GOOD, HEAD
 
 Write = Callable[..., Path]
@@ -223,24 +223,6 @@ def test_checks_of_the_same_title_say_what_each_is_about(
 def test_what_is_about_the_robot_needs_a_world(found: Found, key: str, said: str) -> None:
     (told,) = found(GOOD.replace("timeout: 5 s", f"timeout: 5 s\n    {key}"))
     assert told.startswith(f"12: scenarios[0].{said}")
-
-
-def test_a_check_of_the_motion_needs_a_world_in_each_of_its_scenarios(write: Write) -> None:
-    folder = write(HEAD + "  - {id: touches, uses: motion.no_contact, points: 1}\n")
-    with pytest.raises(AssignmentError) as caught:
-        load_assignment(folder)
-    (problem,) = caught.value.problems
-    assert (problem.line, problem.where) == (13, "checks[0].uses")
-    assert problem.message == "the scenario 'run' has no 'world', and so no simulated robot"
-
-
-def test_waiting_for_messages_that_are_not_recorded_is_a_mistake(found: Found) -> None:
-    text = GOOD.replace(
-        "record: [{topic: /cmd_vel, type: geometry_msgs/msg/Twist}]", "until: {messages: 3}"
-    )
-    assert found(text) == [
-        "10: scenarios[0].until.messages: no topic is recorded: 'record' is missing"
-    ]
 
 
 def test_limits_of_the_build_and_libraries_are_told_with_their_line(found: Found) -> None:

@@ -101,12 +101,6 @@ def test_values_are_drawn_from_the_seed_and_within_bounds() -> None:
     assert len({values["x"] for values in drawn}) > 150
 
 
-def test_another_random_value_does_not_change_the_first() -> None:
-    one = a_scenario(random={"x": [0, 1]})
-    two = a_scenario(random={"y": [0, 1], "x": [0, 1]})
-    assert draw_values(one, 5)["x"] == draw_values(two, 5)["x"]
-
-
 @pytest.mark.parametrize(
     ("written", "value"),
     [
