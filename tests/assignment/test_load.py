@@ -189,29 +189,6 @@ def test_checks_of_all_scenarios_need_the_same_programs_in_each(found: Found) ->
     assert "but 'other' 'bot_pub' (__ns:=/one)" in found(renamed)[0]
 
 
-def test_checks_of_the_same_title_say_what_each_is_about(
-    write: Write, catalogue: Catalogue
-) -> None:
-    recorded = "record: [{topic: /cmd_vel, type: a/msg/B}, {topic: /odom, type: a/msg/B}]"
-    head = re.sub(r"record: .*", recorded, HEAD).replace(
-        "[bot_pub]\n", "[bot_pub]\n    depends: [a]\n"
-    )
-    loaded = load_assignment(
-        write(
-            head
-            + "  - {id: a, uses: topic.published, points: 1, with: {topic: /cmd_vel}}\n"
-            + "  - {id: b, uses: topic.published, points: 1, with: {topic: /odom}}\n"
-            + "  - {id: c, uses: node.alive, points: 1}\n"
-        ),
-        catalogue,
-    )
-    assert [bound.title for bound in loaded.checks] == [
-        "Something is right: /cmd_vel",
-        "Something is right: /odom",
-        "Something is right",
-    ]
-
-
 @pytest.mark.parametrize(
     ("key", "said"),
     [

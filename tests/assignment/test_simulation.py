@@ -64,14 +64,6 @@ def test_a_mistake_in_the_world_is_named_with_its_own_line(tmp_path: Path) -> No
     assert "world.yaml:3: circles[0].radius" in told
 
 
-def test_a_mistake_in_a_world_is_told_once_for_all_scenarios_in_it(tmp_path: Path) -> None:
-    scenario = YAML[YAML.index("  - id: run") : YAML.index("checks:")]
-    yaml = YAML.replace(scenario, scenario + scenario.replace("id: run", "id: again"))
-    told = refused(tmp_path, yaml, "values: {x: 1}\ncircles:\n  - {centre: [1, 1], radius: -1}\n")
-    assert told.count("circles[0].radius") == 1
-    assert "scenarios[0].world" in told
-
-
 def test_a_robot_that_may_start_inside_a_wall_is_refused(tmp_path: Path) -> None:
     yaml = YAML.replace("[1 m, 2 m]", "[-1 m, 1 m]").replace("x: [", "x: [", 1)
     world = "values: {x: 1}\nboxes:\n  - {centre: [$x, 0], size: [1, 1]}\n"
