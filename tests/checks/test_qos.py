@@ -78,9 +78,6 @@ class TestOffered:
         assert "a subscription that requests the expected profile does not match" in (
             finding.observed
         )
-        table = finding.evidence.tables[0]
-        assert table.header == ("policy", "expected", "offered")
-        assert table.rows == (("reliability", "reliable", "best_effort"),)
         assert "qos_profile_sensor_data is best_effort" in finding.hint
 
     def test_a_stronger_offer_is_told_to_match_all_the_same(self):

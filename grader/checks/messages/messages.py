@@ -31,7 +31,7 @@ from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
 from grader.measure.numbering import is_numbered, published
-from grader.recording.model import Kind, Message, Recording
+from grader.recording.model import Kind, Recording
 from grader.spec.name import TopicName
 
 _MOST_FIELDS = 8
@@ -218,11 +218,17 @@ def _wrong(
     )
     more = len(found) - _MOST_FIELDS
     observed += f" and {counted(more, 'more wrong field')}" if more > 0 else ""
-    explanation = _explanation(parameters, messages, found, messages[first - 1], wrong)
-    observed += f": {explanation}" if explanation else ""
+    field, message = found[0].field, messages[first - 1]
+    if accumulates(found[0].expected, [leaves(item.value).get(field) for item in messages]):
+        observed += f": {field} grows from message to message, as if added up"
+    else:
+        tolerance = tolerance_of(parameters.tolerance, field)
+        always = wrong == len(messages)
+        clause = explain(WrongValue(found, leaves(message.value), tolerance, always=always))
+        observed += f": {clause}" if clause else ""
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
-    when_s = recording.since_launch_s(messages[first - 1].stamp_ns)
+    when_s = recording.since_launch_s(message.stamp_ns)
     return Finding.failed(
         parameters.words,
         observed,
@@ -245,21 +251,6 @@ def _hint(found: tuple[Difference, ...], number: int, right: int) -> str:
         )
     fields = codes([item.field for item in found[:_MOST_FIELDS]])
     return f"Look where the program sets {fields} before publish(msg), and to what."
-
-
-def _explanation(
-    parameters: Equal,
-    messages: tuple[Message, ...],
-    found: tuple[Difference, ...],
-    message: Message,
-    wrong: int,
-) -> str:
-    field = found[0].field
-    if accumulates(found[0].expected, [leaves(item.value).get(field) for item in messages]):
-        return f"{field} grows from message to message, as if added up"
-    tolerance = tolerance_of(parameters.tolerance, field)
-    always = wrong == len(messages)
-    return explain(WrongValue(found, leaves(message.value), tolerance, always=always)) or ""
 
 
 class Series(Parameters):

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.first_seen import first_seen
 from grader.checks.need import Recorded
 from grader.checks.timing.stamps import why_not_believed
 from grader.checks.tolerance import TimeTolerance, Tolerance
@@ -249,12 +250,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     number = last.sequence - first.sequence if is_numbered(messages) else len(messages) - 1
     found_hz = number / span_s if span_s > 0.0 else math.inf
     observed = f"{found_hz:.4g} Hz: {counted(number + 1, 'message')} in {format_duration(span_s)}"
-    evidence = Evidence(
-        moments=(
-            Moment("first message", recording.since_launch_s(first.stamp_ns)),
-            Moment("last message", recording.since_launch_s(last.stamp_ns)),
-        )
-    )
+    evidence = Evidence(moments=first_seen(recording, messages))
     is_slow = parameters.at_least is not None and found_hz < parameters.at_least
     if is_slow and number >= (parameters.at_least or 0.0) * left_s(
         recording, first.stamp_ns, last.stamp_ns
