@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from grader.checks.value import leaves
 from grader.checks.wording import code, listing
-from grader.measure.echo import Wanted
-from grader.measure.printed import shows
+from grader.measure.printed import Wanted, shows
 
 _MOST_NAMED = 2
 # One of hundreds of beams has nearly every distance, and so tells nothing; a covariance has 36.

@@ -16,8 +16,18 @@ from grader.diagnosis.misread_log import what_is_shown
 from grader.diagnosis.no_messages import why_not_delivered
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
-from grader.measure.echo import Echo, Wanted, echoes, output_lines, shown
-from grader.measure.printed import exchanged, logged_text, numbers, quote, unfilled
+from grader.measure.printed import (
+    Echo,
+    Wanted,
+    echoes,
+    exchanged,
+    logged_text,
+    numbers,
+    output_lines,
+    quote,
+    shown,
+    unfilled,
+)
 from grader.recording.model import NS, Endpoint, Kind, LogLine, Recording
 from grader.spec.unit import format_duration
 

@@ -35,7 +35,6 @@ from grader.recording.model import Kind, Recording
 from grader.spec.name import TopicName
 
 _MOST_FIELDS = 8
-_SHOWN = 12
 
 
 class Count(Parameters):
@@ -293,18 +292,11 @@ class Series(Parameters):
             )
 
     @property
-    def needed(self) -> int:
-        """Messages without which nothing can be judged."""
-        return len(self.values) or self.at_least
-
-    @property
     def words(self) -> str:
         """What is expected, in words."""
         which = f"{code(self.field)} of the messages on {code(self.topic)}"
         if self.values:
-            listed = ", ".join(map(_text, self.values[:_SHOWN]))
-            more = ", ..." if len(self.values) > _SHOWN else ""
-            return f"{which}: {listed}{more}, in this order"
+            return f"{which}: {', '.join(map(_text, self.values))}, in this order"
         begins = "" if self.start is None else f" from {_text(self.start)} on"
         verb = "counts" if self.step == 1 else f"grows by {_text(self.step)}"
         return f"{which} {verb}{begins}, message by message"
@@ -340,8 +332,9 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
     ]
     if wrong:
         return _wrong_order(recording, parameters, found, wanted, wrong[0])
-    if len(messages) < parameters.needed:
-        return why_few(recording, parameters.topic, parameters.needed).finding(expected)
+    needed = len(parameters.values) or parameters.at_least
+    if len(messages) < needed:
+        return why_few(recording, parameters.topic, needed).finding(expected)
     if parameters.values and len(parameters.values) - 1 not in places:
         return Finding.to_repeat(
             expected, "the last of these messages was lost on its way to the probe"

@@ -313,8 +313,7 @@ class Compatible(Parameters):
     def peer(self, recording: Recording) -> Qos | None:
         """The peer's profile; None if the late joiner never joined."""
         if self.joiner is not None:
-            joins = [item for item in recording.joins if item.name == self.joiner]
-            return joins[0].qos if joins else None
+            return next((item.qos for item in recording.joins if item.name == self.joiner), None)
         return Qos(
             reliability=self.reliability or "reliable",
             durability=self.durability or "volatile",
