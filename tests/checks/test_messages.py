@@ -248,14 +248,13 @@ class TestEqual:
             (twist(angular=(0, 0, 0.008726646)), "in radians already"),
             (twist(angular=(0, 0, math.nan)), "angular.z is not a number"),
             # What rclpy makes of `msg.linear.x = 1`, in Python 3.11 and in 3.12.
-            (twist((5e-324, 0, 0)), "linear.x is a float field, but an integer was put into it"),
-            (twist((4e-323, 0, 0)), "linear.x is a float field, but an integer was put into it"),
-            (twist((5.12e-315, 0, 0)), "but a numpy.float32 was put into it"),
+            (
+                twist((5e-324, 0, 0)),
+                "linear.x is a float field, but an integer, a text or a numpy.float32 was",
+            ),
             # Of -1 in Python 3.11 and in 3.12, and of '1.0' in both.
             (twist((-math.nan, 0, 0)), "linear.x is not a number"),
-            (twist((NAN_OF_MINUS_ONE, 0, 0)), "but an integer was put into it"),
-            (twist((5e-323, 0, 0)), "but an integer was put into it"),
-            (twist((1.5e-323, 0, 0)), "but a text was put into it"),
+            (twist((NAN_OF_MINUS_ONE, 0, 0)), "but an integer, a text or a numpy.float32 was"),
             (twist((math.inf, 0, 0)), "linear.x is infinite"),
             (twist((0, 0, 0), (0, 0, 0)), "every number in it is zero, as in a new message"),
         ],

@@ -201,8 +201,8 @@ class TestDrives:
         [
             # What rclpy makes of the integer 1, in Python 3.11 and in 3.12, of numpy.float32(0.1)
             # and of numpy.float32(-0.1).
-            (1, "an integer was put into `linear.x`"),
-            (8, "an integer was put into `linear.x`"),
+            (1, "a numpy.float32 was put into `linear.x`"),
+            (8, "a numpy.float32 was put into `linear.x`"),
             (0x3DCCCCCD, "a numpy.float32 was put into `linear.x`"),
             (0xBDCCCCCD, "a numpy.float32 was put into `linear.x`"),
         ],

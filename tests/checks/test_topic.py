@@ -221,28 +221,6 @@ class TestType:
         finding = judge("topic.type", recording(), topic="/cmd_vel", type=TWIST)
         assert finding.status is Status.PASSED
 
-    @pytest.mark.parametrize(
-        ("actual", "words"),
-        [
-            ("geometry_msgs/msg/TwistStamped", "adds a header with a time and a frame"),
-            ("geometry_msgs/msg/Vector3", "only a part of `Twist` (its linear and angular)"),
-            ("my_msgs/msg/Twist", "the same short name, but of the package `my_msgs`"),
-            ("geometry_msgs/msg/Twists", "another message than `Twist`"),
-            ("std_msgs/msg/String", "the publisher has the type `std_msgs/msg/String`"),
-        ],
-    )
-    def test_confusions(self, actual, words):
-        found = self.judge_type(actual)
-        assert words in found
-        assert "from geometry_msgs.msg import Twist" in found
-
-    def test_the_plain_message_where_a_stamped_one_is_expected(self):
-        found = self.judge_type(TWIST, "geometry_msgs/msg/TwistStamped")
-        assert "`TwistStamped` adds a header" in found
-
-    def test_the_whole_where_a_part_is_expected(self):
-        assert "is a part of it" in self.judge_type(TWIST, "geometry_msgs/msg/Vector3")
-
     def test_one_wrong_publisher_of_two_fails(self):
         run = with_endpoints(endpoint(), endpoint(type="std_msgs/msg/String"))
         found = failing("topic.type", run, topic="/cmd_vel", type=TWIST)
