@@ -311,16 +311,10 @@ class TestAnyRhythmIsRight:
 
 class TestOtherValues:
     @pytest.mark.parametrize(
-        "text",
-        [
-            "[INFO] [1700000000.1] [bot]: Position: x = -0.62, y = 1.37",
-            '{"y": 1.372, "x": -0.618}',
-            "x: -0.62\ny: 1.37",
-        ],
+        "text", ["[INFO] [1.1] [bot]: x = -0.62, y = 1.37", '{"y": 1.372, "x": -0.618}']
     )
     def test_x_and_y_exchanged(self, text):
-        found = position(lines(text, ODOM_TIMES_S))
-        assert "none shows `pose.pose.position.x` = 1.37" in found
+        assert "none shows `pose.pose.position.x` = 1.37" in position(lines(text, ODOM_TIMES_S))
 
     @pytest.mark.parametrize("text", ["x = -0.62, y = 1.37", "x: -0.62\ny: 1.37"])
     def test_that_they_are_exchanged_is_said(self, text):
@@ -479,11 +473,6 @@ class TestNotTheStudentsFault:
         finding = self.errs(run(), {"topic": "/scan", "fields": [field]})
         assert "the assignment expects what sensor_msgs/msg/LaserScan cannot be" in finding.observed
         assert words in finding.observed
-
-
-def test_a_path_that_is_none_is_the_authors_mistake():
-    with pytest.raises(ValueError, match="'ranges 0' is not a field"):
-        judge("log.follows", run(), topic="/scan", fields=["ranges 0"])
 
 
 def test_a_message_on_rosout_does_not_count_besides_its_line():
