@@ -99,13 +99,8 @@ def test_who_may_look_at_others_is_built_with_them(
         {f"{MSGS}/CMakeLists.txt": "project(bot_msgs)\n"},
         {f"{MSGS}/package.xml": MANIFEST_OF_MSGS.replace("geometry_msgs", "bot_publisher")},
         {f"{MSGS}/package.xml": MANIFEST_OF_MSGS.replace("ada@example.org", "a@b.c")},
-        {
-            f"{MSGS}/package.xml": MANIFEST_OF_MSGS.replace(
-                "<depend>geometry_msgs</depend>", "<group_depend>all</group_depend>"
-            )
-        },
     ],
-    ids=["code", "module", "no interfaces", "needs the other", "wrong manifest", "group"],
+    ids=["code", "module", "no interfaces", "needs the other", "wrong manifest"],
 )
 def test_other_packages_are_built_together(
     tree: Tree, named_ros: RosInstallation, files: dict[str, str]
