@@ -117,16 +117,6 @@ def test_the_autograder_runs_as_gradescope_runs_it(root, submission, score):
     assert data["extra_data"]["late_s"] == 3600.0
 
 
-def test_the_workflow_uses_the_action_that_the_course_names(loaded, tmp_path):
-    file = export.github(loaded, tmp_path, "my-course/rosgrade@v1")
-    assert file == tmp_path / ".github" / "workflows" / "rosgrade.yml"
-    steps = yaml.safe_load(file.read_text())["jobs"]["grade"]["steps"]
-    (grade,) = (step for step in steps if step.get("id") == "grade")
-    assert grade["uses"] == "my-course/rosgrade@v1"
-    assert grade["with"] == {"assignment": "timed_publisher"}
-    assert "container" not in yaml.safe_load(file.read_text())["jobs"]["grade"]
-
-
 def test_the_workflow_gives_the_action_only_inputs_that_it_has(loaded, tmp_path):
     action = yaml.safe_load((ROOT / "action.yml").read_text())
     file = export.github(loaded, tmp_path, "my-course/rosgrade@v1")

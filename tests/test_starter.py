@@ -78,12 +78,6 @@ def test_a_single_program_lies_in_the_module_that_the_handouts_name() -> None:
     assert setup["install"]["install_scripts"] == "$base/lib/bot_publisher"
 
 
-def test_several_programs_have_a_module_each(tmp_path: Path) -> None:
-    files = starter_files(lesson(tmp_path))
-    assert "class Hear(Node):" in files["talker/talker/hear.py"]
-    assert "'speak = talker.speak:main'," in files["talker/setup.py"]
-
-
 def test_a_node_is_called_as_a_visible_check_wants_it(tmp_path: Path) -> None:
     files = starter_files(load_assignment("executors"))
     for module in ("single_threaded", "multi_threaded"):
@@ -161,9 +155,3 @@ def test_it_is_written_whole(tmp_path: Path) -> None:
         "talker_msgs",
     ]
     assert (written[0] / "resource" / "talker").read_text() == ""
-
-
-def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UsageError, match="file"):
-        write_starter(lesson(tmp_path), tmp_path / "file")

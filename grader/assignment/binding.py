@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 from grader.assignment.model import CheckSpec
 from grader.assignment.own_check import load_own_check
@@ -19,42 +19,16 @@ class BoundCheck:
 
     Attributes:
         parameters: Its ``with``, validated by the check's own model.
-        about: What tells it apart from checks of the same title, such as its topic; or nothing.
     """
 
     spec: CheckSpec
     check: Check
     parameters: Parameters
-    about: str = ""
 
     @property
     def title(self) -> str:
         """One line for the student: the author's, or the check's own."""
-        own = f"{self.check.title}: {self.about}" if self.about else self.check.title
-        return self.spec.title or own
-
-
-def tell_apart(checks: Sequence[BoundCheck]) -> list[BoundCheck]:
-    """Name in the titles of checks that would have the same what each is about.
-
-    That is the first text among their parameters that differs, such as the topic, or the
-    scenarios that they name.
-    """
-    groups: dict[str, list[BoundCheck]] = {}
-    for bound in checks:
-        groups.setdefault(bound.title, []).append(bound)
-    return [replace(bound, about=_about(bound, groups[bound.title])) for bound in checks]
-
-
-def _about(bound: BoundCheck, alike: Sequence[BoundCheck]) -> str:
-    if len(alike) == 1 or bound.spec.title:
-        return ""
-    for key in type(bound.parameters).model_fields:
-        texts = [getattr(one.parameters, key, None) for one in alike]
-        mine = getattr(bound.parameters, key)
-        if isinstance(mine, str) and texts.count(mine) < len(texts):
-            return str(mine)
-    return ", ".join(bound.spec.scenarios)
+        return self.spec.title or self.check.title
 
 
 def bind(

@@ -83,19 +83,33 @@ def interface_problems(
     """
     handed_in = {package.name for package in assignment.packages}
     elsewhere = {name for package in assignment.packages for name in package.depends} | PACKAGES
-    for place, interface in _imported_by_the_probe(assignment):
+    for place, interface, is_imported in _named(assignment, checks):
         package = interface.split("/")[0]
-        if package in handed_in and package not in known.packages:
+        if package not in handed_in or (is_imported and package in known.packages):
+            yield from _unknown(source, place, interface, elsewhere, known)
+        elif is_imported:
             text = (
                 f"{package!r} is handed in, and the probe never imports what a student wrote: our "
                 f"own copy of it must be in {FOLDER}/{package} beside the assignment"
             )
             yield source.problem(place, text)
-        else:
-            yield from _unknown(source, place, interface, elsewhere, known)
-    for place, interface in _named_by_checks(checks):
-        if interface.split("/")[0] not in handed_in:
-            yield from _unknown(source, place, interface, elsewhere, known)
+
+
+def _named(
+    assignment: Assignment, checks: Sequence[BoundCheck]
+) -> Iterator[tuple[Place, str, bool]]:
+    """Where interfaces are named, and whether the probe imports them."""
+    for index, scenario in enumerate(assignment.scenarios):
+        for key, items in (("record", scenario.record), ("stimuli", scenario.stimuli)):
+            for number, item in enumerate(items):
+                interface = getattr(item, "type", None)
+                if isinstance(interface, str):
+                    yield ("scenarios", index, key, number, "type"), interface, True
+    for index, bound in enumerate(checks):
+        for key in ("type", "interface"):
+            interface = getattr(bound.parameters, key, None)
+            if isinstance(interface, str) and re.fullmatch(INTERFACE, interface):
+                yield ("checks", index, "with", key), interface, False
 
 
 def _unknown(
@@ -115,20 +129,3 @@ def _unknown(
             "not among 'packages' nor what they have in 'depends'."
         )
         yield source.problem(place, text + did_you_mean(package, known.packages))
-
-
-def _imported_by_the_probe(assignment: Assignment) -> Iterator[tuple[Place, str]]:
-    for index, scenario in enumerate(assignment.scenarios):
-        for key, items in (("record", scenario.record), ("stimuli", scenario.stimuli)):
-            for number, item in enumerate(items):
-                interface = getattr(item, "type", None)
-                if isinstance(interface, str):
-                    yield ("scenarios", index, key, number, "type"), interface
-
-
-def _named_by_checks(checks: Sequence[BoundCheck]) -> Iterator[tuple[Place, str]]:
-    for index, bound in enumerate(checks):
-        for key in ("type", "interface"):
-            interface = getattr(bound.parameters, key, None)
-            if isinstance(interface, str) and re.fullmatch(INTERFACE, interface):
-                yield ("checks", index, "with", key), interface

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from grader import resources
 from grader.assignment import expected, rules, simulation
-from grader.assignment.binding import BoundCheck, bind, tell_apart
+from grader.assignment.binding import BoundCheck, bind
 from grader.assignment.interfaces import Interfaces, interface_problems
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.assignment.own_check import lesson_checks
@@ -127,7 +127,7 @@ def load_assignment(
     if found:
         raise AssignmentError(file, in_order(found))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)
-    return LoadedAssignment(assignment, file, digest, tuple(tell_apart(bound)))
+    return LoadedAssignment(assignment, file, digest, tuple(bound))
 
 
 def folder_sha256(folder: Path, besides: Path | None = None) -> str:

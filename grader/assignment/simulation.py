@@ -31,7 +31,6 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
     Worlds are tried with the values of several seeds, functions with the seed 0. Fields of
     messages are checked where the definitions are at hand.
     """
-    told: set[str] = set()
     default = assignment.packages[0].name
     for index, scenario in enumerate(assignment.scenarios):
         place: Place = ("scenarios", index)
@@ -40,7 +39,7 @@ def problems(source: Source, assignment: Assignment, known: Interfaces) -> Itera
         making = Making(source.file.parent, known.find, 0, values, launched)
         yield from _parameters(source, place, scenario, values)
         if scenario.world is not None:
-            yield from _world(source, place, scenario, told)
+            yield from _world(source, place, scenario)
         for inside, text in _stimuli(scenario, making):
             yield source.problem((*place, *inside), text)
 
@@ -69,8 +68,7 @@ def _parameters(
                 yield source.problem((*place, "launch", number, "parameters", name), str(error))
 
 
-def _world(source: Source, place: Place, scenario: Scenario, told: set[str]) -> Iterator[Problem]:
-    """Try the world of a scenario; a mistake that another scenario told is told once."""
+def _world(source: Source, place: Place, scenario: Scenario) -> Iterator[Problem]:
     file = source.file.parent / str(scenario.world)
     for seed in _TRIED_SEEDS if scenario.random else (0,):
         values = draw_values(scenario, seed)
@@ -79,9 +77,6 @@ def _world(source: Source, place: Place, scenario: Scenario, told: set[str]) -> 
             start = scenario.robot.pose if scenario.robot.pose is not None else world.start
             world.check_start(start, scenario.robot.radius or MODELS[scenario.robot.model].radius_m)
         except (AssignmentError, UsageError) as error:
-            if str(error) in told:
-                return
-            told.add(str(error))
             drawn = ", ".join(f"{name} = {value:g}" for name, value in values.items())
             yield source.problem((*place, "world"), f"{error}{f' (with {drawn})' if drawn else ''}")
             return

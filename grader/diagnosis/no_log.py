@@ -12,18 +12,25 @@ from grader.checks.wording import code, counted, listing, value_text
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.explanation import Symptom, cause_of, explanation
-from grader.diagnosis.misread_log import what_is_shown
 from grader.diagnosis.no_messages import why_not_delivered
 from grader.diagnosis.process.blocked_executor import why_blocked, why_never_spun, why_slow
 from grader.diagnosis.process.process_exit import why_ended
-from grader.measure.echo import Echo, Wanted, echoes, output_lines, shown
-from grader.measure.printed import exchanged, logged_text, numbers, quote, unfilled
+from grader.measure.printed import (
+    Echo,
+    Wanted,
+    echoes,
+    exchanged,
+    logged_text,
+    numbers,
+    output_lines,
+    quote,
+    shown,
+    unfilled,
+)
 from grader.recording.model import NS, Endpoint, Kind, LogLine, Recording
 from grader.spec.unit import format_duration
 
 _LOG_LINES = 5
-# Where needed is no more than this share of the messages, the program may log less often.
-_SOME = 0.5
 # Share of the time that the host may take before silence says nothing any more.
 _STARVED = 0.5
 # What a subscription must request for the messages from before it was there.
@@ -216,16 +223,10 @@ def only_some_logged(symptom: NotLogged) -> Cause | None:
         return None
     times_s = [recording.since_launch_s(echo.lines[-1].time_ns) for echo in found]
     written = listing(f"{time_s:.2f} s" for time_s in times_s)
-    seldom_is_right = symptom.needed <= _SOME * len(symptom.wanted)
     return Cause(
         f"{symptom.seen}, written {written} after launch",
-        "Log in every call of the callback"
-        + (
-            ", or at least once in a second."
-            if seldom_is_right
-            else ": an `if`, once=True, skip_first=True and throttle_duration_sec=... leave some "
-            "out."
-        ),
+        "Log in every call of the callback, or as often as is asked: an `if`, once=True, "
+        "skip_first=True and throttle_duration_sec=... leave some out.",
         Evidence(
             moments=tuple(Moment(f"logged a message on {topic}", time_s) for time_s in times_s),
             log=tuple(line.text for echo in found for line in echo.lines)[:_LOG_LINES],
@@ -284,7 +285,7 @@ def no_f_string(symptom: NotLogged) -> Cause | None:
 
 @explanation(NotLogged)
 def other_values(symptom: NotLogged) -> Cause | None:
-    """The lines show other values: other fields, exchanged names, a wrong sign, few decimals."""
+    """The lines show other values: another field, exchanged names, few decimals."""
     line, item, decimals = _meant(symptom), symptom.wanted[-1], symptom.decimals
     if line is None:
         return None
@@ -294,16 +295,12 @@ def other_values(symptom: NotLogged) -> Cause | None:
     values = listing(f"{code(path)} = {_rounded(item.values[path], decimals)}" for path in missing)
     lines = "\n".join(logged_text(one.text) for one in symptom.near)
     pair = exchanged(lines, item.values, decimals)
-    reason = (
-        f"names the one where it shows the other: {listing(map(code, pair))} are exchanged"
-        if pair
-        else what_is_shown(numbers(line.text), item, missing, decimals)
-    )
+    how = f", where {listing(map(code, pair))} are exchanged" if pair else ""
     rows = tuple((path, value_text(value)) for path, value in item.values.items())
     fields = listing(code(f"msg.{path}") for path in missing)
     return Cause(
         f"log lines follow messages on {code(symptom.topic)}, but none shows {values}: "
-        f"{quote(line.text)}" + (f", which {reason}" if reason else ""),
+        f"{quote(line.text)}{how}",
         f"Log the fields of the message that the callback is given: {fields}.",
         replace(
             symptom.evidence("other values logged", line),

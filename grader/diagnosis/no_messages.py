@@ -14,7 +14,6 @@ from grader.diagnosis.destroyed_endpoint import why_unpublished, why_unsubscribe
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.no_endpoint import why_no_endpoint
 from grader.diagnosis.process.process_exit import why_ended
-from grader.diagnosis.type_confusion import OtherType
 from grader.measure import compatibility
 from grader.recording.model import NS, Endpoint, Kind, Owner, Recording
 from grader.spec.unit import format_duration
@@ -172,34 +171,21 @@ def no_endpoint(symptom: OnTopic) -> Cause | None:
 
 @explanation(NoMessages, NotDelivered)
 def other_type(symptom: OnTopic) -> Cause | None:
-    """The publisher and the subscription have different message types."""
+    """The publisher and the subscription have different message types, or definitions of one."""
     wanted = sorted({item.type for item in symptom.others})
     found = sorted({item.type for item in symptom.own})
-    if not wanted or not found or set(wanted) & set(found):
+    misdefined = symptom.recording.misdefined(symptom.topic) and symptom.kind is Kind.PUBLISHER
+    if not wanted or not found or (set(wanted) & set(found) and not misdefined):
         return None
-    confusion = explain(OtherType(wanted[0], found[0])) or ""
     package, _, short = wanted[0].split("/")
+    other = "with another definition" if misdefined else f"not {codes(wanted, last='or')}"
     return Cause(
         f"{symptom.seen}: the {symptom.kind.value} on {code(symptom.topic)} has the type "
-        f"{codes(found)}, not {codes(wanted, last='or')}"
-        + (f" ({confusion})" if confusion else ""),
+        f"{codes(found)}, {other}",
         "A publisher and a subscription meet only if their types are the same: "
-        f"`from {package}.msg import {short}`.",
+        f"`from {package}.msg import {short}`. The definition of a type of your own must be the "
+        "one that was asked for: types, names, array bounds and order of its fields.",
         Evidence(moments=endpoints_seen(symptom.recording, symptom.own)),
-    )
-
-
-@explanation(NoMessages)
-def other_definition(symptom: NoMessages) -> Cause | None:
-    """The message type has the right name, but other fields than the assignment asks for."""
-    if not symptom.recording.misdefined(symptom.topic):
-        return None
-    return Cause(
-        f"no message on {code(symptom.topic)} could be read: its type "
-        f"{code(symptom.own[0].type)} has the right name, but another definition",
-        "Compare the definition with the one that was asked for: the types, names, array bounds "
-        "and order of its fields must be the same.",
-        Evidence(moments=symptom.moments),
     )
 
 

@@ -134,23 +134,9 @@ def process_ended(symptom: NoNode) -> Cause | None:
 
 
 @explanation(NoNode)
-def other_domain(symptom: NoNode) -> Cause | None:
-    """The program sets ROS_DOMAIN_ID, or joins another domain."""
-    others = symptom.recording.environment.get("other_domains")
-    if not others:
-        return None
-    return Cause(
-        f"the process {code(symptom.process.name)} joined ROS domain {others} and not the one that "
-        "it was started in",
-        "Do not set ROS_DOMAIN_ID or domain_id in the code: the environment chooses it.",
-        Evidence(moments=(symptom.nothing,)),
-    )
-
-
-@explanation(NoNode)
 def never_appeared(symptom: NoNode) -> Cause | None:
-    """The process created a node, but it never appeared in the ROS graph."""
-    if not symptom.declares("node"):
+    """The node never appeared in the ROS graph, as after a change of ROS_DOMAIN_ID."""
+    if not symptom.declares("node") and not symptom.recording.environment.get("other_domains"):
         return None
     return why_never_appeared(symptom.recording, "a node")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import PurePosixPath
@@ -12,7 +11,7 @@ from grader.checks.wording import code, codes
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.explanation import Symptom, cause_of, explain, explanation
 from grader.diagnosis.not_built import existing_package, why_no_package, why_not_built
-from grader.recording.interface import PRIMITIVES, DefinitionError, sections_of
+from grader.recording.interface import DefinitionError, sections_of
 from grader.spec.nearest_name import nearest
 from grader.submission.read.cmake import CMakeCommand, read_commands
 from grader.submission.record import Definition, PackageRecord, SourceError, SubmissionRecord
@@ -262,41 +261,4 @@ def undeclared_package(symptom: NotGenerated) -> Cause | None:
                 "its messages",
                 f"Write `DEPENDENCIES {name}` at the end of {_GENERATE}().",
             )
-    return None
-
-
-@explanation(NotGenerated)
-def no_member_of_group(symptom: NotGenerated) -> Cause | None:
-    """package.xml does not make the package a member of rosidl_interface_packages."""
-    package = symptom.package
-    if GROUP in package.groups:
-        return None
-    tag = f"<member_of_group>{GROUP}</member_of_group>"
-    return Cause(
-        f"package.xml does not make the package a member of the group {code(GROUP)}",
-        f"Add {code(tag)} to package.xml.",
-        Evidence(places=(SourceError(package.file("package.xml"), None, "no member_of_group"),)),
-    )
-
-
-@explanation(NotGenerated)
-def unknown_type(symptom: NotGenerated) -> Cause | None:
-    """The definition names a type that does not exist, or writes a type as in Python."""
-    package, file = symptom.package, symptom.definition.file
-    own = {PurePosixPath(item.file).stem for item in package.definitions}
-    for number, line in enumerate(symptom.definition.text.splitlines(), start=1):
-        written = re.match(r"\s*([A-Za-z][\w/]*)", line.partition("#")[0])
-        name = written[1] if written else "---"
-        if name.count("/") == 1 or name in {"---", *PRIMITIVES, *own}:
-            continue
-        meant = nearest(name, PRIMITIVES)
-        return Cause(
-            f"{file}:{number} names the type {code(name)}, which is neither a type of ROS nor a "
-            f"message of {code(package.name)}",
-            f"Write {code(meant)}."
-            if meant
-            else "A message of another package is written package/Name, such as "
-            "geometry_msgs/Pose2D.",
-            Evidence(places=(SourceError(file, number, f"{name} does not exist"),)),
-        )
     return None

@@ -33,6 +33,9 @@ def why_never_appeared(recording: Recording, what: str) -> Cause:
     """Why what the process declared is not in the ROS graph."""
     seen = f"the process declared {what}, but it never appeared in the ROS graph"
     names = declarations.changed_environment(recording)
+    others = recording.environment.get("other_domains")
+    if others:
+        seen, names = f"the process joined ROS domain {others} and not its own", ["ROS_DOMAIN_ID"]
     if not names and was_held_up(recording):
         return Cause.to_repeat(f"{seen}, while the machine was busy")
     changed = f": the program changed {', '.join(names)}, by which a node finds others"

@@ -23,8 +23,7 @@ _FACTORS = {
     **{0.1**n: f"is {10**n} times too small: look at the units" for n in (1, 2, 3)},
 }
 _FACTOR_TOLERANCE = 2e-3
-# As bits of a numpy.float32 this is a number next to nothing, 1e-38.
-_MOST_DIGITS = 1 << 23
+MISREAD = "an integer, a text or a numpy.float32"
 # Python 3.11 has the number of digits of a negative integer with a minus.
 _LEAST_NEGATIVE = (1 << 64) - (1 << 8)
 
@@ -64,8 +63,7 @@ def integer_in_a_float_field(symptom: WrongValue) -> str | None:
     bad = next((one for one in symptom.numbers if was_integer(one.observed)), None)
     if bad is None:
         return None
-    put = what_was_put(bad.observed)
-    return f"{bad.field} is a float field, but {put} was put into it, which ROS misreads"
+    return f"{bad.field} is a float field, but {MISREAD} was put into it, which ROS misreads"
 
 
 @explanation(WrongValue)
@@ -127,19 +125,6 @@ def was_integer(number: Any) -> bool:
     return isinstance(number, float) and (
         0.0 < abs(number) < sys.float_info.min or _bits(number) >= _LEAST_NEGATIVE
     )
-
-
-def what_was_put(number: float) -> str:
-    """What was put into a float field in place of a float, for one that :func:`was_integer`.
-
-    Of an integer rclpy takes the number of its digits for a float, or a small integer itself; of
-    a numpy.float32 all of its bits, the exponent among them; of a text how long it is.
-    """
-    bits = _bits(number)
-    if bits < _LEAST_NEGATIVE and _bits(abs(number)) > _MOST_DIGITS:
-        return "a numpy.float32"
-    # Digits are counted from 1 in Python 3.11, in eights in 3.12 with 2 for a negative integer.
-    return "an integer" if bits <= 2 or bits >= _LEAST_NEGATIVE or bits % 8 in (0, 2) else "a text"
 
 
 def _bits(number: float) -> int:

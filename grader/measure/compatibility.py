@@ -22,12 +22,7 @@ _DURATIONS = {"deadline": "deadline_s", "liveliness lease": "liveliness_lease_s"
 
 @dataclass(frozen=True)
 class Comparison:
-    """One policy of a publisher and a subscription.
-
-    Attributes:
-        compatible: Whether this policy lets them match; None where it is not known.
-        rule: What must hold.
-    """
+    """One policy of a publisher and a subscription; None where it is not known if they match."""
 
     policy: str
     offered: str

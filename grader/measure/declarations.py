@@ -27,12 +27,7 @@ class DeclaredTimer:
 
 @dataclass(frozen=True)
 class DeclaredQueue:
-    """History of an endpoint as the process asked for it.
-
-    Attributes:
-        history: ``keep_last``, ``keep_all`` or another word of the process's.
-        depth: Queue depth, or None where the process gave no number.
-    """
+    """History and depth of an endpoint as the process declared them; None for no number."""
 
     history: str
     depth: int | None

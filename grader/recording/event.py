@@ -34,12 +34,9 @@ class Breach:
 
     Attributes:
         time_ns: When it was first seen.
-        what: Of a limit: ``memory``, ``cpu time``, ``processes``, ``escaped processes``, ``open
-            files``, ``descriptors in flight``, ``sessions``, ``output``, ``disk``, ``shared
-            memory``, ``files in disk`` or ``files in shared memory``. Else ``forbidden call``,
-            ``forbidden name``, ``forbidden packets`` or ``forged report``.
-        taken: Such as ``1056 MiB of memory``; without a limit what they did, such as ``called
-            `reboot```.
+        what: A limit such as ``memory`` or ``open files``; else ``forbidden call``, ``forbidden
+            name``, ``forbidden packets`` or ``forged report``.
+        taken: Such as ``1056 MiB of memory``; without a limit such as ``called `reboot```.
         allowed: Such as ``1024 MiB``; empty where there is no limit, because it is never allowed.
     """
 

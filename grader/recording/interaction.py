@@ -64,12 +64,11 @@ class Goal:
         action: Fully qualified name.
         type: Interface name, such as ``example_interfaces/action/Fibonacci``.
         goal: Its fields.
-        sent_ns: When it was sent, or when it was due if no server was there.
+        sent_ns: When it was sent, or due if no server was there.
         accepted: The server's answer, or None if there was none by the end.
         answered_ns: When that answer was there, or None.
         feedback: In the order of its reception.
-        statuses: When the probe received a status of the goal, and which: ``accepted``,
-            ``executing``, ``canceling``, ``succeeded``, ``canceled`` or ``aborted``.
+        statuses: When the probe received a status of the goal, and which, such as ``executing``.
         cancel_after_s: It is to be canceled so long after it was accepted; None for not at all.
         canceled_ns: When the probe asked to cancel it, or None.
         cancel_answered_ns: When that was answered, or None.

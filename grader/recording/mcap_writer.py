@@ -44,6 +44,13 @@ CHANNELS: dict[str, str] = {
 """Field of the recording -> attribute that dates it, for the facts kept as JSON."""
 
 
+_FRAME = (
+    *("scenario", "seed", "launched_ns", "matched_ns", "stop_ns", "end_ns", "faults"),
+    *("values", "answers", "environment"),
+)
+"""Fields of the recording that are kept as they are in the metadata."""
+
+
 @dataclass(frozen=True)
 class RawMessage:
     """A message as it came over DDS.
@@ -126,20 +133,7 @@ def _write_messages(
 
 
 def _frame(recording: Recording) -> dict[str, str]:
-    frame = {
-        "format": FORMAT,
-        "scenario": recording.scenario,
-        "seed": recording.seed,
-        "ending": recording.ending.value,
-        "launched_ns": recording.launched_ns,
-        "matched_ns": recording.matched_ns,
-        "stop_ns": recording.stop_ns,
-        "end_ns": recording.end_ns,
-        "faults": list(recording.faults),
-        "values": dict(recording.values),
-        "sent": sorted(recording.sent),
-        "answers": dict(recording.answers),
-        "scene": dataclasses.asdict(recording.scene) if recording.scene else None,
-        "environment": dict(recording.environment),
-    }
-    return {key: json.dumps(value, sort_keys=True) for key, value in frame.items()}
+    frame = {name: getattr(recording, name) for name in _FRAME}
+    frame |= {"format": FORMAT, "ending": recording.ending.value, "sent": sorted(recording.sent)}
+    frame["scene"] = dataclasses.asdict(recording.scene) if recording.scene else None
+    return {key: json.dumps(value, sort_keys=True, default=dict) for key, value in frame.items()}

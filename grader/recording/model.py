@@ -164,11 +164,9 @@ class Process:
         started_ns: When it was started.
         exited_ns: When it had ended, or None if it could not be ended at all.
         exit_code: As in :mod:`subprocess`: negative for the signal that ended it.
-        stopped_by: ``itself`` (before we asked), ``SIGINT``, ``SIGTERM`` or ``SIGKILL``:
-            the last signal that rosgrade had to send.
-        stop_s: Seconds from our SIGINT to its end, less what the host took; None if it
-            ended before.
-        survivors: Commands of descendants that were still there after it and had to be killed.
+        stopped_by: ``itself``, or the last signal that rosgrade had to send: ``SIGINT``, ...
+        stop_s: Seconds from SIGINT to its end, less what the host took; None if it ended before.
+        survivors: Commands of descendants that had to be killed after it.
         dropped_bytes: Bytes of output beyond what was kept.
     """
 
@@ -216,11 +214,9 @@ class Declaration:
             ``destroyed`` (a publisher or subscription),
             ``exiting`` (Python ends in its usual way), ``foreign`` (another than the tracer
             wrote to the tracer's pipe).
-        data: For publisher and subscription: node, topic, type, reliability, durability,
-            history, depth, number; for subscription also group. For destroyed:
-            number. For timer: node, period_s, callback,
-            group (type and id of the callback group). For spin: executor,
-            threads. For held: topic, waited_s, matched.
+        data: Of a publisher or subscription its node, topic, type, QoS, number and group; of
+            a timer its node, period_s, callback and group; of a spin its executor and threads;
+            of a held publisher its topic, waited_s and matched.
     """
 
     time_ns: int
@@ -238,11 +234,10 @@ class Call:
         type: Interface name.
         requested_ns: When the request was sent.
         answered_ns: When the answer was there, or None if there was none by the end.
-        request: Fields of the request; of the calls to ``list_parameters`` they are not kept.
-        response: Fields of the response, or None.
+        request: Its fields; of the calls to ``list_parameters`` they are not kept.
+        response: Its fields, or None.
         error: Why it could not be sent or read: ``no server``, or what went wrong in rosgrade.
-        servers: How many nodes offered the service then; of the calls to ``list_parameters`` and
-            ``get_type_description`` all of them must have answered.
+        servers: How many nodes offered the service then.
     """
 
     service: str
@@ -290,13 +285,11 @@ class Recording:
         end_ns: When everything had ended.
         submission: What was known before the run.
         messages: By topic, in the order of their source timestamps.
-        sent: What the probe published, by topic, in that order; a topic on which it should have
-            published, but on which no subscription of the student's ever matched, has none.
-        answers: Topic in ``sent`` -> topic on which the answers are expected, where the scenario
-            names one.
+        sent: What the probe published, by topic, in that order; none where no subscription of
+            the student's ever matched.
+        answers: Topic in ``sent`` -> topic on which the scenario expects the answers.
         joined: What late joiners received, by their names, in the order of their reception.
-        unreadable: Topic -> how many messages on it hold other bytes than its type has; they are
-            not among ``messages``.
+        unreadable: Topic -> how many messages on it hold other bytes than its type has.
         nodes: Nodes that were seen in the graph, in the order of their appearance.
         endpoints: Their publishers and subscriptions, likewise.
         processes: The student's, in the order of `launch`.
@@ -315,10 +308,8 @@ class Recording:
         incidents: What the simulator noted.
         scene: World and robot, or None in a scenario without a world.
         values: Random values of the scenario by name, in SI units.
-        environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...;
-            ``ros_imports``, packages of ROS that the submission imports and that are installed;
-            where it is known and there are any, ``other_domains`` that the student joined, and
-            ``remaps``.
+        environment: ``ros_distro``, ``rmw``, ``python``, ``domain_id``, ``sandbox``, ...; the
+            ``ros_imports`` that are installed; ``other_domains`` that the student joined.
     """
 
     scenario: str
@@ -383,10 +374,7 @@ class Recording:
         )
 
     def misdefined(self, topic: str) -> bool:
-        """Whether the student publishes another definition of the type that the probe reads.
-
-        The middleware lets such endpoints meet, for their types have the same name.
-        """
+        """Whether the student publishes another definition of the type that the probe reads."""
         ends = [item for item in self.endpoints if item.topic == topic and item.type_hash]
         ours = {(e.type, e.type_hash) for e in ends if e.owner is Owner.PROBE}
         theirs = (e for e in ends if e.owner is Owner.STUDENT and e.kind is Kind.PUBLISHER)

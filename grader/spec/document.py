@@ -142,17 +142,14 @@ _SCALARS: dict[str, Callable[[str], Any]] = {
 }
 
 _ADVICE = {
-    "a quoted scalar, found unexpected end": "its closing quote is missing",
     "found character '\\t'": "indent with spaces, not with tabs",
     "that cannot start any token": "a text that begins with it needs quotes",
     "mapping values are not allowed here": "a text with ': ' in it needs quotes, and a key "
     "stands as far to the right as the keys beside it",
-    "but found '<block mapping start>'": "is a line indented further than those around it?",
-    "unknown escape character": "in double quotes a backslash begins an escape: write the text in "
-    "single quotes, as in '\\d+'",
+    "unknown escape character": "write a text with a backslash in single quotes, as in '\\d+'",
     "expected <block end>": "does this line stand as far to the right as those that it belongs to, "
     "and is every quote before it closed?",
-    "while parsing a flow": "is a comma, a bracket or a quote missing?",
+    "while": "is a comma, a bracket or a quote missing?",
 }
 
 

@@ -48,11 +48,8 @@ UNITS: dict[Dimension, dict[str, float]] = {
 # What people write instead, in lower case.
 _MISSPELT = {
     **{unit.casefold(): unit for units in UNITS.values() for unit in units if unit != "mHz"},
-    **dict.fromkeys(("sec", "second", "seconds"), "s"),
-    **dict.fromkeys(("μs", "usec"), "us"),
-    **dict.fromkeys(("degree", "degrees", "°"), "deg"),
-    **{"msec": "ms", "°/s": "deg/s", "percent": "%", "m/s²": "m/s^2", "rad/s²": "rad/s^2"},
-    **{"kb": "KiB", "mb": "MiB", "gb": "GiB", "bytes": "B"},
+    **{"sec": "s", "seconds": "s", "μs": "us", "degrees": "deg", "°": "deg", "°/s": "deg/s"},
+    **{"percent": "%", "m/s²": "m/s^2", "kb": "KiB", "mb": "MiB", "gb": "GiB"},
 }
 
 _NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"

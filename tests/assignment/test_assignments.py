@@ -26,10 +26,6 @@ def mutants(loaded: LoadedAssignment) -> Mutants:
     return load_mutants(loaded.assignment, loaded.folder)
 
 
-def test_the_publisher_lessons_are_there() -> None:
-    assert set(PUBLISHERS) <= set(list_assignments())
-
-
 def test_every_check_is_noticed_by_a_mutant(loaded: LoadedAssignment, mutants: Mutants) -> None:
     """A check that no mutant loses might as well always pass."""
     lost = {check for mutant in mutants.mutants if not mutant.skip_reason for check in mutant.loses}

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from grader import resources
 from grader.assignment.load import load_assignment
 from grader.assignment.own_check import all_checks
 from grader.errors import AssignmentError
@@ -106,9 +104,3 @@ def test_what_a_check_needs_is_asked_of_the_assignment(lesson) -> None:
 
 def test_the_checks_of_rosgrades_own_lessons_are_listed() -> None:
     assert {"rotation.answers", "callbacks.run", "motion.proportional"} <= set(all_checks())
-
-
-def test_a_copied_lesson_brings_its_checks(tmp_path) -> None:
-    source = resources.assignments() / "executors"
-    subprocess.run(["cp", "-r", str(source), str(tmp_path)], check=True)
-    assert load_assignment(tmp_path / "executors").checks

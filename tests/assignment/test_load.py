@@ -16,7 +16,7 @@ from grader.assignment.load import (
     load_assignment,
 )
 from grader.checks.check import Check
-from grader.errors import AssignmentError, UsageError
+from grader.errors import UsageError
 from tests.assignment.lessons import GOOD, HEAD
 
 Write = Callable[..., Path]
@@ -189,29 +189,6 @@ def test_checks_of_all_scenarios_need_the_same_programs_in_each(found: Found) ->
     assert "but 'other' 'bot_pub' (__ns:=/one)" in found(renamed)[0]
 
 
-def test_checks_of_the_same_title_say_what_each_is_about(
-    write: Write, catalogue: Catalogue
-) -> None:
-    recorded = "record: [{topic: /cmd_vel, type: a/msg/B}, {topic: /odom, type: a/msg/B}]"
-    head = re.sub(r"record: .*", recorded, HEAD).replace(
-        "[bot_pub]\n", "[bot_pub]\n    depends: [a]\n"
-    )
-    loaded = load_assignment(
-        write(
-            head
-            + "  - {id: a, uses: topic.published, points: 1, with: {topic: /cmd_vel}}\n"
-            + "  - {id: b, uses: topic.published, points: 1, with: {topic: /odom}}\n"
-            + "  - {id: c, uses: node.alive, points: 1}\n"
-        ),
-        catalogue,
-    )
-    assert [bound.title for bound in loaded.checks] == [
-        "Something is right: /cmd_vel",
-        "Something is right: /odom",
-        "Something is right",
-    ]
-
-
 @pytest.mark.parametrize(
     ("key", "said"),
     [
@@ -223,24 +200,6 @@ def test_checks_of_the_same_title_say_what_each_is_about(
 def test_what_is_about_the_robot_needs_a_world(found: Found, key: str, said: str) -> None:
     (told,) = found(GOOD.replace("timeout: 5 s", f"timeout: 5 s\n    {key}"))
     assert told.startswith(f"12: scenarios[0].{said}")
-
-
-def test_a_check_of_the_motion_needs_a_world_in_each_of_its_scenarios(write: Write) -> None:
-    folder = write(HEAD + "  - {id: touches, uses: motion.no_contact, points: 1}\n")
-    with pytest.raises(AssignmentError) as caught:
-        load_assignment(folder)
-    (problem,) = caught.value.problems
-    assert (problem.line, problem.where) == (13, "checks[0].uses")
-    assert problem.message == "the scenario 'run' has no 'world', and so no simulated robot"
-
-
-def test_waiting_for_messages_that_are_not_recorded_is_a_mistake(found: Found) -> None:
-    text = GOOD.replace(
-        "record: [{topic: /cmd_vel, type: geometry_msgs/msg/Twist}]", "until: {messages: 3}"
-    )
-    assert found(text) == [
-        "10: scenarios[0].until.messages: no topic is recorded: 'record' is missing"
-    ]
 
 
 def test_limits_of_the_build_and_libraries_are_told_with_their_line(found: Found) -> None:

@@ -56,7 +56,6 @@ def found(mistakes: Callable[[str], list[str]], ros_with: Callable[..., None]) -
         ("service.responds", "service: /enable"),
         ("lifecycle.state", "node: bot, states: [active]"),
         ("parameter.declared", "node: bot, name: anything"),
-        ("parameter.set", "node: bot, name: speed, value: 0.5"),
         (
             "parameter.takes_effect",
             "node: bot, name: speed, value: 0.5, topic: /speed, fields: {data: 0.5}",
@@ -74,19 +73,16 @@ def test_what_fits(found: Found, uses: str, parameters: str) -> None:
     [
         ("service.responds", "service: /enabel", r"asks '/enabel'\. Did you mean '/enable'\?"),
         ("service.concurrent", "service: /enable, takes: 1 s", "never twice at once"),
-        ("service.responds", "service: /enable, within: 5 s", "waits only 2 s for an answer"),
         ("action.result", "action: /fib, within: 11 s", "waits only 10 s for an answer"),
         ("lifecycle.state", "node: other, states: [active]", "asks '/other/get_state'"),
         ("lifecycle.state", "node: bot, states: [inactive, active]", "only 1 times"),
         ("parameter.declared", "node: bto, name: x", r"Did you mean '/bot'\?"),
         ("parameter.set", "node: bot, name: speed, value: 0.6", "to 0.5, never to 0.6"),
-        ("parameter.set", "node: bot, name: other, value: 0.5", "to nothing, never to 0.5"),
         (
             "messages.follows",
             "topic: /speed, source: /sped, fields: {data: data}, tolerance: 0.1",
             r"does not record '/sped'\. Did you mean '/speed'\?",
         ),
-        ("action.result", "action: /fab, within: 1 s", "asks '/fab'"),
         ("action.cancels", "action: /fib", "no goal of the scenario 'run' has 'cancel_after'"),
         ("source.ruff", "package: bot, rules: [F, F999999]", "ruff has no rule 'F999999'"),
     ],

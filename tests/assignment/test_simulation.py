@@ -64,14 +64,6 @@ def test_a_mistake_in_the_world_is_named_with_its_own_line(tmp_path: Path) -> No
     assert "world.yaml:3: circles[0].radius" in told
 
 
-def test_a_mistake_in_a_world_is_told_once_for_all_scenarios_in_it(tmp_path: Path) -> None:
-    scenario = YAML[YAML.index("  - id: run") : YAML.index("checks:")]
-    yaml = YAML.replace(scenario, scenario + scenario.replace("id: run", "id: again"))
-    told = refused(tmp_path, yaml, "values: {x: 1}\ncircles:\n  - {centre: [1, 1], radius: -1}\n")
-    assert told.count("circles[0].radius") == 1
-    assert "scenarios[0].world" in told
-
-
 def test_a_robot_that_may_start_inside_a_wall_is_refused(tmp_path: Path) -> None:
     yaml = YAML.replace("[1 m, 2 m]", "[-1 m, 1 m]").replace("x: [", "x: [", 1)
     world = "values: {x: 1}\nboxes:\n  - {centre: [$x, 0], size: [1, 1]}\n"
@@ -99,12 +91,6 @@ def test_values_are_drawn_from_the_seed_and_within_bounds() -> None:
     assert all(-2.0 <= values["x"] <= 2.0 for values in drawn)
     assert all(0.174 <= values["turn"] <= 0.35 for values in drawn)
     assert len({values["x"] for values in drawn}) > 150
-
-
-def test_another_random_value_does_not_change_the_first() -> None:
-    one = a_scenario(random={"x": [0, 1]})
-    two = a_scenario(random={"y": [0, 1], "x": [0, 1]})
-    assert draw_values(one, 5)["x"] == draw_values(two, 5)["x"]
 
 
 @pytest.mark.parametrize(

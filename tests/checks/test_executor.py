@@ -254,12 +254,3 @@ class TestNotJudged:
             log=output(traceback("KeyError: 'x'")),
         )
         assert "KeyError: 'x'" in failing("executor.responsive", run)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "words"),
-    [({"within": "0 s"}, "too small"), ({"share": "150 %"}, "more than 100 % of the calls")],
-)
-def test_parameters_out_of_range_are_refused(parameters, words):
-    with pytest.raises(ValueError, match=words):
-        responsive(recording(), **parameters)

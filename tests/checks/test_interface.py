@@ -255,10 +255,6 @@ class TestGenerated:
         cmake = "".join([*lines[:2], lines[-1], *lines[2:-1]])
         assert "ament_package() before rosidl" in self.generated(unbuilt(cmake=cmake))
 
-    def test_the_group_of_interface_packages(self):
-        found = self.generated(unbuilt(groups=()))
-        assert "<member_of_group>rosidl_interface_packages</member_of_group>" in found
-
     def test_a_build_that_succeeds_without_the_message(self):
         cmake = CMAKE.replace("msg/BotStatus.msg", "msg/Wheel.msg")
         found = self.generated(handed_in(cmake=cmake, generated=()))
@@ -274,22 +270,6 @@ class TestGenerated:
     def test_an_error_that_nothing_explains_is_that_of_the_build(self):
         found = self.generated(unbuilt())
         assert "`colcon build` failed" in found
-
-    def test_a_type_with_msg_in_the_middle(self):
-        found = self.generated(unbuilt(TEXT.replace("geometry_msgs/", "geometry_msgs/msg/")))
-        assert "src/bot_msgs/msg/BotStatus.msg:4 names the type `geometry_msgs/msg/Pose2D`" in found
-        assert "such as geometry_msgs/Pose2D" in found
-
-    @pytest.mark.parametrize(
-        ("old", "new", "words"),
-        [
-            ("geometry_msgs/", "", "names the type `Pose2D`, which is neither"),
-            ("float64", "float46", "Write `float64`"),
-            ("uint8 model", "unit8 model", "Write `uint8`"),
-        ],
-    )
-    def test_a_type_that_does_not_exist(self, old, new, words):
-        assert words in self.generated(unbuilt(TEXT.replace(old, new)))
 
     def test_a_python_package_generates_nothing(self):
         found = self.generated(handed_in(build_type="ament_python", generated=()))

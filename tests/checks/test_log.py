@@ -261,9 +261,7 @@ class TestAnyRhythmIsRight:
         kept_apart = lines("1.37 -0.62", ODOM_TIMES_S[1:])
         found = failing("log.follows", run(kept_apart), **{**POSITION, "at_least": 6})
         assert "only 5 of 6" in found
-        assert "skip_first=True" in found and "once in a second" not in found
-        found = failing("log.follows", run(kept_apart[:1]), **POSITION)
-        assert "at least once in a second" in found
+        assert "skip_first=True" in found
 
     def test_lines_that_come_too_seldom(self):
         once = [1.0 + 0.2 * index for index in range(16)]
@@ -313,16 +311,10 @@ class TestAnyRhythmIsRight:
 
 class TestOtherValues:
     @pytest.mark.parametrize(
-        "text",
-        [
-            "[INFO] [1700000000.1] [bot]: Position: x = -0.62, y = 1.37",
-            '{"y": 1.372, "x": -0.618}',
-            "x: -0.62\ny: 1.37",
-        ],
+        "text", ["[INFO] [1.1] [bot]: x = -0.62, y = 1.37", '{"y": 1.372, "x": -0.618}']
     )
     def test_x_and_y_exchanged(self, text):
-        found = position(lines(text, ODOM_TIMES_S))
-        assert "none shows `pose.pose.position.x` = 1.37" in found
+        assert "none shows `pose.pose.position.x` = 1.37" in position(lines(text, ODOM_TIMES_S))
 
     @pytest.mark.parametrize("text", ["x = -0.62, y = 1.37", "x: -0.62\ny: 1.37"])
     def test_that_they_are_exchanged_is_said(self, text):
@@ -343,58 +335,18 @@ class TestOtherValues:
         assert "messages on `/scan`, to 2 decimals, within 500 ms" in finding.expected
 
     def test_another_beam(self):
-        assert "`2.50`, which shows `ranges[180]`" in front(lines("2.50", SCAN_TIMES_S))
-
-    def test_ranges_that_are_no_numbers(self):
-        echoes = "sensor_msgs/msg/MultiEchoLaserScan"
-        value = {"range_max": 3.5, "ranges": [{"echoes": [AHEAD]}] * 40}
-        changed = {"/scan": sent("/scan", echoes, value, SCAN_TIMES_S)}
-        log = lines("reaches 2.5", SCAN_TIMES_S)
-        asked = {**FRONT, "fields": ["range_max"]}
-        found = failing("log.follows", run(log, messages=changed), **asked)
-        assert "none shows `range_max` = 3.50" in found
+        assert "none shows `ranges[0]` = 1.83: `2.50`" in front(lines("2.50", SCAN_TIMES_S))
 
     def test_what_is_written_at_ctrl_c_answers_no_message(self):
         log = lines("2.50", SCAN_TIMES_S) + output(traceback("KeyboardInterrupt"), time_s=4.25)
         found = front(log, stop_s=4.2)
-        assert "`2.50`, which shows `ranges[180]`" in found
+        assert "none shows `ranges[0]` = 1.83: `2.50`" in found
         assert "File" not in found and "Traceback" not in found
-
-    def test_the_nearest_of_all_beams(self):
-        found = front(lines("front 0.618", SCAN_TIMES_S))
-        assert "none shows `ranges[0]` = 1.83" in found
-        assert "which shows `min(ranges)`" in found
-        assert "`msg.ranges[0]`" in found
-
-    def test_a_number_of_some_beam_tells_nothing(self):
-        """A mean of the beams is the distance of one of them, too."""
-        changed = ranging(*RANGES[:137], 2.345, *RANGES[138:])
-        found = front(lines("front 2.345", SCAN_TIMES_S), **changed)
-        assert "none shows `ranges[0]`" in found
-        assert "which shows" not in found
 
     def test_z_in_place_of_y(self):
         found = position(lines("1.37 0.0", ODOM_TIMES_S))
         assert "none shows `pose.pose.position.y` = -0.62: `1.37 0.0`" in found
         assert "`pose.pose.position.x`" not in found
-
-    @pytest.mark.parametrize(
-        ("text", "words"),
-        [
-            ("1.8", "`ranges[0]` with fewer decimals"),
-            ("2", "`ranges[0]` with fewer decimals"),
-            ("1", "`ranges[0]` with fewer decimals"),
-            ("-1.834", "`ranges[0]` with the opposite sign"),
-            ("-1.83", "`ranges[0]` with the opposite sign"),
-        ],
-    )
-    def test_the_value_in_another_form(self, text, words):
-        assert words in front(lines(text, SCAN_TIMES_S))
-
-    def test_infinity_is_no_beam_in_particular(self):
-        changed = ranging(AHEAD, float("inf"), BEHIND, float("inf"))
-        found = front(lines("mean inf", SCAN_TIMES_S), **changed)
-        assert "`mean inf`" in found and "which shows" not in found
 
     @pytest.mark.parametrize(
         ("text", "braces"),
@@ -521,11 +473,6 @@ class TestNotTheStudentsFault:
         finding = self.errs(run(), {"topic": "/scan", "fields": [field]})
         assert "the assignment expects what sensor_msgs/msg/LaserScan cannot be" in finding.observed
         assert words in finding.observed
-
-
-def test_a_path_that_is_none_is_the_authors_mistake():
-    with pytest.raises(ValueError, match="'ranges 0' is not a field"):
-        judge("log.follows", run(), topic="/scan", fields=["ranges 0"])
 
 
 def test_a_message_on_rosout_does_not_count_besides_its_line():

@@ -83,18 +83,6 @@ class TestCount:
         run = recording(messages=messages(every(0.3, number)) if number else {})
         assert count(run, **limits).status is status
 
-    @pytest.mark.parametrize(
-        ("limits", "words"),
-        [
-            ({}, "say how many"),
-            ({"exactly": 1, "at_most": 2}, "exactly stands alone"),
-            ({"at_least": 3, "at_most": 2}, r"at_least \(3\) is more than at_most \(2\)"),
-        ],
-    )
-    def test_limits_that_make_no_sense_are_refused(self, limits, words):
-        with pytest.raises(ValueError, match=words):
-            count(recording(), **limits)
-
     def test_a_message_lost_on_its_way_was_published_all_the_same(self):
         run = recording(messages={"/cmd_vel": (message(1.0, sequence=2),)})
         finding = count(run, exactly=1)
@@ -181,7 +169,11 @@ class TestSilence:
         ("check", "parameters"),
         [
             ("messages.equal", {"value": VALUE}),
+            ("messages.sequence", {"field": "data", "step": 1}),
             ("timing.period", {"period": "300 ms"}),
+            ("timing.rate", {"at_least": "9 Hz"}),
+            ("timing.latency", {"stimulus": "/chatter", "median": "20 ms"}),
+            ("executor.timer", {}),
         ],
     )
     def test_the_same_words_in_every_check_that_needs_messages(self, check, parameters):
@@ -248,14 +240,13 @@ class TestEqual:
             (twist(angular=(0, 0, 0.008726646)), "in radians already"),
             (twist(angular=(0, 0, math.nan)), "angular.z is not a number"),
             # What rclpy makes of `msg.linear.x = 1`, in Python 3.11 and in 3.12.
-            (twist((5e-324, 0, 0)), "linear.x is a float field, but an integer was put into it"),
-            (twist((4e-323, 0, 0)), "linear.x is a float field, but an integer was put into it"),
-            (twist((5.12e-315, 0, 0)), "but a numpy.float32 was put into it"),
+            (
+                twist((5e-324, 0, 0)),
+                "linear.x is a float field, but an integer, a text or a numpy.float32 was",
+            ),
             # Of -1 in Python 3.11 and in 3.12, and of '1.0' in both.
             (twist((-math.nan, 0, 0)), "linear.x is not a number"),
-            (twist((NAN_OF_MINUS_ONE, 0, 0)), "but an integer was put into it"),
-            (twist((5e-323, 0, 0)), "but an integer was put into it"),
-            (twist((1.5e-323, 0, 0)), "but a text was put into it"),
+            (twist((NAN_OF_MINUS_ONE, 0, 0)), "but an integer, a text or a numpy.float32 was"),
             (twist((math.inf, 0, 0)), "linear.x is infinite"),
             (twist((0, 0, 0), (0, 0, 0)), "every number in it is zero, as in a new message"),
         ],
@@ -293,11 +284,6 @@ class TestEqual:
         assert finding.status is Status.ERROR
         assert f"the assignment expects what {TWIST} cannot be" in finding.observed
         assert words in finding.observed
-
-    def test_too_few_right_messages(self):
-        run = recording(messages=messages(every(0.3, 3)))
-        found = failing("messages.equal", run, topic="/cmd_vel", value=VALUE, at_least=10)
-        assert "3 messages on `/cmd_vel`" in found
 
     def test_arrays_are_compared_with_their_length(self):
         def run(data):

@@ -148,22 +148,5 @@ class TestLateJoiner:
         assert finding.status is Status.ERROR
 
 
-def test_a_missing_endpoint_is_told_as_such():
-    run = recording(endpoints=(endpoint("/cmdvel"), reader()), messages={})
-    assert "`/cmdvel` instead" in failing("qos.compatible", run, **peer())
-
-
-@pytest.mark.parametrize(
-    ("parameters", "words"),
-    [
-        ({"joiner": "late", "deadline": "1 s"}, "leave 'deadline' out"),
-        ({"kind": "subscription", "joiner": "late"}, "a late joiner subscribes"),
-    ],
-)
-def test_senseless_parameters_are_refused(parameters, words):
-    with pytest.raises(ValueError, match=words):
-        judge("qos.compatible", having(RELIABLE), **peer() | parameters)
-
-
 def test_an_unknown_policy_refuses_nothing():
     assert judge("qos.compatible", having(Qos()), **peer()).status is Status.PASSED

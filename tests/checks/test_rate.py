@@ -2,11 +2,8 @@
 
 from dataclasses import replace
 
-import pytest
-
 from grader.checks.finding import Status
 from tests.checks.builder import (
-    declarations,
     died,
     every,
     failing,
@@ -14,7 +11,6 @@ from tests.checks.builder import (
     message,
     messages,
     recording,
-    silent,
     taken,
 )
 
@@ -93,17 +89,3 @@ class TestAPause:
         run = self.paused(*every(0.1, 20), disturbance=taken(2.6, 4.0, waited_s=1.0))
         finding = judge("timing.rate", run, **PAUSED)
         assert finding.status is Status.ERROR and finding.disturbed
-
-
-def test_silence_is_told_as_such():
-    run = silent(declarations=declarations(timer_s=300.0))
-    assert "timer of 5 min" in failing("timing.rate", run, topic="/cmd_vel", at_least="9 Hz")
-
-
-@pytest.mark.parametrize(
-    ("bounds", "words"),
-    [({}, "give a bound"), ({"at_least": "9 Hz", "at_most": "1 Hz"}, "more than at_most")],
-)
-def test_senseless_bounds_are_refused(bounds, words):
-    with pytest.raises(ValueError, match=words):
-        judge("timing.rate", at_rate(0.1), topic="/cmd_vel", **bounds)

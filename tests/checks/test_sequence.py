@@ -70,16 +70,3 @@ def test_a_field_that_does_not_exist_is_the_author_s_mistake():
     finding = judge("messages.sequence", counting(1, 2, 3), **sequence(step=1) | {"field": "date"})
     assert finding.status is Status.ERROR
     assert "has no field 'date'; it has data. Did you mean 'data'?" in finding.observed
-
-
-@pytest.mark.parametrize(
-    ("parameters", "words"),
-    [
-        ({}, "either 'values' or 'step'"),
-        ({"values": [1], "step": 1}, "either 'values' or 'step'"),
-        ({"values": [1], "start": 1}, "'start' goes with 'step'"),
-    ],
-)
-def test_senseless_parameters_are_refused(parameters, words):
-    with pytest.raises(ValueError, match=words):
-        judge("messages.sequence", counting(1), **sequence(**parameters))

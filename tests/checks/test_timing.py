@@ -8,23 +8,19 @@ from hypothesis import strategies as st
 
 from grader.checks.finding import Status
 from grader.recording.event import Disturbance
-from grader.recording.model import NS, Ending
+from grader.recording.model import NS
 from tests.checks.builder import (
     PERIOD_S,
     after,
     at,
     declarations,
-    died,
     every,
     failing,
     judge,
     message,
     messages,
-    output,
     recording,
-    silent,
     taken,
-    traceback,
 )
 
 
@@ -32,11 +28,14 @@ def period(run, **parameters):
     return judge("timing.period", run, topic="/cmd_vel", **{"period": "300 ms", **parameters})
 
 
-def wrong(intervals_s, **changes):
-    """What is said of a run with these intervals."""
+def spaced(intervals_s, **changes):
+    """A run with these intervals between the messages."""
     times = after(intervals_s)
-    changes.setdefault("stop_s", max(times) + 0.5)
-    run = recording(messages=messages(times), **changes)
+    return recording(**{"messages": messages(times), "stop_s": max(times) + 0.2, **changes})
+
+
+def wrong(run):
+    """What is said of a run at a wrong period."""
     return failing("timing.period", run, topic="/cmd_vel", period="300 ms")
 
 
@@ -59,7 +58,7 @@ class TestGood:
         assert plot.y_label == "time between messages (ms)"
 
     def test_one_late_message_is_forgiven_without_any_disturbance(self):
-        run = recording(messages=messages(after([0.3] * 4 + [0.36, 0.24] + [0.3] * 5)))
+        run = spaced([0.3] * 4 + [0.36, 0.24] + [0.3] * 5)
         assert period(run).status is Status.PASSED
 
     def test_messages_lost_on_the_way_are_no_long_intervals(self):
@@ -75,27 +74,20 @@ class TestGood:
         run = recording(messages={"/cmd_vel": stream}, matched_s=3.0)
         assert period(run).status is Status.PASSED
 
-    @given(st.lists(st.floats(-0.014, 0.014), min_size=5, max_size=40))
-    def test_any_jitter_within_the_tolerance_passes_in_any_order(self, jitter):
-        times = after([0.3 + j for j in jitter])
-        run = recording(messages=messages(times), stop_s=max(times) + 0.2)
-        assert period(run).status is Status.PASSED
-
     @given(st.lists(st.floats(-0.014, 0.014), min_size=5, max_size=40), st.integers(0, 40))
     def test_one_late_message_anywhere_never_decides(self, jitter, index):
         intervals = [0.3 + j / 3 for j in jitter]
         index %= len(intervals) - 1
         intervals[index] += 0.12
         intervals[index + 1] -= 0.12
-        times = after(intervals)
-        run = recording(messages=messages(times), stop_s=max(times) + 0.2)
+        run = spaced(intervals)
         assert period(run).status is Status.PASSED
 
 
 class TestEnds:
     def test_messages_that_stop_long_before_the_end(self):
         run = recording(messages=messages(every(0.3, 9)), stop_s=5.4)
-        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
+        found = wrong(run)
         assert "9 messages at the right period, but none in the last 2.3 s" in found
         assert "timer.cancel()" in found
 
@@ -109,16 +101,6 @@ class TestEnds:
         )
         assert (period(run).status, period(run).disturbed) == (Status.ERROR, True)
         assert "but the machine took the time" in period(run).observed
-
-    def test_a_death_is_the_deeper_cause(self):
-        run = recording(
-            messages=messages(every(0.3, 9)),
-            stop_s=5.4,
-            processes=(died(1, 3.2),),
-            log=output(traceback("KeyError: 'x'")),
-        )
-        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
-        assert "KeyError: 'x'" in found
 
 
 class TestProperties:
@@ -142,8 +124,7 @@ class TestProperties:
         assume(abs(abs(middle - 0.3) - 0.015) > 1e-4 and len(intervals) % 2)
 
         def status(scale):
-            times = after([value * scale for value in intervals])
-            run = recording(messages=messages(times), stop_s=times[-1] + 0.1, declarations=())
+            run = spaced([value * scale for value in intervals], declarations=())
             return period(run, period=f"{300 * scale} ms").status
 
         assert status(1) == status(factor)
@@ -153,16 +134,12 @@ class TestProperties:
         st.lists(st.tuples(st.floats(0.01, 6), st.floats(0, 1), st.floats(0, 1)), max_size=20),
     )
     def test_disturbance_never_turns_a_pass_into_a_failure(self, intervals, samples):
-        times = after(intervals)
-        quiet = recording(messages=messages(times), stop_s=times[-1] + 0.1)
         noise = tuple(
             Disturbance(at(t), round(late * NS), round(waited * NS))
             for t, late, waited in sorted(samples)
         )
-        before = period(quiet).status
-        now = period(recording(
-            messages=messages(times), stop_s=times[-1] + 0.1, disturbance=noise
-        )).status  # fmt: skip
+        before = period(spaced(intervals)).status
+        now = period(spaced(intervals, disturbance=noise)).status
         if before is Status.PASSED:
             assert now is Status.PASSED
         else:
@@ -203,7 +180,7 @@ class TestDisturbance:
         assert "the machine took up to" in finding.observed
 
     def test_the_same_stretch_without_disturbance_fails(self):
-        found = wrong([0.3] * 3 + [0.5, 0.1, 0.3, 0.45, 0.15, 0.3, 0.42, 0.18])
+        found = wrong(spaced([0.3] * 3 + [0.5, 0.1, 0.3, 0.45, 0.15, 0.3, 0.42, 0.18]))
         assert "3 intervals of 11 differ from the median by more than 30 ms" in found
 
     def test_too_little_disturbance_excuses_nothing(self):
@@ -250,27 +227,12 @@ class TestDisturbance:
 
 
 class TestFailures:
-    def test_a_timer_of_300_seconds_is_why_nothing_comes(self):
-        run = silent(declarations=declarations(timer_s=300.0))
-        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
-        assert "the process declared a timer of 5 min" in found
-
     def test_a_pause_that_the_host_made_costs_nothing(self):
         times = after([0.3] * 5 + [1.2] + [0.3] * 5)
         run = recording(
             messages=messages(times), disturbance=taken(times[5], times[6], waited_s=0.9)
         )
         assert period(run).status is Status.ERROR
-
-    def test_a_death_after_three_messages_is_the_deeper_cause(self):
-        run = recording(
-            messages=messages(every(0.3, 3)),
-            processes=(died(1, 1.4),),
-            ending=Ending.EXITED,
-            log=output(traceback("RuntimeError: out of fuel")),
-        )
-        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
-        assert "RuntimeError: out of fuel" in found
 
     def test_the_worst_interval_is_a_moment(self):
         times = after([0.3] * 6 + [0.9, 0.7] + [0.3] * 3)
@@ -279,7 +241,7 @@ class TestFailures:
         assert moment.time_s == pytest.approx(times[7], abs=1e-6)
 
     def test_the_spread_of_a_bimodal_stream_is_not_hidden_by_its_median(self):
-        assert "differ from the median" in wrong([0.3, 0.3, 0.3, 0.15, 0.45] * 3)
+        assert "differ from the median" in wrong(spaced([0.3, 0.3, 0.3, 0.15, 0.45] * 3))
 
 
 def arriving(waits_s, sequence=None, **changes):
@@ -308,7 +270,7 @@ class TestForgery:
         assert "the timestamps are not the times of publishing" in found
 
     def test_stamps_after_the_arrival(self):
-        found = failing("timing.period", self.forged(0.3, 0.03), topic="/cmd_vel", period="300 ms")
+        found = wrong(self.forged(0.3, 0.03))
         assert "not the times of publishing: one lies after its arrival" in found
 
     def test_stamps_before_the_launch(self):
@@ -331,7 +293,7 @@ class TestForgery:
         assert finding.status is Status.ERROR
         assert "no source timestamps" in finding.observed
         stamping = recording(messages={"/cmd_vel": stream}, environment={"rmw": "rmw_fastrtps_cpp"})
-        found = failing("timing.period", stamping, topic="/cmd_vel", period="300 ms")
+        found = wrong(stamping)
         assert "one lies before the launch" in found
 
     def test_a_busy_machine_may_explain_it(self):
@@ -345,7 +307,7 @@ class TestForgery:
     def test_jitter_that_only_the_arrivals_show(self, waits_s):
         """As with a clock that a library puts on a grid."""
         run = arriving(waits_s, stop_s=5)
-        found = failing("timing.period", run, topic="/cmd_vel", period="300 ms")
+        found = wrong(run)
         assert "the timestamps are not the times of publishing" in found
         # Where the machine was busy, messages may wait, and nothing is held against a right node.
         noise = tuple(Disturbance(at(0.5 + 0.5 * n), int(0.3 * NS), 0) for n in range(10))
@@ -398,25 +360,10 @@ class TestParameters:
         intervals = [0.3] * 20
         for index in range(late):
             intervals[3 * index + 2] = 0.4
-        times = after(intervals)
-        run = recording(messages=messages(times), stop_s=max(times) + 0.2)
+        run = spaced(intervals)
         assert period(run, outliers=outliers).status is status
 
     def test_intervals_needed(self):
         run = recording(messages=messages(every(PERIOD_S, 6)), stop_s=2.4)
         assert period(run, at_least=5).status is Status.PASSED
         assert "6 messages on `/cmd_vel`" in period(run, at_least=6).observed
-
-    @pytest.mark.parametrize(
-        ("name", "value", "words"),
-        [
-            ("period", "300", "has no unit"),
-            ("period", "0.3 m", "unit of length"),
-            ("tolerance", "5 m", "neither a share such as '5 %' nor a time"),
-            ("tolerance", "-5 %", "negative"),
-            ("spread", "wide", "neither a share"),
-        ],
-    )
-    def test_wrong_quantities_are_refused(self, name, value, words):
-        with pytest.raises(ValueError, match=words):
-            period(recording(), **{name: value})

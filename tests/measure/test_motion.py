@@ -72,10 +72,6 @@ class TestReferences:
         form = read(["goal_x", 0.25, "1 rad"], far="2 m", turned="turned")
         assert Form.model_validate_json(form.model_dump_json()) == form
 
-    def test_described_to_an_editor(self):
-        properties = Form.model_json_schema()["properties"]
-        assert "names of random values" in properties["goal"]["x-words"]
-
 
 def scene(outlines, moving=(), lidar=ORIGIN):
     return Scene(0.1, 0.22, 2.84, outlines, moving, at(0), lidar)

@@ -21,9 +21,7 @@ from grader.recording.model import (
     Call,
     Declaration,
     Ending,
-    Endpoint,
     Join,
-    Kind,
     LogLine,
     Node,
     Owner,
@@ -35,29 +33,29 @@ from grader.recording.simulated import Incident, Scene, Truth
 from grader.submission.read.code_facts import (
     Lint,
     LintFinding,
-    SourceClass,
     SourceFile,
-    SourceFunction,
 )
 from grader.submission.record import BuildRecord, PackageRecord, SourceError, SubmissionRecord
 from sim.motion import Pose
 from sim.shapes import MovingObstacle, Waypoint
+from tests.checks.builder import endpoint
+from tests.recording.written import TWIST
 
-TWIST = """\
-Vector3  linear
-Vector3  angular
-================================================================================
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-"""
 CDR_HEADER = b"\x00\x01\x00\x00"
 
 
-def twist(*fields: float) -> bytes:
-    """A Twist as CDR, little endian."""
-    return CDR_HEADER + struct.pack("<6d", *fields)
+FED = (Feedback(3_100, {"sequence": [0, 1]}),)
+STATUSES = ((3_020, "executing"),)
+WAY = (Waypoint(0, Pose(1.0, 2.0, 0.5)), Waypoint(10, Pose(1.0, 2.5, 0.5)))
+BOX = MovingObstacle("moving[0]", WAY, size_m=(0.4, 0.2), appears_ns=5, line=7)
+PACKAGE = PackageRecord(
+    name="bot_publisher",
+    path="src/bot_publisher",
+    syntax_errors=(SourceError("node.py", 3, "invalid syntax"),),
+    files=(("bot_publisher/node.py", "src/node.py"),),
+    sources=(SourceFile("src/node.py", "bot_publisher.node", prints=(7,)),),
+    lint=Lint(None, (LintFinding("F401", "src/node.py", 1, "unused"),)),
+)
 
 
 def a_recording(**changes: object) -> Recording:
@@ -73,41 +71,11 @@ def a_recording(**changes: object) -> Recording:
         submission=SubmissionRecord(
             id="ada",
             sha256="ab" * 32,
-            packages=(
-                PackageRecord(
-                    name="bot_publisher",
-                    path="src/bot_publisher",
-                    syntax_errors=(SourceError("node.py", 3, "invalid syntax"),),
-                    files=(("bot_publisher/node.py", "src/node.py"),),
-                    sources=(
-                        SourceFile(
-                            "src/node.py",
-                            "bot_publisher.node",
-                            classes=(SourceClass("Bot", 3, ("Node",), documented=True),),
-                            functions=(SourceFunction("Bot.go", 5, unannotated=("x",)),),
-                            names=(("Node", "rclpy.node.Node"),),
-                            prints=(7,),
-                        ),
-                    ),
-                    lint=Lint(None, (LintFinding("F401", "src/node.py", 1, "unused"),)),
-                ),
-            ),
+            packages=(PACKAGE,),
             build=BuildRecord(succeeded=True, duration_s=0.9, log="ok"),
         ),
         nodes=(Node("/bot_publisher", Owner.STUDENT, 1_500),),
-        endpoints=(
-            Endpoint(
-                kind=Kind.PUBLISHER,
-                topic="/cmd_vel",
-                type="geometry_msgs/msg/Twist",
-                node="/bot_publisher",
-                owner=Owner.STUDENT,
-                qos=Qos("reliable", "volatile", deadline_s=0.5),
-                gid="01" * 16,
-                appeared_ns=1_600,
-                vanished_ns=9_100,
-            ),
-        ),
+        endpoints=(dataclasses.replace(endpoint(), vanished_ns=9_100),),
         processes=(Process("p/e", 42, 1_000, 9_400, -2, "SIGINT", 0.06, ("sleep 99",), 5),),
         log=(LogLine(3_000, "p/e", "stdout", "<b>\x1b[31mred\u202e"),),
         declarations=(Declaration(1_700, "p/e", "timer", {"period_s": 0.3, "group": {"id": 1}}),),
@@ -117,23 +85,7 @@ def a_recording(**changes: object) -> Recording:
             Call("/gone", "x/srv/Go", 2_800, request={}, error="no server"),
         ),
         services=(Service("/go", "x/srv/Go", "/bot_publisher", 1_650, 9_100),),
-        goals=(
-            Goal(
-                "/fib",
-                "x/action/Fib",
-                {"order": 2},
-                3_000,
-                accepted=True,
-                answered_ns=3_010,
-                feedback=(Feedback(3_100, {"sequence": [0, 1]}),),
-                statuses=((3_020, "executing"),),
-                canceled_ns=3_200,
-                status="canceled",
-                result={"sequence": []},
-                result_ns=3_300,
-                preempted=True,
-            ),
-        ),
+        goals=(Goal("/fib", "x/action/Fib", {"order": 2}, 3_000, True, 3_010, FED, STATUSES),),
         waits=(Wait("a node", 10.0, 1_000, 1_500),),
         joins=(Join("late", "/cmd_vel", "geometry_msgs/msg/Twist", Qos("reliable"), 4_000, 4_500),),
         interventions=(Intervention(5_000, "p/e", "kill", "SIGINT"),),
@@ -146,24 +98,7 @@ def a_recording(**changes: object) -> Recording:
             Incident(2_010, "contact_began", "moving[0]"),
             Incident(2_020, "late", "3 steps done 25 ms late", 0.025),
         ),
-        scene=Scene(
-            radius_m=0.1,
-            max_linear_m_s=0.22,
-            max_angular_rad_s=2.84,
-            outlines={"boxes[0]": ((1.0, -1.0, 1.0, 1.0, 0.0),)},
-            moving=(
-                MovingObstacle(
-                    "moving[0]",
-                    (Waypoint(0, Pose(1.0, 2.0, 0.5)), Waypoint(10, Pose(1.0, 2.5, 0.5))),
-                    size_m=(0.4, 0.2),
-                    appears_ns=5,
-                    line=7,
-                ),
-            ),
-            began_ns=2_000,
-            lidar=Pose(-0.03, 0.0, 3.14),
-            command_topic="/bot/cmd_vel",
-        ),
+        scene=Scene(0.1, 0.22, 2.84, {"boxes[0]": ((1.0, -1.0, 1.0, 1.0, 0.0),)}, (BOX,), 2_000),
         environment={"rmw": "rmw_fastrtps_cpp"},
     )
     return dataclasses.replace(recording, **changes)  # type: ignore[arg-type]
@@ -176,9 +111,8 @@ def written(folder: Path, recording: Recording, *messages: RawMessage) -> Path:
 
 
 def raw(stamp_ns: int, *fields: float, sequence: int = 1) -> RawMessage:
-    return RawMessage(
-        "/cmd_vel", "geometry_msgs/msg/Twist", twist(*fields), stamp_ns, stamp_ns + 50, sequence
-    )
+    cdr = CDR_HEADER + struct.pack("<6d", *fields)
+    return RawMessage("/cmd_vel", "geometry_msgs/msg/Twist", cdr, stamp_ns, stamp_ns + 50, sequence)
 
 
 def test_everything_comes_back(tmp_path: Path) -> None:

@@ -56,18 +56,6 @@ def test_contact_with_a_wall_is_where_a_straight_path_meets_it(yaw: float, x_m: 
     assert travelled_m == pytest.approx(expected_m, abs=3 * RESOLUTION_M / math.cos(yaw))
 
 
-@given(st.floats(-0.2, 0.2), st.floats(0.5, 3.0), st.floats(0.05, 0.3))
-def test_contact_with_a_circle_is_the_root_of_a_quadratic(y: float, x: float, r: float) -> None:
-    """|(s, 0) - (x, y)| = r + R, solved for the smaller s."""
-    reach = r + RADIUS_M
-    assume(reach - abs(y) > 1e-3)
-    expected_m = x - math.sqrt(reach**2 - y**2)
-    assume(expected_m > 0.0)
-    travelled_m = 5.0 * share(world_of([circle("c", x, y, r)]), 5.0, 0.0, 1.0)
-    # 1 nm of depth is less than 100 nm of way at these angles.
-    assert travelled_m == pytest.approx(expected_m, abs=1e-7)
-
-
 @given(st.floats(0.3, 3.0), st.floats(0.05, 0.95))
 def test_contact_on_an_arc_is_where_the_circle_meets_the_wall(turn_m: float, part: float) -> None:
     """A left turn of radius R meets the wall y = d after the angle acos(1 - (d - r) / R)."""
@@ -93,11 +81,6 @@ def test_nothing_is_tunnelled_through(shapes: list[Shape], v: float, w: float) -
     if found.share < 1.0:
         assert found.label is not None
         assert clear_m - RADIUS_M <= 3 * RESOLUTION_M
-
-
-def test_a_wall_thinner_than_a_step_is_not_jumped_over() -> None:
-    thin = world_of([wall("w", 1.0, -0.001, 1.0, 0.001)])
-    assert 1000.0 * 0.01 * share(thin, 1000.0, 0.0, 0.01) == pytest.approx(0.9, abs=1e-6)
 
 
 @given(SHAPES, st.lists(st.tuples(st.floats(-2, 2), st.floats(-5, 5)), min_size=1, max_size=40))

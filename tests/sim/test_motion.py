@@ -30,17 +30,6 @@ def test_integrate_is_the_matrix_exponential(pose: Pose, v: float, w: float, t: 
     assert np.allclose(matrix(integrate(pose, v, w, t)), expected, atol=1e-9)
 
 
-@given(POSE, SPEED, st.floats(0.01, 10.0), st.sampled_from([-1, 1]), TIME)
-def test_integrate_stays_on_the_circle_of_radius_v_over_w(
-    pose: Pose, v: float, w: float, sign: int, t: float
-) -> None:
-    w *= sign
-    end = integrate(pose, v, w, t)
-    x = pose.x_m + v / w * (math.sin(pose.yaw_rad + w * t) - math.sin(pose.yaw_rad))
-    y = pose.y_m - v / w * (math.cos(pose.yaw_rad + w * t) - math.cos(pose.yaw_rad))
-    assert (end.x_m, end.y_m) == pytest.approx((x, y), abs=1e-9)
-
-
 @given(st.floats(1e-300, 1e-4), st.sampled_from([-1, 1]))
 def test_integrate_is_exact_for_tiny_angular_velocities(w: float, sign: int) -> None:
     w *= sign
@@ -53,12 +42,6 @@ def test_integrate_is_exact_for_tiny_angular_velocities(w: float, sign: int) -> 
 @given(POSE)
 def test_integrate_without_velocity_keeps_every_bit(pose: Pose) -> None:
     assert integrate(pose, 0.0, 0.0, 0.01) == pose
-
-
-@given(POSE, TURN)
-def test_turning_on_the_spot_keeps_every_bit_of_the_position(pose: Pose, w: float) -> None:
-    end = integrate(pose, 0.0, w, 0.01)
-    assert (end.x_m, end.y_m) == (pose.x_m, pose.y_m)
 
 
 @given(st.floats(-1e6, 1e6))

@@ -227,25 +227,6 @@ def test_every_topic_has_the_qos_of_the_yaml(bench: Bench) -> None:
     assert info.qos_profile.reliability == best
 
 
-def test_missed_steps_are_caught_up_and_told(bench: Bench) -> None:
-    simulator = bench.simulator()
-    first_ns = simulator.start()
-    assert first_ns == STEP_NS
-    bench.now_ns = STEP_NS
-    assert simulator.catch_up() == 4 * STEP_NS  # the first odometry
-    bench.now_ns = 50 * STEP_NS
-    assert simulator.catch_up() == 54 * STEP_NS  # after the one at 500 ms
-    assert [step.index for step in bench.truth.steps] == list(range(1, 51))
-    assert bench.truth.late == [Lateness(2, 49, 46 * STEP_NS)]
-
-
-def test_with_a_clock_it_looks_again_at_every_step(bench: Bench) -> None:
-    simulator = bench.simulator(topics={"clock": {"enabled": True}})
-    simulator.start()
-    bench.now_ns = STEP_NS
-    assert simulator.catch_up() == 2 * STEP_NS
-
-
 def test_a_command_acts_from_the_first_step_that_begins_after_it_arrived(bench: Bench) -> None:
     """However many steps are done together."""
     simulator = bench.simulator()
@@ -268,19 +249,6 @@ def test_a_command_acts_from_the_first_step_that_begins_after_it_arrived(bench: 
     for speed, (began_ns, acked_ns) in zip((0.1, 0.15, 0.2), sent, strict=True):
         begins_ns = bench.truth.stamps[speeds.index(speed)] - STEP_NS
         assert began_ns <= begins_ns <= acked_ns + STEP_NS
-
-
-def test_a_clock_that_jumps_does_not_hold_commands_back(bench: Bench) -> None:
-    """A command whose time of arrival lies ahead acts at the next step all the same."""
-    simulator = bench.simulator()
-    publisher = bench.student.create_publisher(TwistMessage, "/cmd_vel", 10)
-    bench.wait(lambda: publisher.get_subscription_count() == 1, "match")
-    bench.step(simulator, 2)
-    simulator._stamp_ns -= 3600 * NS  # as if the system's clock had been set back by an hour
-    publisher.publish(command(0.1, 0.0))
-    bench.wait(lambda: bench.step(simulator) or simulator.commands == 1, "command")
-    bench.step(simulator)
-    assert bench.truth.steps[-1].command == Twist(0.1, 0.0)
 
 
 def test_commands_that_are_not_finite_are_rejected_and_the_simulator_goes_on(bench: Bench) -> None:

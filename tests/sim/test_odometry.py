@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.description import OdometryOptions
-from sim.motion import REST, Pose, Twist, integrate, relative
+from sim.motion import REST, Pose, Twist, relative
 from sim.odometry import WheelOdometry
 
 SEPARATION_M = 0.16
@@ -42,23 +42,6 @@ def believed(wheels: WheelOdometry, ways: list[tuple[float, float]]) -> Pose:
     for way_m, turn_rad in ways:
         wheels.move(way_m, turn_rad)
     return wheels.sample(0, Pose(99.0, 99.0, 0.0), REST).pose
-
-
-def test_drift_that_is_too_small_to_see_gives_the_true_path() -> None:
-    ways = [(0.002, 0.01)] * 500
-    true = Pose(1.0, 0.0, 0.5)
-    for way_m, turn_rad in ways:
-        true = integrate(true, way_m, turn_rad, 1.0)
-    pose = believed(odometry(Pose(1.0, 0.0, 0.5), drift={"radius": "1e-10 %"}), ways)
-    assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx(
-        (true.x_m, true.y_m, true.yaw_rad), abs=1e-9
-    )
-
-
-def test_a_robot_at_rest_does_not_drift() -> None:
-    wheels = odometry(Pose(1.0, 2.0, 0.5), drift={"radius": "5 %", "slip": "10 mm"})
-    before = believed(wheels, [(0.1, 0.2)])
-    assert believed(wheels, [(0.0, 0.0)] * 100) == before
 
 
 def test_unequal_wheels_bend_a_straight_way() -> None:

@@ -53,10 +53,6 @@ def test_it_turns_the_short_way_round() -> None:
     assert pose.yaw_rad == pytest.approx(math.radians(175))
 
 
-def test_a_box_reaches_to_its_corners() -> None:
-    assert obstacle(radius_m=None, size_m=(0.6, 0.8)).reach_m == pytest.approx(0.5)
-
-
 def test_a_box_turns_with_its_pose() -> None:
     shape = obstacle(radius_m=None, size_m=(2.0, 1.0)).shape_at(Pose(0.0, 0.0, math.pi / 2))
     assert shape.contains(0.0, 0.9)

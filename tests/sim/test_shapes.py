@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sim.motion import Pose
-from sim.shapes import box, chord_clearance_m, circle, point_clearance_m, polygon, wall
+from sim.shapes import box, chord_clearance_m, circle, point_clearance_m, polygon
 
 NUMBER = st.floats(-5.0, 5.0).map(lambda x: round(x, 3))
 POINT = st.tuples(NUMBER, NUMBER)
@@ -18,14 +18,6 @@ POINT = st.tuples(NUMBER, NUMBER)
 def distance_by_samples(p: complex, a: complex, b: complex) -> float:
     """Least distance from p to 20,001 points of the segment a-b; never below the true one."""
     return min(abs(p - (a + (b - a) * i / 20_000)) for i in range(20_001))
-
-
-@pytest.mark.parametrize(
-    ("point", "distance"),
-    [((0.0, 1.0), 1.0), ((5.0, 4.0), 5.0), ((-3.0, -4.0), 5.0), ((1.5, 0.0), 0.0)],
-)
-def test_distance_to_a_wall(point: tuple[float, float], distance: float) -> None:
-    assert point_clearance_m(*point, (0.0, 0.0, 2.0, 0.0, 0.0)) == pytest.approx(distance)
 
 
 @given(POINT, POINT, POINT)
@@ -85,8 +77,3 @@ def test_a_polygon_with_a_notch_is_not_filled_in_the_notch() -> None:
     assert not notched.contains(2.0, 3.0)
     assert notched.contains(0.5, 1.0)
     assert notched.clearance_m(0.5, 1.0) < 0.0
-
-
-def test_a_wall_has_no_inside() -> None:
-    assert not wall("w", 0, 0, 1, 1).contains(0.5, 0.5)
-    assert wall("w", 0, 0, 1, 1).clearance_m(0.5, 0.5) == pytest.approx(0.0)

@@ -93,15 +93,6 @@ def test_a_robot_at_rest_stays_at_rest_to_the_last_bit() -> None:
             assert step.odometry.pose == Pose(0.1, 0.2, 0.3)
 
 
-def test_each_sample_is_the_truth_of_its_step() -> None:
-    for step in run(simulation(), 500, lambda i: Twist(0.1, 0.5) if i == 0 else None):
-        if step.odometry is not None:
-            assert (step.odometry.time_ns, step.odometry.pose) == (step.time_ns, step.pose)
-            assert step.odometry.twist == step.twist
-        if step.scan is not None:
-            assert step.scan.time_ns == step.time_ns
-
-
 def due_ms(rate: float, seconds: int = 10, **window: str) -> list[int]:
     """When scans are due; the steps are 10 ms long."""
     schedule = Schedule(LidarOptions.model_validate({"rate": f"{rate} Hz", **window}))
@@ -158,12 +149,6 @@ def test_the_robot_obeys_its_own_drives_at_their_times() -> None:
     assert asked == [(0.0, 0.0)] * 10 + [(0.0, 1.0)] * 40 + [(0.1, 0.0)] * 50
 
 
-def test_a_command_that_comes_with_a_drive_counts_more() -> None:
-    subject = simulation(robot={"drives": [{"at": 0, "linear": "0.1 m/s"}]})
-    assert subject.advance(Twist(0.2, 0.0)).command == Twist(0.2, 0.0)
-    assert subject.advance().command == Twist(0.2, 0.0)
-
-
 def test_with_a_timeout_the_robot_stops_and_it_is_told_once() -> None:
     subject = simulation(robot={"command_timeout": "500 ms"})
     steps = run(subject, 300, lambda i: Twist(0.1, 0.0) if i in (0, 30) else None)
@@ -194,13 +179,6 @@ def test_a_command_that_is_not_finite_stops_the_robot_and_is_told(command: Twist
     assert last.twist == REST
     assert math.isfinite(last.pose.x_m)
     assert run(subject, 50, lambda _: Twist(0.1, 0.0))[-1].twist == Twist(0.1, 0.0)
-
-
-def test_a_huge_command_is_only_limited() -> None:
-    steps = run(simulation(), 100, lambda _: Twist(1e300, -1e300))
-    assert steps[-1].twist == Twist(0.22, -2.84)
-    assert steps[-1].command == Twist(1e300, -1e300)
-    assert not any(step.events for step in steps)
 
 
 def test_beginning_and_end_of_a_contact_are_told() -> None:
@@ -261,11 +239,3 @@ def test_a_push_moves_the_robot_on_its_way_and_odometry_tells_of_it(drift: dict[
         assert belief is not None
         assert belief.x_m == pytest.approx(step.pose.x_m, abs=0.01)
         assert belief.yaw_rad == pytest.approx(step.pose.yaw_rad, abs=0.05)
-
-
-def test_a_push_stops_at_a_wall() -> None:
-    world = parse_world("{segments: [[-0.15, -1, -0.15, 1]]}")
-    options = {"robot": {"pushes": [{"after": "1 cm", "ahead": "-50 cm"}]}}
-    steps = run(simulation(world, **options), 200, lambda i: Twist(0.1, 0.0) if i == 0 else None)
-    assert min(step.pose.x_m for step in steps) >= -0.0501
-    assert any(step.contact for step in steps)

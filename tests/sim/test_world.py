@@ -65,17 +65,12 @@ WALKER = "moving:\n  - circle: {radius: 0.1}\n    path:\n"
             "boxes:\n  - {centre: [0, 0], size: [-1, 2]}",
             r"w.yaml:2: boxes\[0\].size: length: -1 is too small: it must be more than 0",
         ),
-        (
-            "segments:\n  - [0, 0, 1]",
-            r"w.yaml:2: segments\[0\]: expected \[x1, y1, x2, y2\]: 4 ent",
-        ),
         ("segments:\n  - [0, 0, 0, 0]", r"w.yaml:2: segments\[0\]: both ends are the same point"),
         (
             "boxes: [{centre: [0, 0], size: [1, 1e-9]}]",
             r"width: 1e-09 is too small: it must be at l",
         ),
         ("segments:\n  - [0, .nan, 1, 1]", r"w.yaml:2: segments\[0\]: y1: nan is not finite"),
-        ("segments:\n  - [0, 0, true, 1]", r"w.yaml:2: segments\[0\]: x2: expected a length"),
         ("segments:\n  - [0, 3 deg, 1, 1]", r"segments\[0\]: y1: 'deg' is a unit of angle"),
         ("segments:\n  - [0, 0, 1, 1e9]", r"segments\[0\]: y2: 1000000000.0 is too far away: at m"),
         ("start: [0, 0, 90]", r"w.yaml:1: start: yaw: 90 has no unit: write '90 deg' or '90 rad'"),
@@ -83,7 +78,6 @@ WALKER = "moving:\n  - circle: {radius: 0.1}\n    path:\n"
             "bounds: [1, 1, 0, 0]",
             r"w.yaml:1: bounds: expected \[x_min, y_min, x_max, y_max\]: each",
         ),
-        ("bounds: 3", r"w.yaml:1: bounds: expected \[x_min, y_min, x_max, y_max\], not 3"),
         (
             "polygons:\n  - {points: [[0, 0], [1, 1]]}",
             r"w.yaml:2: polygons\[0\].points: expected at least 3 entries",
@@ -96,7 +90,6 @@ WALKER = "moving:\n  - circle: {radius: 0.1}\n    path:\n"
             "moving:\n  - path: [{at: 0 s, pose: [0, 0]}]",
             r"w.yaml:2: moving\[0\]: give either 'cir",
         ),
-        (WALKER + "      []", r"moving\[0\].path: expected at least 1 entry"),
         (
             WALKER + "      - {at: 3, pose: [0, 0]}",
             r"w.yaml:4: moving\[0\].path\[0\].at: 3 has no unit",
@@ -123,8 +116,6 @@ WALKER = "moving:\n  - circle: {radius: 0.1}\n    path:\n"
             r"w.yaml:3: segments\[0\]\[2\]: '\$wal' is not among the 'values' of this world. "
             r"Did you mean 'wall'\?",
         ),
-        ("segments: 3", r"w.yaml:1: segments: expected a list"),
-        ("- 1", r"w.yaml:1: expected keys and values at the top"),
     ],
 )
 def test_a_mistake_is_reported_with_file_and_line(text: str, message: str) -> None:

@@ -122,11 +122,15 @@ def test_a_byte_order_mark_and_windows_line_ends_do_no_harm(tmp_path: Path) -> N
     [
         ("a: 1\nb:\n\tc: 1", 3, "indent with spaces, not with tabs"),
         ("a: b: c", 1, "a text with ': ' in it needs quotes"),
-        ("a:\n  - id: x\n   points: 1", 3, "is a line indented further than those around it?"),
-        ("a: 1\nb: 'x\nc: 1\n", 2, "unexpected end of stream (its closing quote is missing)"),
+        ("a:\n  - id: x\n   points: 1", 3, "does this line stand as far to the right"),
+        (
+            "a: 1\nb: 'x\nc: 1\n",
+            2,
+            "end of stream (is a comma, a bracket or a quote missing?)",
+        ),
         ('a: 1\nb: "x\nc: 1\nd: "y z"\ne: 2\n', 4, "and is every quote before it closed?"),
         ("a: 1\nb: [1, 2\n", 2, "but got '<stream end>'"),
-        ('a: "\\d+"', 1, "write the text in single quotes, as in '\\d+'"),
+        ('a: "\\d+"', 1, "write a text with a backslash in single quotes, as in '\\d+'"),
         ("- a\nb: 1\n", 2, "does this line stand as far to the right as those that it belongs to,"),
         ("a: [1, 2\nb: 3\n", 2, "(is a comma, a bracket or a quote missing?)"),
         ("a: 1\nb: @x", 2, "cannot start any token (a text that begins with it needs quotes)"),

@@ -70,10 +70,6 @@ def test_what_is_written_until_the_end_is_read(
     assert (outcome.status, outcome.output) == (0, "Finished\n")
 
 
-def test_a_signal_is_told_as_a_negative_status(tmp_path: Path) -> None:
-    assert run("import os; os.kill(os.getpid(), 11)", tmp_path).status == -11
-
-
 def test_it_reads_nothing(tmp_path: Path) -> None:
     assert (
         run("print(repr(input()))", tmp_path)

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -80,13 +79,6 @@ def test_a_good_package_is_built_and_runs(tree: Tree, real_ros: RosInstallation)
     assert list(found.install.rglob("bot_publisher/__pycache__/node.*.pyc"))
 
 
-def test_the_original_is_not_touched(tree: Tree, real_ros: RosInstallation) -> None:
-    tree.package({"setup.py": f"open('made_by_setup', 'w').close()\n{SETUP_PY}"})
-    before = sorted(tree.root.rglob("*"))
-    assert build_of(prepared(tree, real_ros)).succeeded
-    assert sorted(tree.root.rglob("*")) == before
-
-
 def test_the_second_time_it_comes_from_the_cache(tree: Tree, real_ros: RosInstallation) -> None:
     tree.package()
     first = prepared(tree, real_ros)
@@ -99,15 +91,6 @@ def test_the_second_time_it_comes_from_the_cache(tree: Tree, real_ros: RosInstal
     assert second.record.packages == first.record.packages
     tree.write({f"{FOLDER}/bot_publisher/node.py": f"{NODE}\n"})
     assert not build_of(prepared(tree, real_ros)).cached
-
-
-def test_two_at_once_build_it_once(tree: Tree, real_ros: RosInstallation) -> None:
-    tree.package()
-    with ThreadPoolExecutor(2) as pool:
-        first, second = pool.map(lambda _: prepared(tree, real_ros), range(2))
-    assert sorted((build_of(first).cached, build_of(second).cached)) == [False, True]
-    assert first.install == second.install
-    assert first.install is not None
 
 
 def test_a_zip_of_a_whole_workspace_is_built_once(
@@ -315,21 +298,6 @@ def test_a_failure_is_not_hidden_by_last_words_without_a_line_end(
     leave = "if 'install' in sys.argv: sys.exit(1)\n"
     tree.package({"setup.py": f"{LAST_WORDS.format(words)}{leave}{SETUP_PY}"})
     assert build_of(prepared(tree, real_ros)).failed_packages == ("bot_publisher",)
-
-
-def test_a_failure_is_not_hidden_by_the_name_of_a_package_that_waits_for_it(
-    tree: Tree, real_ros: RosInstallation
-) -> None:
-    fail = "import sys\nif 'install' in sys.argv: sys.exit('\\nStarting >>> waiting')\n"
-    tree.package({"setup.py": f"{fail}{SETUP_PY}"})
-    manifest = MANIFEST.replace("bot_publisher", "waiting").replace("rclpy", "bot_publisher")
-    waiting = {
-        "package.xml": manifest,
-        "setup.py": SETUP_PY.replace("'bot_publisher'", "'waiting'"),
-        "resource/waiting": "",
-    }
-    tree.package(dict(waiting), folder="src/waiting")
-    assert build_of(prepared(tree, real_ros)).failed_packages == ("bot_publisher", "waiting")
 
 
 def test_a_sandbox_that_does_not_start_is_no_fault_of_the_student(

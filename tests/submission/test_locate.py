@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import errno
 import os
-import tempfile
 from pathlib import Path
 
 import pytest
@@ -101,22 +100,6 @@ def test_the_copy_is_private(tree: Tree) -> None:
         assert not (located.root / "src/bot_publisher/new.py").exists()
     assert not located.root.exists()
     assert (tree.root / "src/bot_publisher/setup.py").read_text() == PACKAGE["setup.py"]
-
-
-def test_the_copy_is_where_interfaces_can_be_built(
-    tree: Tree, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "josé").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "josé"))
-    with opened(tree.package()) as located:
-        assert str(located.root).isascii()
-
-
-def test_links_are_copied_as_links(tree: Tree) -> None:
-    root = tree.write({"a/x.py": "x"})
-    (root / "b.py").symlink_to(root / "a/x.py")
-    with opened(root) as located:
-        assert (located.root / "b.py").resolve() == (located.root / "a/x.py").resolve()
 
 
 @pytest.mark.parametrize(

@@ -62,10 +62,6 @@ def test_a_name_that_leads_out_or_astray_is_refused(name: str, reason: str) -> N
     assert reason in message
 
 
-def test_a_refusal_names_the_member_and_is_printable() -> None:
-    assert refusal(files("../\x1b[2J")) == "bot.zip: ../\\x1b[2J: paths with '..' are refused"
-
-
 def test_the_sum_of_declared_sizes_is_bounded() -> None:
     assert "more than 0 MiB" in refusal(files("a", "b", size=600))
 
@@ -97,11 +93,6 @@ def test_a_file_cannot_be_a_folder_as_well() -> None:
     assert "twice" in refusal(files("a/b", "a"))
 
 
-def test_nothing_is_written_through_a_link() -> None:
-    link = Member(0, "a", Kind.LINK, target=".")
-    assert "a is not a folder" in refusal([link, *files("a/b")])
-
-
 def test_a_negative_size_is_refused() -> None:
     assert "negative" in refusal(files("a", size=-1))
 
@@ -109,14 +100,6 @@ def test_a_negative_size_is_refused() -> None:
 @pytest.mark.parametrize("target", ["/etc", "..", "../x", "b/../../x"])
 def test_a_link_that_leads_out_is_refused(target: str) -> None:
     assert "leads out" in refusal([Member(0, "a", Kind.LINK, target=target), *files("b/c")])
-
-
-def test_a_chain_of_links_that_leads_out_is_refused() -> None:
-    chain = [
-        Member(0, "d/one", Kind.LINK, target=".."),
-        Member(1, "two", Kind.LINK, target="d/one/.."),
-    ]
-    assert "leads out" in refusal([*chain, *files("d/x")])
 
 
 @pytest.mark.parametrize(

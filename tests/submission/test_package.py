@@ -36,14 +36,6 @@ def test_a_good_package_is_recorded(tree: Tree, named_ros: RosInstallation) -> N
     assert record.missing_targets == record.syntax_errors == record.executables == ()
 
 
-def test_tests_launch_files_and_setup_py_need_no_dependency(
-    tree: Tree, named_ros: RosInstallation
-) -> None:
-    tree.package({"test/test_it.py": "import launch_testing\n", "launch/a.py": "import launch\n"})
-    modules = {item.module for item in records(tree, named_ros)["bot_publisher"].imports}
-    assert modules == {"rclpy", "geometry_msgs"}
-
-
 def test_scripts_without_a_suffix_are_read(tree: Tree, named_ros: RosInstallation) -> None:
     tree.package({"scripts/run": "#!/usr/bin/env python3\nimport std_msgs.msg\n", "scripts/x": "("})
     record = records(tree, named_ros)["bot_publisher"]
@@ -65,19 +57,6 @@ def test_ros_packages_that_are_not_installed_are_known_by_name(
         "tf2_ros",
     ]
     assert {item.module for item in record.imports} >= {"numpy", "os", "bot_publisher"}
-
-
-def test_a_module_of_another_package_of_the_submission_is_that_package(
-    tree: Tree, named_ros: RosInstallation
-) -> None:
-    tree.package({"bot_publisher/node.py": "import helpers\n"})
-    tree.write(
-        {
-            "src/bot_help/package.xml": MANIFEST.replace("bot_publisher", "bot_help"),
-            "src/bot_help/helpers/__init__.py": "",
-        }
-    )
-    assert records(tree, named_ros)["bot_publisher"].ros_imports[0].module == "bot_help"
 
 
 @pytest.mark.parametrize("declared", ["tf2_ros", "tf2_ros_py"])

@@ -42,11 +42,6 @@ setuptools.setup(name=name, entry_points=GROUPS)
     assert [(e.name, e.target) for e in setup(source).entry_points] == [("pub", "bot.node:main")]
 
 
-def test_what_must_be_run_is_not_guessed() -> None:
-    source = "setup(name=name(), version=open('v').read(), entry_points={'console_scripts': [x]})"
-    assert setup(source) == Setup()
-
-
 def test_a_malformed_entry_point_is_told_with_its_line() -> None:
     found = setup("setup(entry_points={'console_scripts': [\n 'pub : bot.node:main',\n 'x']})")
     assert found.entry_points == ()

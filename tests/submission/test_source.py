@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.submission.read.source import MAX_BYTES, Allowance, is_python_script, parse
+from grader.submission.read.source import MAX_BYTES, Allowance, parse
 from grader.submission.record import SourceError
 
 
@@ -94,12 +94,6 @@ def test_a_string_that_is_no_text_can_be_written_down() -> None:
 @given(st.binary(max_size=300))
 def test_no_bytes_raise(data: bytes) -> None:
     assert isinstance(parse(data, "node.py"), (ast.Module, SourceError))
-
-
-def test_a_script_is_known_by_its_first_line() -> None:
-    assert is_python_script(b"#!/usr/bin/env python3\nimport rclpy\n")
-    assert not is_python_script(b"#!/bin/sh\npython3 -m bot\n")
-    assert not is_python_script(b"import rclpy\n")
 
 
 class Garbage:

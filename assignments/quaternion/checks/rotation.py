@@ -17,7 +17,7 @@ from grader.measure.numbering import published
 from grader.checks.need import Published, Recorded
 from grader.checks.wording import code, counted, listing
 from grader.diagnosis.cause import Cause
-from grader.diagnosis.wrong_value import was_integer, what_was_put
+from grader.diagnosis.wrong_value import MISREAD, was_integer
 from grader.diagnosis.no_messages import why_not_sent
 from grader.diagnosis.destroyed_endpoint import why_unsubscribed
 from grader.diagnosis.no_answer import why_raised
@@ -259,7 +259,7 @@ def _explanation(parameters: Answers, judged: list[Case], wrong: list[Case]) -> 
     misread = [v for case in wrong for v in case.answers[0].row if was_integer(v)]
     if misread:
         return (
-            f"{what_was_put(misread[0])} was put into a float field, which ROS misreads",
+            f"{MISREAD} was put into a float field, which ROS misreads",
             "A number in a message must be a float: write 1.0 instead of 1, 0.0 instead of 0, and "
             "float(value) of what is another type, such as numpy.float32.",
         )

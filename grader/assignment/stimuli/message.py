@@ -153,8 +153,6 @@ class _Reader:
         if field.type in TEXTS:
             if not isinstance(value, str):
                 raise self._misfit(place, "text", value)
-            if field.longest is not None and len(value) > field.longest:
-                raise self._misfit(place, f"at most {field.longest} characters", value)
             return value
         if field.type == "bool":
             word = str(value).lower()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from statistics import median
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.doubt import was_held_up
@@ -64,13 +64,6 @@ class Responsive(Parameters):
         "on a recorded topic, or every node if none has.",
     )
 
-    @field_validator("share")
-    @classmethod
-    def _not_more_than_all(cls, share: float) -> float:
-        if share > 1.0:
-            raise ValueError("more than 100 % of the calls cannot be answered")
-        return share
-
 
 @dataclass(frozen=True)
 class _Answers:
@@ -103,14 +96,12 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
     timer.
     """
     expected = f"services of the node answer within {format_duration(parameters.within)}"
-    if parameters.node:
-        missing = why_not_node(recording, parameters.node)
-    else:
-        missing = why_no_node(recording)
+    node = parameters.node
+    missing = why_not_node(recording, node) if node else why_no_node(recording)
     if missing is not None:
         return missing.finding(expected)
     nodes = target_nodes(recording) or recording.student_nodes
-    names = [parameters.node] if parameters.node else [node.name for node in nodes]
+    names = [node] if node else [item.name for item in nodes]
     groups = [_answers(recording, name, parameters) for name in dict.fromkeys(names)]
     groups = [group for group in groups if group.judged]
     if not groups:
@@ -120,9 +111,10 @@ def responsive(recording: Recording, parameters: Responsive) -> Finding:
         if parameters.typically is not None:
             expected += f", the median within {format_duration(parameters.typically)}"
         busy = _why_mostly_late(recording, parameters, groups)
+        if busy is not None:
+            return busy.finding(expected)
         summary = _summary(groups, parameters)
-        evidence = _evidence(recording, groups)
-        return busy.finding(expected) if busy else Finding.passed(expected, summary, evidence)
+        return Finding.passed(expected, summary, _evidence(recording, groups))
     # Of the late calls, those that were late for another reason than what the host took.
     own = [sum(_own_s(recording, call) > parameters.within for call in one.late) for one in bad]
     if all(one.enough(parameters.share, late) for one, late in zip(bad, own, strict=True)):

@@ -16,8 +16,7 @@ from grader.checks.wording import code, codes, counted
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.no_log import why_not_logged
 from grader.diagnosis.process.blocked_executor import why_slow
-from grader.measure.echo import Echo, Wanted, echoes, wanted_values
-from grader.measure.printed import quote
+from grader.measure.printed import Echo, Wanted, echoes, quote, wanted_values
 from grader.recording.model import NS, Kind, Message, Recording
 from grader.spec.name import TopicName
 from grader.spec.quantity import Duration
@@ -123,18 +122,13 @@ def follows(recording: Recording, parameters: Follows) -> Finding:
         longest = format_duration(parameters.every or 0.0)
         return seldom.finding(f"{expected}, and never longer than {longest} without one")
     lines = [line for echo in found for line in echo.lines]
+    last_s = recording.since_launch_s(lines[-1].time_ns)
     number = counted(len(messages), "message")
     return Finding.passed(
         expected,
         f"log lines follow {len(found)} of {number}: {quote(lines[-1].text)}",
         Evidence(
-            moments=tuple(
-                Moment(
-                    f"logged a message on {parameters.topic}",
-                    recording.since_launch_s(echo.lines[-1].time_ns),
-                )
-                for echo in (found[0], found[-1])
-            ),
+            moments=(Moment(f"logged a message on {parameters.topic}", last_s),),
             log=tuple(line.text for line in lines[:_SHOWN_LINES]),
         ),
     )

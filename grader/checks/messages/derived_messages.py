@@ -91,12 +91,7 @@ class SourceValue:
                 yield f"`{path}`", float(number)
 
 
-def _readable(text: str) -> str:
-    SourceValue.of(text)
-    return text
-
-
-SourceText = Annotated[str, AfterValidator(_readable)]
+SourceText = Annotated[str, AfterValidator(lambda text: SourceValue.of(text).text)]
 
 
 def yaw(x: float, y: float, z: float, w: float) -> float:

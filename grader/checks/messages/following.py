@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pydantic import Field
 
 from grader.checks.check import NamedFields, Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Plot, Table
+from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.checks.messages.derived_messages import (
     DerivedMessages,
     Sample,
@@ -175,21 +175,15 @@ def _failure(
             f"Set {codes(derived.fields[index] for index in bad)} in the callback of {source}, "
             f"from {codes(derived.values[index].text for index in bad)} of its message."
         )
-    rows = tuple(
-        (field, f"{wanted:.6g}", f"{value:.6g}")
-        for field, wanted, value in zip(derived.fields, newest, sample.values, strict=True)
-    )
-    label = f"message {sample.number}"
-    moment = Moment(f"{label} is wrong", recording.since_launch_s(sample.message.stamp_ns))
+    when_s = recording.since_launch_s(sample.message.stamp_ns)
     shown = bad or range(len(derived.fields))
     return Finding.failed(
         expected,
         f"{observed} ({len(wrong)} of {counted(len(judged), 'message')} wrong)",
         hint,
         Evidence(
-            moments=(moment,),
+            moments=(Moment(f"message {sample.number} is wrong", when_s),),
             plots=tuple(_plot(recording, derived, judged, index) for index in shown),
-            tables=(Table(label.capitalize(), ("field", "expected", "observed"), rows),),
         ),
     )
 

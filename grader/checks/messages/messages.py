@@ -31,11 +31,10 @@ from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_messages import why_few, why_not_sent, why_silent, why_unreadable
 from grader.diagnosis.wrong_value import WrongValue, accumulates, was_integer
 from grader.measure.numbering import is_numbered, published
-from grader.recording.model import Kind, Message, Recording
+from grader.recording.model import Kind, Recording
 from grader.spec.name import TopicName
 
 _MOST_FIELDS = 8
-_SHOWN = 12
 
 
 class Count(Parameters):
@@ -218,11 +217,17 @@ def _wrong(
     )
     more = len(found) - _MOST_FIELDS
     observed += f" and {counted(more, 'more wrong field')}" if more > 0 else ""
-    explanation = _explanation(parameters, messages, found, messages[first - 1], wrong)
-    observed += f": {explanation}" if explanation else ""
+    field, message = found[0].field, messages[first - 1]
+    if accumulates(found[0].expected, [leaves(item.value).get(field) for item in messages]):
+        observed += f": {field} grows from message to message, as if added up"
+    else:
+        tolerance = tolerance_of(parameters.tolerance, field)
+        always = wrong == len(messages)
+        clause = explain(WrongValue(found, leaves(message.value), tolerance, always=always))
+        observed += f": {clause}" if clause else ""
     if len(messages) > 1:
         observed += f" ({wrong} of {counted(len(messages), 'message')} wrong)"
-    when_s = recording.since_launch_s(messages[first - 1].stamp_ns)
+    when_s = recording.since_launch_s(message.stamp_ns)
     return Finding.failed(
         parameters.words,
         observed,
@@ -245,21 +250,6 @@ def _hint(found: tuple[Difference, ...], number: int, right: int) -> str:
         )
     fields = codes([item.field for item in found[:_MOST_FIELDS]])
     return f"Look where the program sets {fields} before publish(msg), and to what."
-
-
-def _explanation(
-    parameters: Equal,
-    messages: tuple[Message, ...],
-    found: tuple[Difference, ...],
-    message: Message,
-    wrong: int,
-) -> str:
-    field = found[0].field
-    if accumulates(found[0].expected, [leaves(item.value).get(field) for item in messages]):
-        return f"{field} grows from message to message, as if added up"
-    tolerance = tolerance_of(parameters.tolerance, field)
-    always = wrong == len(messages)
-    return explain(WrongValue(found, leaves(message.value), tolerance, always=always)) or ""
 
 
 class Series(Parameters):
@@ -302,18 +292,11 @@ class Series(Parameters):
             )
 
     @property
-    def needed(self) -> int:
-        """Messages without which nothing can be judged."""
-        return len(self.values) or self.at_least
-
-    @property
     def words(self) -> str:
         """What is expected, in words."""
         which = f"{code(self.field)} of the messages on {code(self.topic)}"
         if self.values:
-            listed = ", ".join(map(_text, self.values[:_SHOWN]))
-            more = ", ..." if len(self.values) > _SHOWN else ""
-            return f"{which}: {listed}{more}, in this order"
+            return f"{which}: {', '.join(map(_text, self.values))}, in this order"
         begins = "" if self.start is None else f" from {_text(self.start)} on"
         verb = "counts" if self.step == 1 else f"grows by {_text(self.step)}"
         return f"{which} {verb}{begins}, message by message"
@@ -349,8 +332,9 @@ def sequence(recording: Recording, parameters: Series) -> Finding:
     ]
     if wrong:
         return _wrong_order(recording, parameters, found, wanted, wrong[0])
-    if len(messages) < parameters.needed:
-        return why_few(recording, parameters.topic, parameters.needed).finding(expected)
+    needed = len(parameters.values) or parameters.at_least
+    if len(messages) < needed:
+        return why_few(recording, parameters.topic, needed).finding(expected)
     if parameters.values and len(parameters.values) - 1 not in places:
         return Finding.to_repeat(
             expected, "the last of these messages was lost on its way to the probe"

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
-from grader.checks.finding import Evidence, Finding, Moment, Table
+from grader.checks.finding import Evidence, Finding
 from grader.checks.first_seen import endpoints_seen, first_seen
 from grader.checks.need import Joined
 from grader.checks.wording import code, counted
@@ -105,7 +105,7 @@ def requested(recording: Recording, parameters: Profile) -> Finding:
 
 
 def _judge(recording: Recording, parameters: Profile, kind: Kind) -> Finding:
-    has, did, _ = _WORDS[kind]
+    has, did, other_end = _WORDS[kind]
     wanted = ", ".join(f"{name} {_words(item)}" for name, item in parameters.policies.items())
     expected = f"the {kind.value} on {code(parameters.topic)} {has} {wanted}"
     cause = why_no_endpoint(recording, kind, parameters.topic)
@@ -120,11 +120,25 @@ def _judge(recording: Recording, parameters: Profile, kind: Kind) -> Finding:
         source = ", declared by the process"
     for node, qos in profiles:
         wrong = _wrong(qos, parameters)
-        if wrong:
-            own = [item for item in endpoints if item.qos is qos]
-            messages = recording.on(parameters.topic)
-            seen = endpoints_seen(recording, own) or first_seen(recording, messages)
-            return _mismatch(parameters, kind, (node, qos), wrong, source, expected, seen)
+        if not wrong:
+            continue
+        differences = ", ".join(
+            f"{name} {_words(actual)} instead of {_words(item)}"
+            for name, (item, actual) in wrong.items()
+        )
+        matches = not refusals(*sides(kind, qos, parameters.qos))
+        still = "; a {} would still match it" if matches else ": a {} does not match it"
+        own = [item for item in endpoints if item.qos is qos]
+        seen = endpoints_seen(recording, own) or first_seen(
+            recording, recording.on(parameters.topic)
+        )
+        return Finding.failed(
+            expected,
+            f"the {kind.value} of {code(node)} {has} {differences}{source}"
+            + still.format(f"{other_end} the expected profile"),
+            _hint(parameters, kind, wrong),
+            Evidence(moments=seen),
+        )
     hidden = [
         name
         for name in parameters.policies
@@ -148,33 +162,6 @@ def _wrong(qos: Qos, parameters: Profile) -> dict[str, tuple[Any, Any]]:
         if not right:
             found[name] = wanted, actual
     return found
-
-
-def _mismatch(
-    parameters: Profile,
-    kind: Kind,
-    found: tuple[str, Qos],
-    wrong: dict[str, tuple[Any, Any]],
-    source: str,
-    expected: str,
-    moments: tuple[Moment, ...],
-) -> Finding:
-    node, qos = found
-    has, did, other_end = _WORDS[kind]
-    refused = refusals(*sides(kind, qos, parameters.qos))
-    differences = ", ".join(
-        f"{name} {_words(actual)} instead of {_words(wanted)}"
-        for name, (wanted, actual) in wrong.items()
-    )
-    observed = f"the {kind.value} of {code(node)} {has} {differences}{source}"
-    if refused:
-        observed += f": a {other_end} the expected profile does not match it"
-    else:
-        observed += f"; a {other_end} the expected profile would still match it"
-    rows = tuple((name, _words(wanted), _words(actual)) for name, (wanted, actual) in wrong.items())
-    table = Table("Requested against offered", ("policy", "expected", did), rows)
-    evidence = Evidence(moments=moments, tables=(table,))
-    return Finding.failed(expected, observed, _hint(parameters, kind, wrong), evidence)
 
 
 def _hint(parameters: Profile, kind: Kind, wrong: Collection[str]) -> str:
@@ -326,8 +313,7 @@ class Compatible(Parameters):
     def peer(self, recording: Recording) -> Qos | None:
         """The peer's profile; None if the late joiner never joined."""
         if self.joiner is not None:
-            joins = [item for item in recording.joins if item.name == self.joiner]
-            return joins[0].qos if joins else None
+            return next((item.qos for item in recording.joins if item.name == self.joiner), None)
         return Qos(
             reliability=self.reliability or "reliable",
             durability=self.durability or "volatile",

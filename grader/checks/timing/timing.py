@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
+from statistics import median
 
 from pydantic import Field, model_validator
 
 from grader.checks.check import Parameters, Subject, check
 from grader.checks.finding import Evidence, Finding, Moment, Plot
+from grader.checks.first_seen import first_seen
 from grader.checks.need import Recorded
-from grader.checks.timing.stamps import why_not_believed
 from grader.checks.tolerance import TimeTolerance, Tolerance
 from grader.checks.wording import code, counted
 from grader.diagnosis.cause import Cause
@@ -39,6 +41,19 @@ _MS = 1e3
 _SAME = 0.05
 # One message may be late or left out; after so many periods they have stopped.
 _ENDED_PERIODS = 3.0
+
+# Arrivals and source timestamps may differ so much in their medians, or in a single message.
+_RELATIVE = 0.20
+_ABSOLUTE_S = 0.020
+_CLOCK_SLACK_NS = 50_000_000
+# Fewer arrivals have no meaningful median.
+_FEWEST = 3
+# Single messages may be lost on their way, and are sent again.
+_MOST_LATE, _LATE_SHARE = 3, 0.2
+_AROUND_NS = NS // 10
+# Middleware that stamps every message.
+_STAMPING = "rmw_fastrtps_cpp"
+_CLOCK_HINT = "Publish when the time has come, and leave the clock of the process alone."
 
 
 class Period(Parameters):
@@ -93,7 +108,7 @@ def period(recording: Recording, parameters: Period) -> Finding:
     if len(messages) <= parameters.at_least and not _too_slow(messages, limits):
         cause = why_few(recording, parameters.topic, parameters.at_least + 1)
         return cause.finding(expected)
-    unbelievable = why_not_believed(recording, messages)
+    unbelievable = _why_not_believed(recording, messages)
     if unbelievable is not None:
         return unbelievable.finding(expected)
     measured = intervals(messages)
@@ -240,7 +255,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     messages = recording.on(parameters.topic)
     if len(messages) < parameters.messages:
         return why_few(recording, parameters.topic, parameters.messages).finding(expected)
-    unbelievable = why_not_believed(recording, messages)
+    unbelievable = _why_not_believed(recording, messages)
     if unbelievable is not None:
         return unbelievable.finding(expected)
     first, last = messages[0], messages[-1]
@@ -249,12 +264,7 @@ def rate(recording: Recording, parameters: Rate) -> Finding:
     number = last.sequence - first.sequence if is_numbered(messages) else len(messages) - 1
     found_hz = number / span_s if span_s > 0.0 else math.inf
     observed = f"{found_hz:.4g} Hz: {counted(number + 1, 'message')} in {format_duration(span_s)}"
-    evidence = Evidence(
-        moments=(
-            Moment("first message", recording.since_launch_s(first.stamp_ns)),
-            Moment("last message", recording.since_launch_s(last.stamp_ns)),
-        )
-    )
+    evidence = Evidence(moments=first_seen(recording, messages))
     is_slow = parameters.at_least is not None and found_hz < parameters.at_least
     if is_slow and number >= (parameters.at_least or 0.0) * left_s(
         recording, first.stamp_ns, last.stamp_ns
@@ -298,3 +308,65 @@ def _why_paused(
         "Look for an `if` or a `return` before publish(msg), for an `except: pass` that hides an "
         "error, for a timer that is cancelled, and for a callback that does not return.",
     )
+
+
+def _why_not_believed(recording: Recording, messages: Sequence[Message]) -> Cause | None:
+    """Why the source timestamps, which the writer gives, do not tell when it published."""
+    given = any(message.stamp_ns for message in messages)
+    if not given and recording.environment.get("rmw") != _STAMPING:
+        return Cause("the middleware gave no source timestamps", ours=True)
+    for message in messages:
+        begin_ns = recording.launched_ns - _CLOCK_SLACK_NS
+        if not begin_ns <= message.stamp_ns <= message.received_ns + _CLOCK_SLACK_NS:
+            return Cause(
+                "the source timestamps are not the times of publishing: one lies "
+                + ("before the launch" if message.stamp_ns < begin_ns else "after its arrival"),
+                _CLOCK_HINT,
+                _arrival(recording, message),
+            )
+    # What was published before the match (transient local) arrives all at once.
+    begin_ns = recording.matched_ns or recording.launched_ns
+    live = [message for message in messages if message.stamp_ns >= begin_ns]
+    return _why_arrivals_differ(recording, live) if len(live) > _FEWEST else None
+
+
+def _why_arrivals_differ(recording: Recording, live: Sequence[Message]) -> Cause | None:
+    usual_s = median(map(_way_s, live))
+    # The first message of a publisher waits for its match. What holds up the middleware need not
+    # show at the same moment in what the machine took.
+    late = [
+        item
+        for item in live
+        if item.sequence != 1
+        and abs(_way_s(item) - usual_s)
+        > _ABSOLUTE_S
+        + recording.stolen_s(item.stamp_ns - _AROUND_NS, item.received_ns + _AROUND_NS)
+    ]
+    if len(late) > max(_MOST_LATE, _LATE_SHARE * len(live)):
+        way_s = max(map(_way_s, late)) - min(map(_way_s, live))
+        return Cause(
+            f"{counted(len(late), 'message')} of {len(live)} came up to {format_duration(way_s)} "
+            "earlier or later than their source timestamps say, and the machine took no such "
+            "time: the timestamps are not the times of publishing",
+            _CLOCK_HINT,
+            _arrival(recording, late[0]),
+            disturbed=True,
+        )
+    arrivals_ns = sorted(message.received_ns for message in live)
+    source_s = median((b.stamp_ns - a.stamp_ns) / NS for a, b in pairwise(live))
+    arrival_s = median((b - a) / NS for a, b in pairwise(arrivals_ns))
+    if abs(arrival_s - source_s) <= max(_RELATIVE * source_s, _ABSOLUTE_S):
+        return None
+    return Cause.to_repeat(
+        f"messages arrive every {format_duration(arrival_s)}, but their source timestamps are "
+        f"{format_duration(source_s)} apart, while the machine was busy"
+    )
+
+
+def _arrival(recording: Recording, message: Message) -> Evidence:
+    when_s = recording.since_launch_s(message.received_ns)
+    return Evidence(moments=(Moment(f"a message on {message.topic} arrived", when_s),))
+
+
+def _way_s(message: Message) -> float:
+    return (message.received_ns - message.stamp_ns) / NS

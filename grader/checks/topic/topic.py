@@ -12,10 +12,8 @@ from grader.checks.finding import Evidence, Finding, Status
 from grader.checks.first_seen import endpoints_seen, nodes_seen
 from grader.checks.need import Recorded
 from grader.checks.wording import code, codes
-from grader.diagnosis.explanation import explain
 from grader.diagnosis.no_endpoint import misnamed, why_no_endpoint
 from grader.diagnosis.no_node import why_no_node
-from grader.diagnosis.type_confusion import OtherType
 from grader.recording.model import Kind, Recording
 from grader.spec.name import InterfaceName, TopicName
 
@@ -122,11 +120,10 @@ def type_(recording: Recording, parameters: Type) -> Finding:
     if not wrong:
         return Finding.passed(expected, f"the type is {codes(types)}")
     which = f"another {kind.value} on the topic" if wanted in types else f"the {kind.value}"
-    explanation = explain(OtherType(wanted, wrong[0]))
     package, _, short = wanted.split("/")
     return Finding.failed(
         expected,
-        f"{which} has the type {code(wrong[0])}" + (f": {explanation}" if explanation else ""),
+        f"{which} has the type {code(wrong[0])}",
         "A publisher and a subscription meet only if their types are the same: "
         f"`from {package}.msg import {short}`.",
         Evidence(moments=endpoints_seen(recording, endpoints)),

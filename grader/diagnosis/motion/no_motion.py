@@ -15,7 +15,7 @@ from grader.diagnosis.explanation import Symptom, cause_of, explanation
 from grader.diagnosis.no_messages import why_silent
 from grader.diagnosis.no_node import why_no_node
 from grader.diagnosis.process.process_exit import exited, why_ended, why_it_exited
-from grader.diagnosis.wrong_value import was_integer, what_was_put
+from grader.diagnosis.wrong_value import MISREAD, was_integer
 from grader.measure.compatibility import compatibility_table, refusals
 from grader.measure.motion.approach import Approach
 from grader.measure.motion.command import (
@@ -206,7 +206,7 @@ def integer_in_command(symptom: NotMoved) -> Cause | None:
     for field, number in (("linear.x", twist.linear_m_s), ("angular.z", twist.angular_rad_s)):
         if was_integer(number):
             return Cause(
-                f"{_STILL}: {what_was_put(number)} was put into {code(field)}, a float field, "
+                f"{_STILL}: {MISREAD} was put into {code(field)}, a float field, "
                 "which ROS misreads",
                 "A number in a message must be a float: write 1.0 instead of 1, or float(value).",
                 symptom.evidence,

@@ -120,8 +120,17 @@ def why_never_spun(
     process = next(
         (item for item in candidates if declarations.never_spun(recording, item.name)), None
     )
+    names = sorted(set(nodes))
     if process is None:
-        return why_not_given(recording, seen, nodes)
+        if not names or not all(declarations.in_no_executor(recording, name) for name in names):
+            return None
+        return Cause(
+            f"{seen}: an executor spins, but {codes(names)} was not given to it, so none of its "
+            "callbacks runs",
+            "Give the node to the executor that spins, executor.add_node(node), or call "
+            "rclpy.spin(node).",
+            Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
+        )
     place = interrupted_place(recording, process.name)
     where = f"; it was at {place.file}:{place.line} when it was interrupted" if place else ""
     return Cause(
@@ -131,20 +140,6 @@ def why_never_spun(
             moments=(until_the_end(recording, "rclpy.spin() was still not called"),),
             places=(place,) if place else (),
         ),
-    )
-
-
-def why_not_given(recording: Recording, seen: str, nodes: Iterable[str]) -> Cause | None:
-    """The cause if nodes were given to no executor, though their process has one that spins."""
-    names = sorted(set(nodes))
-    if not names or not all(declarations.in_no_executor(recording, name) for name in names):
-        return None
-    return Cause(
-        f"{seen}: an executor spins, but {codes(names)} was not given to it, so none of its "
-        "callbacks runs",
-        "Give the node to the executor that spins, executor.add_node(node), or call "
-        "rclpy.spin(node).",
-        Evidence(moments=(until_the_end(recording, "no executor had the node"),)),
     )
 
 

@@ -10,7 +10,7 @@ from string import Template
 from grader.checks.wording import code
 from grader.diagnosis.explanation import Explanation, Symptom, add, explanation
 from grader.diagnosis.process.missing_library import library_hint
-from grader.diagnosis.process.raised import Failure, Frame, student_place, submission_path
+from grader.diagnosis.process.raised import Failure, Frame, student_place
 from grader.recording.model import Recording
 from grader.spec.source import Model, read_source
 
@@ -101,21 +101,6 @@ def not_imported(symptom: Raised) -> str | None:
 
 for _row in TABLE.exceptions:
     add(Explanation(Raised, _row.mistake, _row, __name__, _row.mistake))
-
-
-@explanation(Raised)
-def no_such_attribute(symptom: Raised) -> str | None:
-    """A module has no such name, or console_scripts in setup.py names no function of it."""
-    failure = symptom.failure
-    if failure.type != "AttributeError" or not failure.message.startswith("module "):
-        return None
-    # Where Python itself loads the entry point, the last frame is its own.
-    if submission_path(failure.frames[-1].file, symptom.recording.submission):
-        return (
-            "The module has no such name: check its spelling. A module inside of another one "
-            "must be imported itself, as in `from rclpy.node import Node`."
-        )
-    return "setup.py's console_scripts names a function that the module does not have."
 
 
 @explanation(Raised, general=True)

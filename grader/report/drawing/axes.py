@@ -48,13 +48,10 @@ def ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
     digits = max(0, -math.floor(math.log10(step) + 1e-9))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     values = [number * step for number in range(first, last + 1)]
-    return [(value, _number(value, digits)) for value in values]
-
-
-def _number(value: float, digits: int) -> str:
-    if abs(value) >= 1e6 or digits > 4:
-        return f"{value:.3g}"
-    return f"{value + 0.0:.{digits}f}"
+    return [
+        (one, f"{one:.3g}" if abs(one) >= 1e6 or digits > 4 else f"{one + 0.0:.{digits}f}")
+        for one in values
+    ]
 
 
 def value_axis(

@@ -42,16 +42,6 @@ class Phase:
     end_s: float
 
 
-@dataclass(frozen=True)
-class _Speed:
-    """One of the two speeds of the robot at some times, and what it was told to be."""
-
-    title: str
-    commands: Sequence[float]
-    true: Sequence[float]
-    limit: float
-
-
 def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
     """Draw commands and speeds of a run; None in one without a simulated robot."""
     scene = recording.scene
@@ -61,26 +51,16 @@ def draw_motion(recording: Recording, name: str) -> svg.Figure | None:
     stride = max(STRIDE, len(recording.truth) // MOST_POINTS)
     truth = (*recording.truth[::stride], recording.truth[-1])
     times_s = [recording.since_launch_s(step.time_ns) for step in truth]
-    speeds = (
-        _Speed(
-            "speed ahead (m/s)",
-            [0.0 if math.isnan(step.command_m_s) else step.command_m_s for step in truth],
-            [step.linear_m_s for step in truth],
-            scene.max_linear_m_s,
-        ),
-        _Speed(
-            "turn (rad/s)",
-            [0.0 if math.isnan(step.command_rad_s) else step.command_rad_s for step in truth],
-            [step.angular_rad_s for step in truth],
-            scene.max_angular_rad_s,
-        ),
-    )
+    forward_m_s = [0.0 if math.isnan(one.command_m_s) else one.command_m_s for one in truth]
+    turn_rad_s = [0.0 if math.isnan(one.command_rad_s) else one.command_rad_s for one in truth]
+    forward = (forward_m_s, [one.linear_m_s for one in truth], scene.max_linear_m_s)
+    turn = (turn_rad_s, [one.angular_rad_s for one in truth], scene.max_angular_rad_s)
 
     def draw(width: float) -> tuple[float, list[Markup]]:
         x = Scale(0.0, max(times_s[-1], 0.1), LEFT, width - RIGHT)
         content, bottom = _strip(found, x), float(STRIP)
-        for speed in speeds:
-            content += _panel(speed, times_s, x, bottom + BETWEEN)
+        for title, speed in (("speed ahead (m/s)", forward), ("turn (rad/s)", turn)):
+            content += _panel(title, *speed, x.all_clipped(times_s), x.end, bottom + BETWEEN)
             bottom += BETWEEN + PANEL
         return bottom + TIME_AXIS, [*content, *time_axis(x, bottom, width)]
 
@@ -127,26 +107,35 @@ def _strip(found: Sequence[Phase], x: Scale) -> list[Markup]:
     return drawn
 
 
-def _panel(speed: _Speed, times_s: Sequence[float], x: Scale, top: float) -> list[Markup]:
-    finite = [value for value in (*speed.commands, *speed.true) if abs(value) < MOST]
+def _panel(
+    title: str,
+    commands: Sequence[float],
+    true: Sequence[float],
+    most: float,
+    at: Sequence[float],
+    end: float,
+    top: float,
+) -> list[Markup]:
+    """One of the two speeds; ``most`` is the limit of the robot, ``at`` are pixels of times."""
+    finite = [value for value in (*commands, *true) if abs(value) < MOST]
     low, high = min(0.0, *finite), max(0.0, *finite)
     reached = ((1.0, high), (-1.0, -low))
-    limits = [sign * speed.limit for sign, reach in reached if reach > 0.5 * speed.limit]
+    limits = [sign * most for sign, reach in reached if reach > 0.5 * most]
     low, high = min([low, *limits]), max([high, *limits])
-    room = 0.08 * (high - low) or 0.05 * speed.limit or 0.05
+    room = 0.08 * (high - low) or 0.05 * most or 0.05
     y = Scale(low - room, high + room, top + PANEL, top)
-    at = x.all_clipped(times_s)
+    # The labels of limits go over the lines, which run through that of the lower limit.
+    labels = [
+        svg.label(f"limit {one:.3g}{unit_of(title)}", end, y(one) - 4, anchor="end")
+        for one in limits
+    ]
     return [
-        svg.label(speed.title, 0, y.end - 8),
-        *value_axis(y, LEFT, x.end),
-        *(svg.line(LEFT, y(limit), x.end, y(limit), "limit") for limit in limits),
-        svg.curve(_steps(at, y.all_clipped(speed.commands)), "command"),
-        svg.curve(list(zip(at, y.all_clipped(speed.true), strict=True)), "true"),
-        # Over the lines, which run through the label of the lower limit.
-        *(
-            svg.label(f"limit {limit:.3g}{unit_of(speed.title)}", x.end, y(limit) - 4, anchor="end")
-            for limit in limits
-        ),
+        svg.label(title, 0, y.end - 8),
+        *value_axis(y, LEFT, end),
+        *(svg.line(LEFT, y(one), end, y(one), "limit") for one in limits),
+        svg.curve(_steps(at, y.all_clipped(commands)), "command"),
+        svg.curve(list(zip(at, y.all_clipped(true), strict=True)), "true"),
+        *labels,
     ]
 
 

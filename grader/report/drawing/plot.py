@@ -80,16 +80,15 @@ def _series(points: Sequence[svg.Point], band: svg.Point, x: Scale, y: Scale) ->
     shown = _thinned(points, x) if len(points) > MANY else points
     across, down = x.all_clipped([a for a, _ in shown]), y.all_clipped([b for _, b in shown])
     placed = list(zip(across, down, strict=True))
-    inside = [band[0] <= value <= band[1] for _, value in shown]
+    good = [point for point, (_, v) in zip(placed, shown, strict=True) if band[0] <= v <= band[1]]
     dense = len(placed) > DOTS
     drawn = []
     if len(placed) > 1:
         drawn.append(svg.curve(placed, "series dense" if dense else "series"))
-    good = [point for point, fits in zip(placed, inside, strict=True) if fits]
     if good and not dense:
         drawn.append(svg.dots(good, "dots"))
     if len(good) < len(placed):
-        bad = [point for point, fits in zip(placed, inside, strict=True) if not fits]
+        bad = [p for p, (_, v) in zip(placed, shown, strict=True) if not band[0] <= v <= band[1]]
         drawn.append(svg.crosses(_apart(bad), "out"))
     return drawn
 
@@ -147,28 +146,15 @@ def _span(values: Sequence[float], margin: float) -> tuple[float, float]:
 
 
 def _caption(plot: Plot, values: Sequence[float], band: svg.Point | None, lost: int) -> str:
-    parts = []
-    if not values:
-        parts.append("no values")
-    elif band:
-        outside = sum(not band[0] <= value <= band[1] for value in values)
-        parts.append(f"{_allowed(band)}{unit_of(plot.y_label)} (shaded)")
-        parts.append(
-            f"{outside} of {len(values)} outside (marked ×)"
-            if outside
-            else f"all {len(values)} inside"
-        )
-    else:
-        parts.append(counted(len(values), "value"))
+    parts = [counted(len(values), "value") if values else "no values"]
+    if values and band:
+        low, high = band
+        allowed = f"{low:.6g} to {high:.6g}"
+        if math.isinf(low) or math.isinf(high):
+            allowed = f"up to {high:.6g}" if math.isinf(low) else f"from {low:.6g}"
+        outside, count = sum(not low <= value <= high for value in values), len(values)
+        told = f"{outside} of {count} outside (marked ×)" if outside else f"all {count} inside"
+        parts = [f"allowed {allowed}{unit_of(plot.y_label)} (shaded)", told]
     if lost:
         parts.append(f"{lost} without a finite value not drawn")
     return f"{one_line(plot.title)}: {', '.join(parts)}."
-
-
-def _allowed(band: svg.Point) -> str:
-    low, high = band
-    if math.isinf(low):
-        return f"allowed up to {high:.6g}"
-    if math.isinf(high):
-        return f"allowed from {low:.6g}"
-    return f"allowed {low:.6g} to {high:.6g}"

@@ -124,13 +124,11 @@ def _of_processes(recording: Recording) -> Iterator[Lane]:
 
 
 def _of_topics(recording: Recording) -> Iterator[Lane]:
-    for topic, messages in sorted(recording.messages.items()):
-        note = f"{counted(len(messages), 'message')}{_held(recording, topic)}"
-        yield Lane(topic, note, ticks=_since(recording, [one.stamp_ns for one in messages]))
-    for topic, messages in sorted(recording.sent.items()):
-        note = f"{counted(len(messages), 'message')} sent"
-        ticks = _since(recording, [message.stamp_ns for message in messages])
-        yield Lane(f"to {topic}", note, ticks=ticks)
+    found = [(topic, _held(recording, topic), all_) for topic, all_ in recording.messages.items()]
+    sent = [(f"to {topic}", " sent", all_) for topic, all_ in recording.sent.items()]
+    for name, rest, messages in sorted(found) + sorted(sent):
+        ticks = _since(recording, [one.stamp_ns for one in messages])
+        yield Lane(name, f"{counted(len(messages), 'message')}{rest}", ticks=ticks)
 
 
 def _held(recording: Recording, topic: str) -> str:

@@ -149,14 +149,14 @@ def read_canvas(text: str, name: str = "the Canvas export") -> CanvasExport:
         {title: text.strip() for title, text in zip_longest(columns, said, fillvalue="")},
         students=tuple(tuple(row[:end]) for row in body),
         excused=tuple(
-            frozenset(title for title, text in zip_longest(columns, row[end:]) if _is_excused(text))
+            frozenset(
+                title
+                for title, text in zip(columns, row[end:], strict=False)
+                if text.strip().casefold() == "ex"
+            )
             for row in body
         ),
     )
-
-
-def _is_excused(text: str | None) -> bool:
-    return (text or "").strip().casefold() == "ex"
 
 
 def canvas_csv(
@@ -210,6 +210,12 @@ def canvas_csv(
         raise UsageError("\n".join(["no score could be filled in:", *problems]))
     doubts = tuple(_doubts(export, title, points, ours))
     return CanvasFile(_csv(table), len(table) - 2, tuple(problems), doubts)
+
+
+def _csv(rows: Iterable[Sequence[str]]) -> str:
+    stream = io.StringIO()
+    csv.writer(stream).writerows(rows)
+    return stream.getvalue()
 
 
 def cell(text: str) -> str:
@@ -320,27 +326,16 @@ def _students(export: CanvasExport, submission: str) -> list[int]:
 
 def _rows_of(export: CanvasExport, index: int, value: str) -> list[int]:
     """Rows with a value in a column; of a name only the letters count, in either order."""
+    cells = enumerate(student[index] for student in export.students)
     if index:
-        wanted = value.casefold()
-        return [
-            row
-            for row, student in enumerate(export.students)
-            if wanted == student[index].strip().casefold()
-        ]
-    wanted = _letters(value)
-    found = []
-    for row, student in enumerate(export.students):
-        names = student[0].split("," if "," in student[0] else None)
-        if wanted and wanted in (_letters("".join(names)), _letters("".join(reversed(names)))):
-            found.append(row)
-    return found
+        return [row for row, text in cells if text.strip().casefold() == value.casefold()]
+    names = {row: text.split("," if "," in text else None) for row, text in cells}
+    return [
+        row
+        for row, parts in names.items()
+        if _letters(value) in (_letters("".join(parts)), _letters("".join(reversed(parts))))
+    ]
 
 
 def _letters(name: str) -> str:
     return re.sub(r"[\W_]+", "", name).casefold()
-
-
-def _csv(rows: Iterable[Sequence[str]]) -> str:
-    stream = io.StringIO()
-    csv.writer(stream).writerows(rows)
-    return stream.getvalue()

@@ -82,30 +82,15 @@ def render_report(
     )
 
 
-class Gallery:
-    """The plots of one report; checks of the same run often show the same."""
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self._names: dict[tuple[Plot, str | None], str] = {}
-        self._folded: set[str] = set()
+class Gallery(dict[tuple[Plot, str | None, bool], str]):
+    """The plots of one report by where they are drawn; checks of a run often show the same."""
 
     def plot(
         self, plot: Plot, name: str, scenario: str | None, *, folded: bool = False
     ) -> tuple[str, Figure | None]:
-        """Draw a plot, or only name the figure that shows it already.
-
-        Args:
-            folded: Whether the finding is folded up at first. One that is not shows its plot,
-                even if one that is has it too.
-        """
-        known = self._names.get((plot, scenario))
-        if known is not None and (folded or known not in self._folded):
-            return known, None
-        self._names[plot, scenario] = name
-        if folded:
-            self._folded.add(name)
-        return name, draw_plot(plot, name)
+        """Draw a plot, or only name the figure that shows it already, and not folded up."""
+        known = self.get((plot, scenario, False)) or self.setdefault((plot, scenario, folded), name)
+        return known, draw_plot(plot, name) if known == name else None
 
 
 def _faults(result: Result) -> list[str]:

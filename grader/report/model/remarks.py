@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
-from itertools import accumulate
+from collections.abc import Iterator
 
 from grader.checks.topic.topic import PROBE, Untouched
 from grader.checks.wording import code, codes, counted
-from grader.recording.model import NS, Kind, Message, Owner, Recording
+from grader.recording.model import NS, Kind, Owner, Recording
 
 _FLOOD = 1000
 """Messages within a second on one topic; the fastest sensors send fewer."""
@@ -54,28 +53,14 @@ def _excess(recording: Recording) -> Iterator[str]:
     if others:
         yield f"the submission joined another ROS domain: {others}"
     for topic, messages in recording.messages.items():
-        most = _most_within_a_second(recording, topic, messages)
+        times = [message.stamp_ns for message in messages]
+        most = max((bisect_left(times, time + NS) - at for at, time in enumerate(times)), default=0)
         if most > _FLOOD:
             yield f"{most} messages were sent on {code(topic)} within 1 s"
     for process in recording.processes:
         if process.dropped_bytes:
             left_out = counted(process.dropped_bytes, "byte")
             yield f"{code(process.name)} printed more than is kept, by {left_out}"
-
-
-def _most_within_a_second(recording: Recording, topic: str, messages: Sequence[Message]) -> int:
-    """Count messages, with those that were lost because the probe could not keep up."""
-    numbers: list[int] = [*range(1, len(messages) + 1)]
-    if len(recording.student_endpoints(Kind.PUBLISHER, topic)) == 1:
-        # The numbers are of one writer, so a gap in them is as many lost messages.
-        numbers = [*accumulate((item.sequence for item in messages), max)]
-    if not numbers or numbers[-1] <= _FLOOD:
-        return 0
-    times = [message.stamp_ns for message in messages]
-    return max(
-        numbers[bisect_left(times, begin_ns + NS) - 1] - number + 1
-        for begin_ns, number in zip(times, numbers, strict=True)
-    )
 
 
 def _tricks(recording: Recording) -> Iterator[str]:

@@ -10,7 +10,7 @@ from grader.checks.wording import counted, listing
 from grader.grade import model as grades
 from grader.grade.model import total
 from grader.report.model.result_model import CheckPart, FindingPart, Result
-from grader.report.text.words import ADVICE, STATUS, counted_points, cut, number
+from grader.report.text.words import ADVICE, counted_points, cut, number
 from grader.safe_text import clean, one_line
 from grader.submission.record import SourceError
 
@@ -148,14 +148,6 @@ def score(result: Result) -> str:
     if result.score is None:
         return "Not graded"
     return f"{number(result.score)} of {counted_points(result.max_score)}"
-
-
-def tally(result: Result, status: Status) -> str:
-    """``9 passed``, ``1 error``; nothing where there are none."""
-    count = len(result.of(status))
-    if not count:
-        return ""
-    return counted(count, "error") if status is Status.ERROR else f"{count} {STATUS[status].word}"
 
 
 def headline(result: Result) -> str:

@@ -14,7 +14,6 @@ from itertools import takewhile
 from pathlib import Path
 
 from grader.ros import site_packages
-from grader.submission.intake.paths import is_within
 from grader.submission.read.setup_py import EntryPoint, parse_installed
 from grader.submission.record import Definition
 
@@ -118,8 +117,7 @@ def tidy(install: Path, sources: Path, *, most_bytes: int, most_files: int) -> s
         return f"the build installed more than {most_files} files or {most_bytes} bytes"
     if planted:
         shutil.rmtree(install)
-        more = f" and {len(planted) - 1} more of that kind" if len(planted) > 1 else ""
-        return f"the build installed {min(planted)}{more}"
+        return f"the build installed {min(planted)}"
     return None
 
 
@@ -168,11 +166,6 @@ def _common_ending(one: str, other: str) -> int:
     """How many parts at the end of two paths are the same."""
     pairs = zip(reversed(one.split("/")), reversed(other.split("/")), strict=False)
     return len(list(takewhile(lambda pair: pair[0] == pair[1], pairs)))
-
-
-def in_folder(files: Mapping[str, str], folder: str) -> tuple[tuple[str, str], ...]:
-    """Those of the matched files that come from one package's folder, sorted."""
-    return tuple(sorted((new, old) for new, old in files.items() if is_within(old, folder)))
 
 
 def hash_of(data: bytes) -> str:

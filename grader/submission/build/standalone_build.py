@@ -61,7 +61,7 @@ def _needs_nothing(package: Package, others: set[str]) -> bool:
     manifest, cmake = package.manifest, package.cmake
     if cmake is None or manifest.error is not None or package.build_type != "ament_cmake":
         return False
-    if manifest.name != package.name or manifest.asks_for_groups:
+    if manifest.name != package.name:
         return False
     named = {dependency.name for dependency in manifest.dependencies}
     if others & named or any(text in cmake for text in (*others, *_WAYS_OUT)):

@@ -39,9 +39,7 @@ class Manifest:
         build_type: As colcon takes it: without an export it is ``catkin``. None where the XML is
             broken before it says.
         error: Why colcon does not accept it, or None.
-        dependencies: In its order; ``known`` is not yet told.
-        misplaced: Entries that stand inside <export>, where they do not count; their ``kind`` is
-            ``export/depend`` and so on.
+        misplaced: Entries inside <export>, where they do not count, of a kind ``export/depend``.
         groups: Groups that it is a member of (REP-149).
     """
 
@@ -51,7 +49,6 @@ class Manifest:
     dependencies: tuple[Dependency, ...] = ()
     misplaced: tuple[Dependency, ...] = ()
     groups: tuple[str, ...] = ()
-    asks_for_groups: bool = False
 
 
 @dataclass
@@ -102,7 +99,6 @@ def read_manifest(data: bytes, file: str, environment: Mapping[str, str]) -> Man
         dependencies=tuple(dependencies[:_MAX_DEPENDENCIES]),
         misplaced=tuple(misplaced[:_MAX_DEPENDENCIES]),
         groups=tuple(document.texts("member_of_group")[:_MAX_DEPENDENCIES]),
-        asks_for_groups=bool(document.texts("group_depend")),
     )
 
 

@@ -13,7 +13,6 @@ from grader.submission.build.installed import (
     MOST_BYTES,
     InstallSpace,
     hash_of,
-    in_folder,
     normalised,
 )
 from grader.submission.intake.listing import SubmissionFile
@@ -40,14 +39,12 @@ _CONDITIONS = {"ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
 
 @dataclass(frozen=True)
 class Package:
-    """A package as handed in.
+    """A package as handed in; see :class:`PackageRecord` for what it shares with that.
 
     Attributes:
-        cmake: Its CMakeLists.txt, or None where it has none.
         setup_py: The lines of its setup.py, or None where it has none.
         hashes: Path of each Python file in the submission -> hash of its content.
-        lint: What ruff says of what runs, or None where it was not asked.
-        newer_syntax: What only the Python of ROS 2 Jazzy can parse, and not the one here.
+        trees: Path of each Python file -> its syntax tree, or why there is none.
     """
 
     name: str
@@ -120,10 +117,9 @@ class Package:
         providers: Mapping[str, tuple[str, ...]],
         ros: RosInstallation,
     ) -> PackageRecord:
-        """What is known of it before it is built.
+        """What is known of it, one of the submission's packages, before it is built.
 
         Args:
-            packages: All of the submission.
             providers: Importable module -> packages of which each provides it.
         """
         submitted = {other.name for other in packages}
@@ -257,7 +253,11 @@ def _with_executables(
     entries = list(package.setup.entry_points)
     modules = package.modules()
     if installed is not None:
-        files = {shown(i): shown(p) for i, p in in_folder(installed.origins, package.folder)}
+        files = (
+            (shown(new), shown(old))
+            for new, old in installed.origins.items()
+            if is_within(old, package.folder)
+        )
         distribution = normalised(package.setup.name or package.name)
         built = installed.entry_points.get(distribution)
         if built is not None:
@@ -266,7 +266,7 @@ def _with_executables(
         names = {entry.name for entry in entries}
         record = replace(
             record,
-            files=tuple(sorted(files.items())),
+            files=tuple(sorted(files)),
             generated=installed.definitions.get(package.name, ())[:_MOST_DEFINITIONS],
             registered=package.name in installed.registered,
             executables=installed.executables.get(package.name, ()),
