@@ -63,11 +63,6 @@ class TestExists:
         run = recording(endpoints=(endpoint(topic), reader()))
         assert judge("node.exists", run, name=NODE, publishes="/cmd_vel").status is Status.PASSED
 
-    def test_nothing_launched_names_what_is_installed(self):
-        run = nodeless(ending=Ending.NOT_STARTED, processes=())
-        found = failing("node.exists", run, name=NODE)
-        assert "executable does not exist; installed are `bot_pub`" in found
-
     def test_what_could_not_be_started_is_named(self):
         wait = Wait("start of bot_publisher/bot_pub: Permission denied", 0.0, at(0))
         run = nodeless(ending=Ending.NOT_STARTED, processes=(), waits=(wait,))
@@ -157,11 +152,6 @@ class TestExists:
     def test_a_crash_is_named_by_its_signal(self, exit_code, words):
         run = crashed(exit_code=exit_code)
         assert words in failing("node.exists", run, name=NODE)
-
-    def test_main_that_returns_before_a_node_was_created(self):
-        run = crashed(exit_code=0)
-        found = failing("node.exists", run, name=NODE)
-        assert "main() returned before a node was created" in found
 
     def test_a_process_that_hangs_before_init_names_the_line_it_hangs_at(self):
         interrupted = traceback("KeyboardInterrupt", source="time.sleep(60)", line=5)

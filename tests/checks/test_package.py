@@ -54,11 +54,6 @@ class TestFound:
         assert problem in found
         assert "each of them once" in found
 
-    def test_no_package_at_all(self):
-        empty = submission()
-        empty = type(empty)(id="ada", sha256="0" * 64)
-        assert "no package.xml was found" in self.found(empty)
-
     def test_a_misspelt_name(self):
         found = self.found(submission(package("bot_publishr")))
         assert "found package `bot_publishr`" in found
@@ -69,11 +64,6 @@ class TestFound:
         found = self.found(submission(package("bot_publishr", build_type="ament_cmake")))
         assert "in project(...) of CMakeLists.txt" in found
         assert "setup.py" not in found
-
-    def test_other_packages_only(self):
-        found = self.found(submission(package("alpha"), package("omega")))
-        assert "found `alpha` and `omega` only" in found
-        assert "inside another one is not found" in found
 
     def test_broken_xml_is_named_with_its_line(self):
         error = SourceError("src/bot_publisher/package.xml", 8, "mismatched tag")
@@ -150,23 +140,10 @@ class TestBuilds:
             f"line {n}" for n in range(85, 100)
         )
 
-    def test_a_build_that_never_ends(self):
-        finding = self.found(build=failed_build(timed_out=True))
-        assert "did not finish within its time limit" in finding.observed
-        assert "setup.py" in finding.hint
-
     def test_a_build_that_was_ended_for_another_reason_says_which(self):
         log = "spam\nspam\n\n[rosgrade: the build was ended because it wrote too much output]\n"
         finding = self.found(build=failed_build(NAME, log=log))
         assert "failed: the build was ended because it wrote too much output" in finding.observed
-
-    def test_another_package_failed_first(self):
-        log = "Failed   <<< other [1s]\nAborted  <<< bot_publisher [1s]\n"
-        subject = submission(
-            package(), package("other"), build=failed_build("bot_publisher", "other", log=log)
-        )
-        found = failing("package.builds", subject, package=NAME)
-        assert "because `other` failed to build" in found
 
     def test_both_packages_failed(self):
         log = "Failed   <<< other [1s]\nFailed   <<< bot_publisher [1s]\n"

@@ -12,13 +12,12 @@ from tests.checks.builder import (
     died,
     failing,
     judge,
-    nodeless,
     output,
     taken,
     text,
     traceback,
 )
-from tests.checks.requests import SET_BOOL, action, asked, service, serving
+from tests.checks.requests import SET_BOOL, asked, service, serving
 
 ENABLE = {"service": "/enable"}
 TRUE = {**ENABLE, "response": {"success": True}}
@@ -52,27 +51,11 @@ class TestExists:
         assert "has the type `std_srvs/srv/Trigger`" in found
         assert "`from std_srvs.srv import SetBool`" in found
 
-    def test_an_action_in_its_place(self):
-        run = serving(services=(action("/enable"),))
-        assert "offers the action `/enable`, but has no service" in failing(
-            "service.exists", run, **ENABLE
-        )
-
     def test_parameter_services_are_not_offered_as_what_there_is(self):
         run = serving(services=(service("/bot_publisher/get_parameters"),))
         found = failing("service.exists", run, **ENABLE)
         assert "`/bot_publisher` has no service of its own" in found
         assert "self.create_service(Type, 'enable', self.callback)" in found
-
-    def test_a_program_that_died_first_is_the_cause(self):
-        run = serving(
-            services=(), processes=(died(1),), ending=Ending.EXITED,
-            log=output(traceback("ValueError: no camera")),
-        )  # fmt: skip
-        assert f"ValueError: no camera ({SOURCE}:14)" in failing("service.exists", run, **ENABLE)
-
-    def test_no_node_at_all(self):
-        assert "never called rclpy.init()" in failing("service.exists", nodeless(), **ENABLE)
 
 
 class TestResponds:
