@@ -237,12 +237,9 @@ class Scenario(Model):
         10.0,
         description="How long the first node may take to appear; time that the host took "
         "from it is not counted.",
-        validate_default=False,
     )
     shutdown: DurationOrZero = Field(
-        2.0,
-        description="How long the node may take to end after SIGINT before it gets SIGTERM.",
-        validate_default=False,
+        2.0, description="How long the node may take to end after SIGINT before it gets SIGTERM."
     )
     limits: LimitOptions | None = Field(
         None, description="What the student may take; by default the assignment's."
