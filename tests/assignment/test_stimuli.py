@@ -100,7 +100,6 @@ FORM = [
     (publish("message: {}\nmessages: [{}]"), f"{ONE_WAY}, not message and messages"),
     (publish("messages: [{}, {}]"), "several messages need a pace: give 'every' or 'answer'"),
     (publish("message: {}\ncount: 3"), "several messages need a pace"),
-    (publish("message: {}\nbefore_launch: 1"), "unless the durability is transient_local"),
     (publish("message: {}\nwithin: 5"), "17: .*within: '5' has no unit|17: .*within: 5 has no"),
     ("      - {join: /echo, type: std_msgs/msg/String, after: 1 s}\n", "'name' is missing"),
 ]

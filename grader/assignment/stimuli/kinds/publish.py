@@ -94,11 +94,6 @@ class Publish(StimulusModel):
             raise ValueError(f"give the messages in one way of {', '.join(given)}, {told}")
         if self.count is not None and self.message is None:
             raise ValueError("'count' says how often one 'message' is published")
-        if self.before_launch and self.durability == "volatile":
-            raise ValueError(
-                "what is published 'before_launch' is lost for later subscriptions unless the "
-                "durability is transient_local"
-            )
         if self._is_several and not self._is_paced:
             raise ValueError("several messages need a pace: give 'every' or 'answer'")
         return self
