@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from grader import resources
-from grader.assignment import limits, model, mutant
+from grader.assignment import model, mutant
 from grader.assignment.own_check import FOLDER, lesson_checks
 from grader.assignment.stimuli.stimulus import stimulus_models
 from grader.checks import finding
@@ -46,8 +46,8 @@ _SECTIONS: dict[str, dict[str, type[BaseModel]]] = {
         "record": model.RecordedTopic,
         **{f"stimuli: {one.heading or one.key}": one for one in stimulus_models()},
         "until": model.Until,
-        "limits": limits.LimitOptions,
-        "build_limits": limits.BuildLimitOptions,
+        "limits": model.LimitOptions,
+        "build_limits": model.BuildLimitOptions,
         "robot": description.RobotOptions,
         "robot: drives": description.Drive,
         "lidar": description.LidarOptions,

@@ -9,9 +9,9 @@ from hashlib import sha256
 from pathlib import Path
 
 from grader import resources
-from grader.assignment import expected, rules, simulation
+from grader.assignment import rules, simulation
 from grader.assignment.binding import BoundCheck, bind
-from grader.assignment.interfaces import Interfaces, interface_problems
+from grader.assignment.interfaces import Interfaces, field_problems, interface_problems
 from grader.assignment.model import NOTHING_WITHHELD, Assignment, Scenario, Withheld
 from grader.assignment.own_check import lesson_checks
 from grader.checks.catalogue import CATALOGUE
@@ -123,7 +123,7 @@ def load_assignment(
         interfaces = Interfaces.of(file.parent)
         found += simulation.problems(source, assignment, interfaces)
         found += interface_problems(source, assignment, bound, interfaces)
-        found += expected.problems(source, assignment, bound, interfaces)
+        found += field_problems(source, assignment, bound, interfaces)
     if found:
         raise AssignmentError(file, in_order(found))
     digest = folder_sha256(file.parent) if file.name == ASSIGNMENT_FILE else _sha256(file)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from grader.assignment.limits import BuildLimitOptions, LimitOptions
 from grader.assignment.stimuli.stimulus import Stimulus
+from grader.sandbox.limits import BUILD, BUILD_OUTPUT_BYTES, SandboxLimits
 from grader.spec.name import (
     Durability,
     Id,
@@ -25,10 +25,83 @@ from grader.spec.name import (
     Reliability,
     TopicName,
 )
-from grader.spec.quantity import Duration, DurationOrZero, PositiveLength
+from grader.spec.quantity import Duration, DurationOrZero, PositiveLength, Size
 from grader.spec.source import Model
 from grader.spec.unit import parse_any
 from sim.description import LidarOptions, OdometryOptions, RobotOptions, Topics
+
+_DEFAULTS = SandboxLimits()
+
+_Memory = Annotated[Size, Field(description="Of all processes together.")]
+_Processes = Annotated[
+    int,
+    Field(
+        ge=16,
+        le=4096,
+        description="Processes and threads together; a node of rclpy has 14 threads.",
+    ),
+]
+_CpuTime = Annotated[Duration, Field(description="CPU time of all processes together.")]
+_FileSize = Annotated[Size, Field(description="Size of one file.")]
+_Disk = Annotated[Size, Field(description="Everything that is written; it is kept in memory.")]
+_Files = Annotated[int, Field(ge=100, description="Files and folders that are made.")]
+_Output = Annotated[
+    Size, Field(description="Output to the terminal; a program that writes more is ended.")
+]
+
+
+class LimitOptions(Model):
+    """What the processes of a student may take in a sandbox.
+
+    Without a sandbox nothing is bounded but time. How long a run lasts is bounded by
+    `discovery`, `timeout` and `shutdown`.
+    """
+
+    _least_address_bytes: ClassVar[int] = _DEFAULTS.address_bytes
+
+    memory: _Memory = _DEFAULTS.memory_bytes
+    processes: _Processes = _DEFAULTS.processes
+    cpu_time: _CpuTime = _DEFAULTS.cpu_s
+    file_size: _FileSize = _DEFAULTS.file_bytes
+    disk: _Disk = _DEFAULTS.disk_bytes
+    files: _Files = _DEFAULTS.files
+    output: _Output = _DEFAULTS.output_bytes
+
+    def limits(self) -> SandboxLimits:
+        """For the sandbox."""
+        return SandboxLimits(
+            memory_bytes=int(self.memory),
+            processes=self.processes,
+            cpu_s=max(1, round(self.cpu_time)),
+            file_bytes=int(self.file_size),
+            disk_bytes=int(self.disk),
+            files=self.files,
+            output_bytes=int(self.output),
+            address_bytes=max(self._least_address_bytes, 4 * int(self.memory)),
+        )
+
+
+class BuildLimitOptions(LimitOptions):
+    """What the build of a submission may take; `setup.py` and `CMakeLists.txt` are programs, too.
+
+    Without a sandbox only `wall_time` and `output` are bounded. A build that passes a limit has
+    failed.
+    """
+
+    _least_address_bytes: ClassVar[int] = BUILD.address_bytes
+
+    memory: _Memory = BUILD.memory_bytes
+    processes: _Processes = BUILD.processes
+    cpu_time: _CpuTime = BUILD.cpu_s
+    wall_time: Duration | None = Field(
+        None,
+        description="Of the whole build; by default 2 min where all packages are ament_python, "
+        "else 5 min.",
+    )
+    file_size: _FileSize = BUILD.file_bytes
+    disk: _Disk = BUILD.disk_bytes
+    files: _Files = BUILD.files
+    output: _Output = BUILD_OUTPUT_BYTES
 
 
 class RandomRange(Model):
@@ -237,12 +310,9 @@ class Scenario(Model):
         10.0,
         description="How long the first node may take to appear; time that the host took "
         "from it is not counted.",
-        validate_default=False,
     )
     shutdown: DurationOrZero = Field(
-        2.0,
-        description="How long the node may take to end after SIGINT before it gets SIGTERM.",
-        validate_default=False,
+        2.0, description="How long the node may take to end after SIGINT before it gets SIGTERM."
     )
     limits: LimitOptions | None = Field(
         None, description="What the student may take; by default the assignment's."

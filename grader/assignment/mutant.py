@@ -227,14 +227,13 @@ class Mutants:
 
 def reference_of(assignment: str, folder: Path | None = None) -> Path:
     """The folder of an assignment's reference solution: beside it, or rosgrade's own."""
-    beside = folder / REFERENCE_FOLDER if folder is not None else None
-    if beside is not None and beside.is_dir():
-        return beside
     own = resources.reference() / assignment
-    if not own.is_dir():
-        places = f"{beside} or {own}" if beside else f"{own}"
-        raise UsageError(f"the assignment {assignment!r} has no reference solution: {places}")
-    return own
+    places = [folder / REFERENCE_FOLDER, own] if folder is not None else [own]
+    for place in places:
+        if place.is_dir():
+            return place
+    listed = " or ".join(map(str, places))
+    raise UsageError(f"the assignment {assignment!r} has no reference solution: {listed}")
 
 
 def load_mutants(assignment: Assignment, folder: Path, reference: Path | None = None) -> Mutants:

@@ -26,14 +26,14 @@ from threading import Lock
 from types import MappingProxyType, ModuleType
 from typing import Any, get_type_hints
 
-from pydantic import ConfigDict, create_model
+from pydantic import create_model
 from pydantic.errors import PydanticUserError
 
 from grader import resources
 from grader.checks.catalogue import CATALOGUE, gather
 from grader.checks.check import Check, Parameters, Subject
 from grader.checks.finding import Finding
-from grader.spec.nearest_name import did_you_mean
+from grader.spec.nearest_name import did_you_mean, nearest_or_all
 
 FOLDER = "checks"
 _IMPORTING = Lock()
@@ -69,10 +69,8 @@ def load_function(text: str, folder: Path) -> Callable[..., Any]:
     if not inspect.isfunction(function):
         functions = inspect.getmembers(module, inspect.isfunction)
         own = [key for key, value in functions if value.__module__ == module.__name__]
-        listed = f" Its functions: {', '.join(own) or 'none'}."
-        raise ValueError(
-            f"{file.name} has no function {name!r}.{did_you_mean(name, own) or listed}"
-        )
+        advice = nearest_or_all(name, own, "Its functions")
+        raise ValueError(f"{file.name} has no function {name!r}.{advice}")
     return function
 
 
@@ -91,12 +89,6 @@ def _module(file: Path) -> ModuleType:
         # Not imported, so that no __pycache__ appears in the assignment's folder.
         exec(compile(source, str(file), "exec", dont_inherit=True), module.__dict__)
     return module
-
-
-class _OwnParameters(Parameters):
-    """Base of the parameters of own checks, which may be annotated with any class."""
-
-    model_config = ConfigDict(arbitrary_types_allowed=True)
 
 
 def load_own_check(text: str, folder: Path) -> Check:
@@ -128,7 +120,7 @@ def _parameters(
             required = argument.default is inspect.Parameter.empty
             default = ... if required else argument.default
             fields[argument.name] = (hints.get(argument.name, Any), default)
-        model = create_model(function.__name__, __base__=_OwnParameters, **fields)
+        model = create_model(function.__name__, __base__=Parameters, **fields)
     except (NameError, TypeError, AttributeError, PydanticUserError) as error:
         reason = str(error).splitlines()[0]
         raise ValueError(f"{name}: its annotations cannot be read: {reason}") from error

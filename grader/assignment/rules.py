@@ -1,19 +1,40 @@
-"""What must fit together in an assignment, beyond the form of each value. Pure."""
+"""What must fit together in an assignment, beyond the form of each value; pure but for ruff.
+
+That is what the YAML names elsewhere in itself, and what checks declare to need: a check without it
+would end as an error, or as a failure, for every student.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import singledispatch
 from graphlib import CycleError, TopologicalSorter
+from typing import Any
 
 from grader.assignment.binding import BoundCheck
-from grader.assignment.model import SHOWN_FROM, Assignment, CheckSpec, Launch, Scenario
-from grader.assignment.needs import need_problems, no_executable, no_package
+from grader.assignment.model import SHOWN_FROM, Assignment, CheckSpec, Launch, Package, Scenario
+from grader.assignment.stimuli.kinds.join import Join
+from grader.assignment.stimuli.kinds.publish import Publish
+from grader.assignment.stimuli.kinds.request import (
+    CallService,
+    ReadParameters,
+    SendGoal,
+    SetParameters,
+)
+from grader.checks import need as needs
 from grader.checks.check import Subject
-from grader.errors import Problem
+from grader.checks.value import same_value
+from grader.errors import GraderFault, Problem
 from grader.spec.document import Place
-from grader.spec.nearest_name import nearest_or_all
+from grader.spec.nearest_name import did_you_mean, nearest_or_all
 from grader.spec.source import Source
+from grader.spec.unit import format_duration
+from grader.submission.read.lint import find_ruff, known_rules
+
+_Lack = tuple[Place, str]
+"""A place below the entry of a check, and what is wrong there."""
 
 
 def problems(
@@ -118,11 +139,11 @@ def _check(assignment: Assignment, bound: BoundCheck) -> Iterator[tuple[Place, s
                 advice = nearest_or_all(scenario, scenarios, "The scenarios are")
                 yield ("scenarios", number), f"there is no scenario {scenario!r}.{advice}"
         if not spec.scenarios:
-            yield from _unnamed(judged)
+            yield from _other_programs(judged)
     yield from need_problems(assignment, bound, judged)
 
 
-def _unnamed(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
+def _other_programs(scenarios: Sequence[Scenario]) -> Iterator[tuple[Place, str]]:
     """A check of all scenarios would judge one program in the runs of another, too."""
     launched = [sorted(map(_program, scenario.launch)) for scenario in scenarios]
     for scenario, programs in zip(scenarios, launched, strict=True):
@@ -141,3 +162,195 @@ def _program(launch: Launch) -> str:
     renamed = [*launch.remap.items(), ("__node", launch.name), ("__ns", launch.namespace)]
     rules = ", ".join(f"{old}:={new}" for old, new in renamed if new is not None)
     return f"'{launch.program}'" + (f" ({rules})" if rules else "")
+
+
+@dataclass(frozen=True)
+class _User:
+    """A check with what its needs are looked for in."""
+
+    bound: BoundCheck
+    assignment: Assignment
+    scenarios: Sequence[Scenario]
+
+    def value(self, key: str | None) -> Any:
+        return getattr(self.bound.parameters, key) if key else None
+
+
+def need_problems(
+    assignment: Assignment, bound: BoundCheck, scenarios: Sequence[Scenario]
+) -> Iterator[_Lack]:
+    """Find what a check needs and the assignment lacks."""
+    user = _User(bound, assignment, scenarios)
+    for need in bound.parameters.needs:
+        yield from _lacks(need, user)
+
+
+@singledispatch
+def _lacks(need: needs.Need, user: _User) -> Iterator[_Lack]:
+    raise NotImplementedError(type(need))
+
+
+@_lacks.register
+def _(need: needs.SimulatedRobot, user: _User) -> Iterator[_Lack]:
+    for scenario in user.scenarios:
+        if scenario.world is None:
+            text = f"the scenario {scenario.id!r} has no 'world', and so no simulated robot"
+            yield ("uses",), text
+
+
+@_lacks.register
+def _(need: needs.Recorded, user: _User) -> Iterator[_Lack]:
+    topic, interface = user.value(need.topic), user.value(need.type)
+    if user.value(need.kind) == "subscription":
+        return
+    for scenario in user.scenarios:
+        recorded = scenario.recorded_types
+        if topic not in recorded:
+            text = f"the scenario {scenario.id!r} does not record {topic!r}."
+            yield ("with", need.topic), text + nearest_or_all(topic, recorded, "It records")
+        elif interface not in (None, recorded[topic]):
+            text = f"the scenario {scenario.id!r} records {topic!r} as {recorded[topic]!r}"
+            yield ("with", "type"), text
+
+
+@_lacks.register
+def _(need: needs.Published, user: _User) -> Iterator[_Lack]:
+    for scenario in user.scenarios:
+        topics = [one.publish for one in scenario.stimuli if isinstance(one, Publish)]
+        yield from _unnamed(user, need.topic, scenario, topics, "publishes on")
+
+
+@_lacks.register
+def _(need: needs.Joined, user: _User) -> Iterator[_Lack]:
+    for scenario in user.scenarios:
+        names = [one.name for one in scenario.stimuli if isinstance(one, Join)]
+        yield from _unnamed(user, need.name, scenario, names, "is a join with the name")
+
+
+@_lacks.register
+def _(need: needs.Called, user: _User) -> Iterator[_Lack]:
+    service, key = user.value(need.service) + need.suffix, ("with", need.service)
+    for scenario in user.scenarios:
+        calls = [one for one in scenario.stimuli if isinstance(one, CallService)]
+        mine = [one for one in calls if one.call == service]
+        names = [one.call for one in calls]
+        yield from _unnamed(user, need.service, scenario, names, "asks", service)
+        if mine and all(one.at_once < need.at_once for one in mine):
+            text = f"the scenario {scenario.id!r} calls it never twice at once: 'at_once: 2'"
+            yield key, text
+        fields = user.value(need.request) or {}
+        waits_s = [one.within for one in mine if _has_fields(fields, one.sequence)]
+        yield from _impatient(user, scenario, need.within, waits_s)
+
+
+@_lacks.register
+def _(need: needs.GoalSent, user: _User) -> Iterator[_Lack]:
+    action = user.value(need.action)
+    for scenario in user.scenarios:
+        goals = [one for one in scenario.stimuli if isinstance(one, SendGoal)]
+        mine = [one for one in goals if one.send_goal == action]
+        names = [one.send_goal for one in goals]
+        yield from _unnamed(user, need.action, scenario, names, "asks")
+        if need.having is not None and mine and not any(getattr(g, need.having) for g in mine):
+            text = f"no goal of the scenario {scenario.id!r} has {need.having!r}"
+            yield ("with", need.action), text
+        fields = user.value(need.goal)
+        waits_s = [one.within for one in mine if _has_fields(fields, [one.goal])]
+        yield from _impatient(user, scenario, need.within, waits_s)
+
+
+@_lacks.register
+def _(need: needs.ParametersRead, user: _User) -> Iterator[_Lack]:
+    for scenario in user.scenarios:
+        read = [one.read_parameters for one in scenario.stimuli if isinstance(one, ReadParameters)]
+        yield from _unnamed(user, need.node, scenario, [*_nodes_set(scenario), *read], "asks")
+
+
+@_lacks.register
+def _(need: needs.ParameterSet, user: _User) -> Iterator[_Lack]:
+    node, name, wanted = map(user.value, (need.node, need.name, need.value))
+    for scenario in user.scenarios:
+        nodes = _nodes_set(scenario)
+        yield from _unnamed(user, need.node, scenario, nodes, "asks")
+        tried = [
+            one.set_parameters[name]
+            for one in scenario.stimuli
+            if isinstance(one, SetParameters) and one.node == node and name in one.set_parameters
+        ]
+        drawn = any(isinstance(value, str) for value in tried)
+        if node in nodes and not drawn and not any(same_value(wanted, value) for value in tried):
+            listed = ", ".join(map(repr, tried)) or "nothing"
+            text = f"the scenario {scenario.id!r} sets {name!r} to {listed}, never to {wanted!r}"
+            yield ("with", need.value), text
+
+
+def _nodes_set(scenario: Scenario) -> list[str]:
+    return [one.node for one in scenario.stimuli if isinstance(one, SetParameters)]
+
+
+@_lacks.register
+def _(need: needs.Submitted, user: _User) -> Iterator[_Lack]:
+    name, executable = user.value(need.package), user.value(need.executable)
+    packages = {package.name: package for package in user.assignment.packages}
+    if name not in packages:
+        yield ("with", need.package), no_package(name, packages)
+    elif need.executable and executable not in packages[name].executables:
+        yield ("with", need.executable), no_executable(executable, packages[name])
+
+
+@_lacks.register
+def _(need: needs.RuffRules, user: _User) -> Iterator[_Lack]:
+    ruff = find_ruff()
+    try:
+        known = known_rules(ruff) if ruff is not None else frozenset()
+    except GraderFault:
+        return
+    for index, rule in enumerate(user.value(need.rules) if known else ()):
+        if not any(code.startswith(rule) for code in known):
+            text = f"ruff has no rule {rule!r}." + did_you_mean(rule, known)
+            yield ("with", need.rules, index), text
+
+
+def _unnamed(
+    user: _User,
+    key: str,
+    scenario: Scenario,
+    names: Sequence[str],
+    does: str,
+    wanted: str | None = None,
+) -> Iterator[_Lack]:
+    """No stimulus is about what a parameter names."""
+    wanted = wanted or user.value(key)
+    if wanted is not None and wanted not in names:
+        text = f"no stimulus of the scenario {scenario.id!r} {does} {wanted!r}."
+        yield ("with", key), text + nearest_or_all(wanted, names)
+
+
+def _has_fields(wanted: Mapping[str, Any], given: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether one of some requests has the fields that a check asks for, as both are written."""
+    return any(all(fields.get(key) == item for key, item in wanted.items()) for fields in given)
+
+
+def _impatient(
+    user: _User, scenario: Scenario, key: str | None, waits_s: Iterable[float]
+) -> Iterator[_Lack]:
+    """A stimulus that waits for less time than the check allows."""
+    if key is None:
+        return
+    within_s = user.value(key)
+    short_s = min(waits_s, default=within_s)
+    if short_s < within_s:
+        short, needed = format_duration(short_s), format_duration(within_s)
+        text = f"a stimulus of the scenario {scenario.id!r} waits only {short} for an answer"
+        yield ("with", key), f"{text}: give it 'within: {needed}' too"
+
+
+def no_package(name: str, names: Collection[str]) -> str:
+    """That no package of the assignment has a name."""
+    return f"{name!r} is not among 'packages'.{nearest_or_all(name, names, 'The packages are')}"
+
+
+def no_executable(name: str, package: Package) -> str:
+    """That a package has no executable of a name."""
+    advice = nearest_or_all(name, package.executables, "It has")
+    return f"the package {package.name!r} has no executable {name!r} in 'packages'.{advice}"

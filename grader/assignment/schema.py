@@ -65,7 +65,6 @@ def _schemas(*models: type[Model]) -> tuple[dict[type[Model], dict[str, Any]], d
 
 
 def _parameters_of(check: Check, reference: Mapping[str, Any]) -> dict[str, Any]:
-    """If an entry uses this check, its ``with`` has the parameters of this check."""
     then: dict[str, Any] = {"properties": {"with": reference}}
     if any(field.is_required() for field in check.parameters.model_fields.values()):
         then["required"] = ["with"]

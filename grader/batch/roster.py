@@ -177,7 +177,6 @@ def _collect(columns: Mapping[str, int], rows: Sequence[tuple[int, list[str]]]) 
         known = students.setdefault(written(student.key), student)
         if known is not student:
             problems.append(f"row {number}: {student.key} is in row {known.row} already")
-            again = f"in the roster again in row {number}"
-            problem = "; ".join(part for part in (known.problem, again) if part)
-            students[written(student.key)] = replace(known, problem=problem)
+            again = known.problem or f"in the roster again in row {number}"
+            students[written(student.key)] = replace(known, problem=again)
     return Roster(tuple(students.values()), tuple(problems))

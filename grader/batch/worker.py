@@ -117,9 +117,6 @@ class Parcel:
             with opened(path) as located:
                 if not path.is_dir():
                     return cls(key, path.name, path.read_bytes(), False)
-                # That there were some is told to who handed in nothing else.
-                for skipped in located.skipped:
-                    (located.root / skipped).mkdir(parents=True, exist_ok=True)
                 return cls(key, path.name, pack(located.root), True)
         except SubmissionError as error:
             # It may be of any size, and there is nothing to run.

@@ -73,8 +73,6 @@ class Called(Need):
     """Parameter with fields of the requests that are judged."""
     within: str | None = None
     """Parameter with how long an answer may take: the stimulus must wait as long."""
-    count: str | None = None
-    """Parameter with an entry for each call."""
     at_once: int = 1
     """How many calls must be sent at once."""
 

@@ -58,8 +58,25 @@ def grade(
             findings = (_skipped([results[root] for root in roots]),)
         else:
             findings = tuple(_findings(bound[name], loaded, known, recordings, faults))
+        spec = bound[name].spec
+        status = min((item.finding.status for item in findings), key=SEVERITY.index)
+        credit = 1.0 if status is Status.PASSED else 0.0
+        if status is Status.FAILED:
+            credit = min(item.finding.credit for item in findings)
         put_right = all(_is_put_right(item, recordings) for item in findings)
-        results[name] = _result(bound[name], loaded, findings, roots, put_right=put_right)
+        results[name] = CheckResult(
+            id=name,
+            title=bound[name].title,
+            status=status,
+            points=points_for(spec.points, credit),
+            max_points=spec.points,
+            visibility=spec.visibility,
+            scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound[name])),
+            findings=findings,
+            waits_for=roots,
+            hint=spec.hint,
+            put_right=put_right and status is Status.FAILED,
+        )
     ordered = tuple(results[name] for name in bound)
     return Grade(
         loaded.assignment, loaded.sha256, submission, ordered, loaded.withheld, loaded.location
@@ -72,34 +89,6 @@ def _is_put_right(item: ScenarioFinding, recordings: Mapping[str, Recording]) ->
     runs = [run for name, run in recordings.items() if item.scenario in (None, name)]
     return item.finding.status is Status.PASSED or (
         bool(rule and runs) and all(rule in run.remaps for run in runs)
-    )
-
-
-def _result(
-    bound: BoundCheck,
-    loaded: LoadedAssignment,
-    findings: tuple[ScenarioFinding, ...],
-    waits_for: tuple[str, ...],
-    *,
-    put_right: bool,
-) -> CheckResult:
-    spec = bound.spec
-    status = min((item.finding.status for item in findings), key=SEVERITY.index)
-    credit = 1.0 if status is Status.PASSED else 0.0
-    if status is Status.FAILED:
-        credit = min(item.finding.credit for item in findings)
-    return CheckResult(
-        id=spec.id,
-        title=bound.title,
-        status=status,
-        points=points_for(spec.points, credit),
-        max_points=spec.points,
-        visibility=spec.visibility,
-        scenarios=tuple(scenario.id for scenario in loaded.scenarios_of(bound)),
-        findings=findings,
-        waits_for=waits_for,
-        hint=spec.hint,
-        put_right=put_right and status is Status.FAILED,
     )
 
 

@@ -118,19 +118,6 @@ class Grade:
                 return result
         raise KeyError(check)
 
-    def waiting_for(self, check: str) -> tuple[CheckResult, ...]:
-        """Results that were skipped because of a check, directly or not."""
-        return tuple(result for result in self.results if check in result.waits_for)
-
-    def same_reason(self, check: str) -> tuple[CheckResult, ...]:
-        """Other results that failed for the same reason as a failed check."""
-        reason = self.result(check).reason
-        return tuple(
-            result
-            for result in self.of(Status.FAILED)
-            if result.id != check and result.reason == reason
-        )
-
     def first_to_fix(self) -> CheckResult | None:
         """The failed check on which most others depend, or None where none must be mended."""
         reasons = {result.id: result.reason for result in self.of(Status.FAILED)}

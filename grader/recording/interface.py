@@ -61,21 +61,16 @@ class Field:
         """Whether its values are messages themselves."""
         return "/" in self.type
 
-    @property
-    def full_type(self) -> str:
-        """The type as a definition writes it, bounds and all: ``float64[2]``."""
+    def __str__(self) -> str:
+        """Write it as a definition does, bounds and all: ``float64[2] wheels``."""
         package, _, name = self.type.replace("/msg/", "/").rpartition("/")
         text = f"{package}/{name}" if package else name
         if self.longest is not None:
             text += f"<={self.longest}"
-        if not self.is_array:
-            return text
-        bound = f"<={self.most}" if self.most is not None else ""
-        return f"{text}[{bound if self.count is None else self.count}]"
-
-    def __str__(self) -> str:
-        """Write it as a definition does."""
-        return f"{self.full_type} {self.name}"
+        if self.is_array:
+            bound = f"<={self.most}" if self.most is not None else ""
+            text += f"[{bound if self.count is None else self.count}]"
+        return f"{text} {self.name}"
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, lru_cache
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -113,7 +114,7 @@ def _read(stream: Any) -> Recording:
         {
             **frame,
             **{
-                name: [fact for _, fact in sorted(items, key=_number)]
+                name: [fact for _, fact in sorted(items, key=itemgetter(0))]
                 for name, items in facts.items()
             },
             "submission": submission,
@@ -124,10 +125,6 @@ def _read(stream: Any) -> Recording:
         }
     )
     return recording
-
-
-def _number(fact: tuple[int, Any]) -> int:
-    return fact[0]
 
 
 class _Unreadable(Exception):

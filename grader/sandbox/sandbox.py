@@ -24,7 +24,7 @@ from grader.sandbox.namespaces import MOUNT_POINTS
 from grader.sandbox.python_tree import PythonTree, student_prefix, trees_folder
 from grader.sandbox.seccomp import student_filter
 from grader.sandbox.usage import (
-    CpuAccount,
+    OrphanCpu,
     folder_usage,
     hidden_bytes,
     memory_bytes,
@@ -179,7 +179,7 @@ class BuildRoom:
     environment: Mapping[str, str] = field(
         default_factory=lambda: dict(bubblewrap.PLAIN_ENVIRONMENT)
     )
-    _cpu: CpuAccount = field(default_factory=CpuAccount, repr=False)
+    _cpu: OrphanCpu = field(default_factory=OrphanCpu, repr=False)
 
     def command(self, command: Sequence[str], environment: Mapping[str, str]) -> list[str]:
         """The command line that runs a command in it."""

@@ -15,6 +15,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+_PROC = "/proc"
+_SHARED = b"/dev/zero (deleted)"
 _WINDOW = 3
 """Looks within which a parent has got what the child had that is missing at the last of them.
 
@@ -35,6 +39,18 @@ class Taken(NamedTuple):
 
     own: int
     waited: int
+
+
+class Usage(NamedTuple):
+    """What a process takes, from a file that is read often: ``/proc/PID/stat``."""
+
+    pid: int
+    parent: int
+    session: int
+    started: int
+    taken: Taken
+    threads: int
+    resident_bytes: int
 
 
 class OrphanCpu:
@@ -78,36 +94,11 @@ class OrphanCpu:
         }
         self._there = dict(there)
 
-
-_PAGE = os.sysconf("SC_PAGE_SIZE")
-_TICKS_PER_S = os.sysconf("SC_CLK_TCK")
-_PROC = "/proc"
-_SHARED = b"/dev/zero (deleted)"
-
-
-class Usage(NamedTuple):
-    """What a process takes, from a file that is read often: ``/proc/PID/stat``."""
-
-    pid: int
-    parent: int
-    session: int
-    started: int
-    taken: Taken
-    threads: int
-    resident_bytes: int
-
-
-class CpuAccount:
-    """CPU time of processes that are looked at again and again, of those that have ended too."""
-
-    def __init__(self) -> None:
-        self._orphan_cpu = OrphanCpu()
-
     def used_s(self, usages: Iterable[Usage]) -> float:
-        """What was taken so far, at least."""
+        """CPU time of processes so far, of those that have ended too."""
         there = {Process(one.pid, one.started): one.taken for one in usages}
-        self._orphan_cpu.look(there)
-        return (sum(map(sum, there.values())) + self._orphan_cpu.ticks) / _TICKS_PER_S
+        self.look(there)
+        return (sum(map(sum, there.values())) + self.ticks) / _TICKS_PER_S
 
 
 def usage_of(roots: Iterable[int]) -> list[Usage]:
@@ -115,7 +106,7 @@ def usage_of(roots: Iterable[int]) -> list[Usage]:
     below: dict[int, list[int]] = {}
     found: dict[int, Usage] = {}
     for name in filter(str.isdigit, os.listdir(_PROC)):  # noqa: PTH208  often
-        usage = _usage(int(name))
+        usage = usage_at(int(name))
         if usage is not None:
             found[usage.pid] = usage
             below.setdefault(usage.parent, []).append(usage.pid)
@@ -141,7 +132,7 @@ def memory_bytes(usages: Sequence[Usage], enough: int, hidden: int = 0) -> int:
 
 def own_bytes() -> int:
     """Memory of this very process."""
-    usage = _usage(os.getpid())
+    usage = usage_at(os.getpid())
     return usage.resident_bytes if usage is not None else 0
 
 
@@ -198,7 +189,8 @@ def folder_usage(folders: Iterable[Path], most_bytes: int, most_files: int) -> t
     return total, count
 
 
-def _usage(pid: int) -> Usage | None:
+def usage_at(pid: int) -> Usage | None:
+    """What one process takes by itself; None where it has ended."""
     try:
         with open(f"{_PROC}/{pid}/stat", "rb") as file:  # noqa: PTH123  often
             # The command's name may contain anything, but the last ")" ends it.

@@ -75,7 +75,6 @@ def test_what_fits(found: Found, uses: str, parameters: str) -> None:
         ("service.concurrent", "service: /enable, takes: 1 s", "never twice at once"),
         ("action.result", "action: /fib, within: 11 s", "waits only 10 s for an answer"),
         ("lifecycle.state", "node: other, states: [active]", "asks '/other/get_state'"),
-        ("lifecycle.state", "node: bot, states: [inactive, active]", "only 1 times"),
         ("parameter.declared", "node: bto, name: x", r"Did you mean '/bot'\?"),
         ("parameter.set", "node: bot, name: speed, value: 0.6", "to 0.5, never to 0.6"),
         (

@@ -17,10 +17,8 @@ from tests.checks.builder import (
     declared,
     died,
     endpoint,
-    every,
     failing,
     judge,
-    messages,
     node,
     nodeless,
     output,
@@ -187,10 +185,6 @@ class TestBlocked:
         assert finding.status is Status.FAILED
         assert finding.evidence.places == ()
 
-    def test_answers_that_are_too_late(self):
-        found = failing("executor.responsive", recording(calls=calls(1.5)))
-        assert "answered 0 of 6 calls" in found
-
     def test_a_death_is_the_deeper_cause(self):
         run = recording(
             calls=(call(0.8), call(1.3, None), call(1.8, None), call(2.3, None)),
@@ -245,12 +239,3 @@ class TestNotJudged:
         )
         assert (finding.status, finding.disturbed) == (Status.ERROR, False)
         assert f"`{NODE}/list_parameters`" in finding.observed
-
-    def test_no_call_because_it_died(self):
-        run = recording(
-            calls=(),
-            processes=(died(1, 0.9),),
-            messages=messages(every(0.3, 1)),
-            log=output(traceback("KeyError: 'x'")),
-        )
-        assert "KeyError: 'x'" in failing("executor.responsive", run)

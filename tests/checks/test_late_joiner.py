@@ -49,8 +49,16 @@ def joined(kept, *, qos=LATCHED, depth=10, missed=0, **changes):
     return recording(**{**defaults, **changes})
 
 
+def verdict(run):
+    return judge("qos.late_joiner", run, **LAST_10)
+
+
+def told(run):
+    return failing("qos.late_joiner", run, **LAST_10)
+
+
 def test_the_last_ten():
-    finding = judge("qos.late_joiner", joined(10), **LAST_10)
+    finding = verdict(joined(10))
     assert finding.status is Status.PASSED
     assert finding.observed == "it got 10 of the 12 messages before it"
     rows = finding.evidence.tables[0].rows
@@ -59,27 +67,25 @@ def test_the_last_ten():
 
 def test_a_message_while_it_is_matched_counts_on_either_side():
     late = join(JOINED_S, matched_s=6.72)
-    assert judge("qos.late_joiner", joined(9, joins=(late,)), **LAST_10).status is Status.PASSED
-    assert judge("qos.late_joiner", joined(10, joins=(late,)), **LAST_10).status is Status.PASSED
+    assert verdict(joined(9, joins=(late,))).status is Status.PASSED
+    assert verdict(joined(10, joins=(late,))).status is Status.PASSED
 
 
 def test_a_message_right_after_the_match_counts_for_nothing_of_the_past():
     late = join(JOINED_S, matched_s=6.69)
-    assert judge("qos.late_joiner", joined(9, joins=(late,)), **LAST_10).status is Status.ERROR
-    assert "got 9 of the 12" in failing(
-        "qos.late_joiner", joined(9, depth=9, joins=(late,)), **LAST_10
-    )
+    assert verdict(joined(9, joins=(late,))).status is Status.ERROR
+    assert "got 9 of the 12" in told(joined(9, depth=9, joins=(late,)))
 
 
 def test_a_longer_queue():
-    found = failing("qos.late_joiner", joined(12, depth=100), **LAST_10)
+    found = told(joined(12, depth=100))
     assert "it got 12 of the 12 messages before it: the publisher's depth is 100" in found
     assert "depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL" in found
 
 
 def test_a_publisher_made_anew_for_each_message():
     own = tuple(endpoint(qos=LATCHED, appeared_s=0.35 + 0.1 * n) for n in range(12))
-    found = failing("qos.late_joiner", joined(12, endpoints=(*own, reader())), **LAST_10)
+    found = told(joined(12, endpoints=(*own, reader())))
     assert "of 12 publishers, each of which keeps its own" in found
     assert "Call create_publisher once" in found
 
@@ -88,7 +94,7 @@ def test_publishers_that_were_destroyed_took_along_what_they_kept():
     own = [endpoint(qos=LATCHED, appeared_s=0.3 + PERIOD_S * n) for n in range(12)]
     gone = [replace(item, vanished_ns=item.appeared_ns + NS // 2) for item in own[:-1]]
     run = joined(1, endpoints=(*gone, own[-1], reader()))
-    found = failing("qos.late_joiner", run, **LAST_10)
+    found = told(run)
     assert "lost with it, and 11 publishers were destroyed before it joined" in found
     assert "Call create_publisher once" in found
 
@@ -96,42 +102,39 @@ def test_publishers_that_were_destroyed_took_along_what_they_kept():
 def test_a_publisher_that_was_out_of_sight_is_not_the_student_s_fault():
     seen = replace(endpoint(qos=LATCHED), vanished_ns=join(JOINED_S).joined_ns - NS)
     run = joined(7, endpoints=(seen, reader()))
-    assert judge("qos.late_joiner", run, **LAST_10).status is Status.ERROR
+    assert verdict(run).status is Status.ERROR
 
 
 def test_a_shorter_queue():
-    assert "it got 9 of the 12 messages before it: the publisher's depth is 9" in failing(
-        "qos.late_joiner", joined(9, depth=9), **LAST_10
-    )
+    found = told(joined(9, depth=9))
+    assert "it got 9 of the 12 messages before it: the publisher's depth is 9" in found
 
 
 def test_a_queue_that_nothing_declared():
-    assert "it got 3 of the 12 messages" in failing(
-        "qos.late_joiner", joined(3, declarations=()), **LAST_10
-    )
+    assert "it got 3 of the 12 messages" in told(joined(3, declarations=()))
 
 
 def test_a_history_that_was_lost_is_not_the_student_s_fault():
-    finding = judge("qos.late_joiner", joined(7, depth=10), **LAST_10)
+    finding = verdict(joined(7, depth=10))
     assert finding.status is Status.ERROR and finding.disturbed
 
 
 def test_a_lifespan_that_is_over():
     short = replace(LATCHED, lifespan_s=1.0)
-    found = failing("qos.late_joiner", joined(2, qos=short), **LAST_10)
+    found = told(joined(2, qos=short))
     assert "it got 2 of the 12 messages before it: the publisher's lifespan is 1 s" in found
     assert "Leave `lifespan` out" in found
 
 
 def test_a_lifespan_that_is_long_enough_explains_nothing():
     long = replace(LATCHED, lifespan_s=60.0)
-    assert judge("qos.late_joiner", joined(7, qos=long), **LAST_10).status is Status.ERROR
+    assert verdict(joined(7, qos=long)).status is Status.ERROR
 
 
 def test_a_volatile_publisher_is_refused_and_the_rule_is_shown():
     late = join(JOINED_S, matched_ns=None)
     run = joined(0, qos=RELIABLE, joins=(late,), joined={})
-    finding = judge("qos.late_joiner", run, **LAST_10)
+    finding = verdict(run)
     assert finding.status is Status.FAILED
     assert "durability volatile offered, transient_local requested" in finding.observed
     row = next(row for row in finding.evidence.tables[0].rows if row[0] == "durability")
@@ -150,7 +153,7 @@ def test_nothing_of_the_past():
 
 def test_too_few_were_published():
     few = messages(every(2.0, 3))
-    found = failing("qos.late_joiner", joined(0, messages=few, joined={}), **LAST_10)
+    found = told(joined(0, messages=few, joined={}))
     assert "3 messages on `/cmd_vel`" in found
 
 
@@ -162,9 +165,7 @@ def test_the_node_had_ended():
         processes=(died(1, exited_s=6.5),),
         messages=messages(every(0.4, 14)),
     )
-    assert "the run ended before it joined: the process" in failing(
-        "qos.late_joiner", run, **LAST_10
-    )
+    assert "the run ended before it joined: the process" in told(run)
 
 
 def unheard(kept, published, **changes):
@@ -179,27 +180,23 @@ def unheard(kept, published, **changes):
 
 
 def test_where_nothing_is_subscribed_before_the_messages_numbers_tell_how_many_came():
-    finding = judge("qos.late_joiner", unheard(10, 12), **LAST_10)
+    finding = verdict(unheard(10, 12))
     assert finding.status is Status.PASSED
     assert finding.observed == "it got 10 of the 12 messages before it"
-    assert "got 9 of the 12 messages" in failing(
-        "qos.late_joiner", unheard(9, 12, depth=9), **LAST_10
-    )
-    assert "got 12 of the 12 messages" in failing(
-        "qos.late_joiner", unheard(12, 12, depth=100), **LAST_10
-    )
+    assert "got 9 of the 12 messages" in told(unheard(9, 12, depth=9))
+    assert "got 12 of the 12 messages" in told(unheard(12, 12, depth=100))
 
 
 @pytest.mark.parametrize("published", [0, 1, 10])
 def test_a_publisher_that_waits_for_a_subscription_fails(published):
-    found = failing("qos.late_joiner", unheard(published, published), **LAST_10)
+    found = told(unheard(published, published))
     assert f"before it, {published} message" in found
     assert "whether or not there is a subscription" in found
 
 
 def test_a_publisher_that_the_machine_held_up_is_not_the_student_s_fault():
     run = unheard(10, 10, disturbance=taken(1.0, 3.0, waited_s=1.0))
-    finding = judge("qos.late_joiner", run, **LAST_10)
+    finding = verdict(run)
     assert finding.status is Status.ERROR and finding.disturbed
 
 
@@ -207,5 +204,5 @@ def test_where_nothing_is_subscribed_before_a_publisher_made_anew_is_named():
     own = [endpoint(qos=LATCHED, appeared_s=0.3 + PERIOD_S * n) for n in range(12)]
     gone = [replace(item, vanished_ns=item.appeared_ns + NS // 2) for item in own[:-1]]
     run = unheard(1, 1, endpoints=(*gone, own[-1], reader()))
-    found = failing("qos.late_joiner", run, **LAST_10)
+    found = told(run)
     assert "11 publishers were destroyed before it joined" in found

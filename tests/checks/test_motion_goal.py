@@ -214,7 +214,7 @@ def test_a_callback_that_sleeps_works_with_old_odometry():
     said = failing(
         "motion.proportional", drive(sleeps, seconds=40), goal=yaml(GOAL), phase="position"
     )
-    assert "one every 800 ms" in said and "time.sleep()" in said
+    assert "time.sleep()" in said
 
 
 def test_a_gain_out_of_range():

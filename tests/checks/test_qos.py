@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from grader.checks.finding import Status
-from grader.measure.compatibility import refusals
 from grader.recording.model import Kind, Qos
 from tests.checks.builder import (
     RELIABLE,
@@ -28,38 +27,6 @@ def offering(*profiles: Qos, kind: Kind = Kind.PUBLISHER):
     return recording(
         messages={}, endpoints=(*(endpoint(qos=qos, kind=kind) for qos in profiles), reader())
     )
-
-
-class TestRule:
-    """The table of the ROS docs, "QoS compatibilities"."""
-
-    @pytest.mark.parametrize("policy", ["reliability", "durability", "liveliness"])
-    @pytest.mark.parametrize("offered", [0, 1])
-    @pytest.mark.parametrize("requested", [0, 1])
-    def test_an_offer_must_not_be_weaker_than_the_request(self, policy, offered, requested):
-        words = {
-            "reliability": ("best_effort", "reliable"),
-            "durability": ("volatile", "transient_local"),
-            "liveliness": ("automatic", "manual_by_topic"),
-        }[policy]
-        found = refusals(Qos(**{policy: words[offered]}), Qos(**{policy: words[requested]}))
-        assert (not found) == (offered >= requested)
-
-    @pytest.mark.parametrize(
-        ("offered", "requested", "matches"),
-        [
-            (None, None, True),
-            (None, 1.0, False),
-            (1.0, None, True),
-            (1.0, 1.0, True),
-            (1.0, 2.0, True),
-            (2.0, 1.0, False),
-        ],
-    )
-    def test_an_offered_deadline_or_lease_must_not_be_longer(self, offered, requested, matches):
-        for name in ("deadline_s", "liveliness_lease_s"):
-            found = refusals(Qos(**{name: offered}), Qos(**{name: requested}))
-            assert (not found) == matches
 
 
 class TestOffered:

@@ -42,8 +42,11 @@ RULES = [
     (RELIABLE, {"deadline": "1 s"}, False),
     (SLOW, {"deadline": "1 s"}, True),
     (SLOW, {"deadline": "500 ms"}, False),
+    (SLOW, {}, True),
     (RELIABLE, {"liveliness": "manual_by_topic"}, False),
+    (replace(RELIABLE, liveliness="manual_by_topic"), {"liveliness": "automatic"}, True),
     (RELIABLE, {"lease": "1 s"}, False),
+    (replace(RELIABLE, liveliness_lease_s=1.0), {"lease": "2 s"}, True),
 ]
 
 

@@ -219,12 +219,12 @@ class TestQos:
         (pair,) = pairs(recording(endpoints=(offered, wanted)))
         assert pair.publisher == "/bot_publisher" and pair.subscription == "the grader"
         assert ("reliability", "best_effort", "reliable") in pair.cells
-        assert pair.refused == {"reliability"} and not pair.matches
+        assert pair.refused == {"reliability"} and not pair.types_differ
 
     def test_types_that_differ_do_not_match(self):
         ends = (endpoint(), reader(type="geometry_msgs/msg/TwistStamped"))
         (pair,) = pairs(recording(endpoints=ends))
-        assert pair.types_differ and not pair.matches
+        assert pair.types_differ and not pair.refused
 
 
 class TestBuildLog:

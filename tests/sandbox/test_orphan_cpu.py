@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from grader.sandbox.usage import CpuAccount, OrphanCpu, Process, Taken, usage_of
+from grader.sandbox.usage import OrphanCpu, Process, Taken, usage_of
 
 PARENT, CHILD, OTHER = Process(10, 1), Process(11, 2), Process(12, 3)
 # Two at a time, each for 100 ms of CPU time.
@@ -108,7 +108,7 @@ def test_nothing_is_lost_of_a_tree_in_which_all_are_waited_for(seed: int) -> Non
 
 @pytest.mark.parametrize("action", ["signal.SIG_DFL", "signal.SIG_IGN"])
 def test_the_time_of_children_counts_whether_they_are_waited_for_or_not(action: str) -> None:
-    account = CpuAccount()
+    account = OrphanCpu()
     script = RELAY.format(action=action)
     command = [sys.executable, "-S", "-c", script]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:

@@ -88,18 +88,6 @@ def test_any_text_is_read_or_refused_in_words(text: str) -> None:
         assert str(error).startswith("assignment.yaml")
 
 
-@given(st.binary(max_size=200))
-def test_any_file_is_read_or_refused_in_words(
-    tmp_path_factory: pytest.TempPathFactory, raw: bytes
-) -> None:
-    file = tmp_path_factory.mktemp("any") / "assignment.yaml"
-    file.write_bytes(raw)
-    try:
-        read_source(file)
-    except AssignmentError as error:
-        assert str(error).startswith(str(file))
-
-
 def test_each_value_knows_its_line() -> None:
     source = parse_source("a: 1\nb:\n  - x\n  - c:\n      d: 2\n", FILE)
     assert source.line(("a",)) == 1

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import Field
 
 from grader.assignment.model import Assignment, Until
 from grader.errors import AssignmentError
@@ -160,12 +159,7 @@ def test_a_list_is_not_called_short_because_its_entries_have_mistakes() -> None:
     ]
 
 
-class _Circle(Model):
-    radius: int
-
-
 class _Scene(Model):
-    named: dict[str, _Circle] = Field(default_factory=dict)
     wait: int | Duration = 0
     flag: bool = False
 
@@ -174,12 +168,6 @@ def test_the_alternatives_of_a_union_are_one_mistake() -> None:
     assert mistakes("wait: soon", _Scene) == [
         "assignment.yaml:1: wait: expected a whole number, not 'soon'; or 'soon' is not a time: "
         "write a number and a unit (s, ms, us, ns, min)"
-    ]
-
-
-def test_a_key_that_is_called_like_a_field_is_still_a_key() -> None:
-    assert mistakes("named:\n  radius:\n    radius: x", _Scene) == [
-        "assignment.yaml:3: named.radius.radius: expected a whole number, not 'x'"
     ]
 
 

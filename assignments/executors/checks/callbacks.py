@@ -31,10 +31,14 @@ from .missing_reports import SECONDS_HINT, Reported, why_reports_are_missing
 _PAUSE_S = 0.1
 # Between the end of the work that a timer waited for and its start, besides what the machine took.
 _NEXT_S = 0.05
-# A declared period is the one that was seen.
-_SAME = 0.03
 _GAINED = 0.25
 """Share of its period by which a timer may seem to have gained."""
+_PERIOD_HINT = (
+    f"{SECONDS_HINT} A callback that is given to two timers runs twice as often. While a callback "
+    "works, no other callback of its executor or group begins: several that work longer than a "
+    "period together are late."
+)
+
 
 
 class Runs(Reported):
@@ -146,7 +150,9 @@ def _judge_period(
             return Finding.to_repeat(
                 expected, f"{observed}, unless it was the machine that held it up"
             )
-        return Finding.failed(expected, observed, _period_hint(recording, 0.0, period_s), evidence)
+        return Finding.failed(
+            expected, observed, _made_twice(recording) or _PERIOD_HINT, evidence
+        )
     if good and len(reports.ended([callback])) >= parameters.at_least:
         return _by_chance(recording, parameters, reports, callback, limits)
     if seconds and not good:
@@ -157,7 +163,7 @@ def _judge_period(
                 expected, f"{observed}, but the machine took the time from the process"
             )
         return Finding.failed(
-            expected, observed, _period_hint(recording, middle_s, period_s), evidence
+            expected, observed, _made_twice(recording) or _PERIOD_HINT, evidence
         )
     cause = why_reports_are_missing(
         recording, parameters.topic, parameters.callbacks, reports, parameters.at_least
@@ -253,25 +259,6 @@ def _worked(recording: Recording, reports: Reports, from_ns: int, to_ns: int) ->
             break
         free_ns = max(free_ns, item.end_ns or recording.stop_ns)
     return to_ns - free_ns <= _PAUSE_S * NS
-
-
-def _period_hint(recording: Recording, found_s: float, wanted_s: float) -> str:
-    twice = _made_twice(recording)
-    if twice:
-        return twice
-    declared_s = {timer.period_s for timer in declarations.timers(recording)}
-    if any(math.isclose(item, found_s, rel_tol=_SAME) for item in declared_s):
-        given = next(item for item in declared_s if math.isclose(item, found_s, rel_tol=_SAME))
-        return (
-            f"The process declared a timer of {format_duration(given)}. create_timer takes its "
-            f"period in seconds: {format_duration(wanted_s)} is {wanted_s:g}."
-        )
-    if found_s < 0.75 * wanted_s:
-        return f"{SECONDS_HINT} A callback that is given to two timers runs twice as often."
-    return (
-        f"{SECONDS_HINT} While a callback works, no other callback of its executor or group "
-        "begins: several that work longer than a period together are late."
-    )
 
 
 def _made_twice(recording: Recording) -> str:
@@ -384,19 +371,9 @@ def work(recording: Recording, parameters: Work) -> Finding:
         return Finding.failed(
             expected,
             f"{told[-1]} (median of {counted(len(seconds), 'run')})",
-            _work_hint(middle_s, parameters.duration),
+            f"Report the start, then work with time.sleep({parameters.duration:g}), then report "
+            f"the end. {SECONDS_HINT} If it takes longer, something else waits between the two "
+            "reports, such as for a lock.",
             Evidence(spans=spans(recording, reports, found)),
         )
     return Finding.passed(expected, listing(told), Evidence(spans=spans(recording, reports)))
-
-
-def _work_hint(found_s: float, wanted_s: float) -> str:
-    if found_s < 0.01 * wanted_s:
-        return (
-            "Report the start, then work with time.sleep, then report the end. A start and an end "
-            "that are published one right after the other show no work."
-        )
-    hint = f"Work with time.sleep({wanted_s:g}) between the two reports. {SECONDS_HINT}"
-    if 1.5 * wanted_s < found_s < 10.0 * wanted_s:
-        hint += " If you do: something else waits between them, such as for a lock."
-    return hint

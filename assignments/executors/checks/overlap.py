@@ -96,15 +96,11 @@ def _exclusion_hint(recording: Recording, names: Sequence[str], overlap: Overlap
             "thread that a callback starts, a second executor or a second process. Work in the "
             "callback itself, from its first report to its last."
         )
-    if overlap.one.callback == overlap.other.callback:
-        return (
-            "Give the subscription a MutuallyExclusiveCallbackGroup: "
-            "self.create_subscription(..., callback_group=self.group). In a "
-            "ReentrantCallbackGroup a callback may run again while it still runs."
-        )
     return (
         "A SingleThreadedExecutor, which rclpy.spin(node) uses too, runs one callback at a time; "
-        "with a MultiThreadedExecutor only those of one MutuallyExclusiveCallbackGroup do."
+        "with a MultiThreadedExecutor only those of one MutuallyExclusiveCallbackGroup do: "
+        "self.create_subscription(..., callback_group=self.group). In a ReentrantCallbackGroup a "
+        "callback may run again while it still runs."
     )
 
 
@@ -152,8 +148,8 @@ def overlap(recording: Recording, parameters: Overlapping) -> Finding:
         f"{format_duration(parameters.by)}"
     )
     reports = read_reports(recording.on(parameters.topic))
-    everybody = (*parameters.callbacks, *parameters.others)
-    cause = why_reports_are_missing(recording, parameters.topic, everybody, reports)
+    names = (*parameters.callbacks, *parameters.others)
+    cause = why_reports_are_missing(recording, parameters.topic, names, reports)
     if cause is not None:
         return cause.finding(expected)
     told = []

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
-from statistics import median
 from typing import Literal
 
 from pydantic import Field
@@ -15,10 +13,9 @@ from grader.checks.finding import Evidence, Finding, Moment, Plot
 from grader.measure.motion.steering import MOST_BEHIND, Sample, answers
 from grader.measure.motion.approach import Approach
 from grader.diagnosis.motion.no_motion import approach
-from grader.measure.motion.command import command_topic, commands
+from grader.measure.motion.command import command_topic
 from grader.measure.motion.quantities import metres
-from grader.checks.motion.robot_check import RobotParameters
-from grader.checks.reference import GoalPose
+from grader.checks.motion.robot_check import GoalParameters
 from grader.checks.wording import counted, percent
 from grader.diagnosis.cause import Cause
 from grader.diagnosis.motion.misread_yaw import misread_yaw
@@ -26,24 +23,19 @@ from grader.diagnosis.motion.missed_goal import why_not_there
 from grader.diagnosis.motion.no_motion import why_cut_short
 from grader.diagnosis.motion.off_course import why_off_course
 from grader.diagnosis.no_messages import why_silent
-from grader.recording.model import NS, Recording
+from grader.recording.model import Recording
 from grader.spec.quantity import Frequency, PositiveLength, Ratio
-from grader.spec.unit import format_duration
 
 from .control_law import LEAST_SAMPLES, Law, LawVerdict, at_the_goal, examine, on_the_way
 
-_GOAL = "Goal pose `[x, y, theta]` in the world's frame: metres and an angle, or random values."
 _MOST_POINTS = 400
-# Odometry comes 30 times in a second, and a timer of 10 Hz is right.
-_RARE_S = 0.2
 _WHAT = {"position": "the direction of the goal", "align": "the goal's heading"}
 _FORMULA = {"position": "atan2(dy, dx) - yaw", "align": "goal_theta - yaw"}
 
 
-class Proportional(RobotParameters):
+class Proportional(GoalParameters):
     """Parameters of motion.proportional."""
 
-    goal: GoalPose = Field(description=_GOAL)
     phase: Literal["position", "align"] = Field(
         description="`position`: on the way, against the direction of the goal. `align`: at the "
         "goal, against its heading."
@@ -110,13 +102,6 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
             evidence,
         )
     observed, hint = _words(verdict, parameters, len(samples))
-    apart_s = _apart_s(recording)
-    if verdict.law is Law.PROPORTIONAL and apart_s > _RARE_S:
-        observed += f", one every {format_duration(apart_s)}"
-        hint += (
-            " Publish one with every odometry, or from a timer of 10 Hz or more: a time.sleep() in "
-            "a callback lets odometry grow old."
-        )
     misread = misread_yaw(run, parameters.position)
     if misread is not None:
         return Finding.failed(
@@ -125,19 +110,11 @@ def proportional(recording: Recording, parameters: Proportional) -> Finding:
     return Finding.failed(expected, observed, hint, evidence)
 
 
-def _apart_s(recording: Recording) -> float:
-    """Median time between two commands; 0 without two."""
-    times_ns = [item.time_ns for item in commands(recording)]
-    return median((b - a) / NS for a, b in pairwise(times_ns)) if len(times_ns) > 1 else 0.0
-
-
 def _range_words(parameters: Proportional) -> str:
     low, high = parameters.gain_min, parameters.gain_max
-    if low is not None and high is not None:
-        return f", gain {low:.3g} to {high:.3g} 1/s"
-    if low is not None:
-        return f", gain at least {low:.3g} 1/s"
-    return f", gain at most {high:.3g} 1/s" if high is not None else ""
+    limits = [f"at least {low:.3g} 1/s"] if low is not None else []
+    limits += [f"at most {high:.3g} 1/s"] if high is not None else []
+    return f", gain {' and '.join(limits)}" if limits else ""
 
 
 def _is_good(verdict: LawVerdict, parameters: Proportional) -> bool:
@@ -170,11 +147,10 @@ def _words(verdict: LawVerdict, parameters: Proportional, number: int) -> tuple[
     formula = f"angular.z = gain * error, with the error {_FORMULA[parameters.phase]}"
     wrap = "normalised by atan2(sin(e), cos(e))"
     if verdict.law is Law.TOO_FEW:
+        near = f", more than {metres(parameters.position)} from the goal"
         return (
-            f"only {counted(number, 'command')} in this phase to judge, at more than "
-            f"{metres(parameters.position)} from the goal"
-            if parameters.phase == "position"
-            else f"only {counted(number, 'command')} in this phase to judge",
+            f"only {counted(number, 'command')} in this phase to judge"
+            f"{near if parameters.phase == 'position' else ''}",
             f"Publish {formula}, in every callback.",
         )
     if verdict.law is Law.ZERO:
@@ -204,7 +180,8 @@ def _words(verdict: LawVerdict, parameters: Proportional, number: int) -> tuple[
     return (
         f"the commands do not follow the error: gain {verdict.gain:.3g} 1/s, R² {verdict.r2:.2f}, "
         f"{counted(verdict.used, 'command')}",
-        f"Publish {formula}, {wrap}, from the newest odometry.",
+        f"Publish {formula}, {wrap}, from the newest odometry, at 10 Hz or more: a time.sleep() in "
+        "a callback lets odometry grow old.",
     )
 
 

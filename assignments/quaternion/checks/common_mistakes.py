@@ -174,10 +174,6 @@ def _angle_without_sign(rows: Rows) -> Rows:
     return _right_quaternion(np.column_stack((rows[:, :3], np.abs(rows[:, 3]))))
 
 
-def _length(rows: Rows) -> Rows:
-    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
-
-
 def _w_first(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
     """w, x, y, z in the fields x, y, z, w."""
     return lambda rows: formula(rows)[:, [3, 0, 1, 2]]
@@ -185,10 +181,6 @@ def _w_first(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
 
 def _conjugate(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
     return lambda rows: formula(rows) * _CONJUGATE
-
-
-def _sine_halved(rows: Rows) -> Rows:
-    return np.column_stack((_axis(rows) * 0.5 * np.sin(rows[:, 3:4]), np.cos(_half(rows))))
 
 
 def _w_without_sign(formula: Callable[[Rows], Rows]) -> Callable[[Rows], Rows]:
@@ -211,16 +203,6 @@ _AXIS_ANGLE = (
         lambda rows: _turn(rows[:, :3], _half(rows), _half(rows)),
     ),
     Mistake(
-        "the axis is not normalized before, only the quaternion afterwards",
-        _AXIS_HINT,
-        lambda rows: _length(_turn(rows[:, :3], _half(rows), _half(rows))),
-    ),
-    Mistake(
-        "the axis is not normalized and the angle is not halved",
-        f"{_AXIS_HINT} {_HALF_HINT}",
-        lambda rows: _turn(rows[:, :3], rows[:, 3], rows[:, 3]),
-    ),
-    Mistake(
         "the angle is halved in the cosine only",
         _HALF_HINT,
         lambda rows: _turn(_axis(rows), rows[:, 3], _half(rows)),
@@ -230,10 +212,6 @@ _AXIS_ANGLE = (
         _HALF_HINT,
         lambda rows: _turn(_axis(rows), _half(rows), rows[:, 3]),
     ),
-    Mistake("the angle is halved twice", _HALF_HINT, _angle_scaled(0.5)),
-    Mistake(
-         "the sine is halved, not the angle: sin(angle) / 2 instead of sin(angle / 2)", _HALF_HINT,
-         _sine_halved),
     Mistake("w has lost its sign", _SIGN_HINT, _w_without_sign(_right_quaternion)),
     Mistake("w stands first: the fields x, y, z, w hold w, x, y, z", _ORDER_HINT,
          _w_first(_right_quaternion)),
@@ -279,8 +257,6 @@ _SWAPPED = (
     ("roll and yaw are swapped", [2, 1, 0]),
     ("roll and pitch are swapped", [1, 0, 2]),
     ("pitch and yaw are swapped", [0, 2, 1]),
-    ("the angles are in a wrong order: pitch, yaw, roll", [1, 2, 0]),
-    ("the angles are in a wrong order: yaw, roll, pitch", [2, 0, 1]),
 )
 _SWAP_HINT = "Roll turns about x, pitch about y, yaw about z, and the fields are x, y and z."
 
@@ -292,7 +268,6 @@ _RPY = (
         _rpy_times,
         (
             ("not halved", 2.0, _HALF_ANGLES_HINT),
-            ("halved twice", 0.5, _HALF_ANGLES_HINT),
             ("converted as if in degrees", np.pi / 180.0, _RADIANS_HINT),
             ("converted to degrees", 180.0 / np.pi, _RADIANS_HINT),
         ),

@@ -16,7 +16,7 @@ from .conversion import (
     CONVERSIONS,
     Group,
     answer_words,
-    degrees,
+    number,
     sine_of_pitch,
 )
 
@@ -50,6 +50,11 @@ def right_words(conversion: str, case: Case) -> str:
     return answer_words([sign * value for value in case.right])
 
 
+def _error_deg(case: Case) -> float | None:
+    error_rad = case.answers[0].error_rad if case.answers else math.inf
+    return math.degrees(error_rad) if math.isfinite(error_rad) else None
+
+
 def evidence_of(
     recording: Recording, conversion: str, topic: str, tolerance_rad: float, judged: list[Case]
 ) -> Evidence:
@@ -62,9 +67,7 @@ def evidence_of(
             question(case.row),
             right_words(conversion, case),
             shown(case.answers[0]) if case.answers else "no answer",
-            degrees(case.answers[0].error_rad)
-            if case.answers and math.isfinite(case.answers[0].error_rad)
-            else "",
+            "" if (error_deg := _error_deg(case)) is None else f"{number(error_deg)} deg",
         )
         for case in wrong[:_ROWS]
     )
@@ -85,9 +88,7 @@ def evidence_of(
                     CaseError(
                         question(case.row),
                         case.group.words,
-                        math.degrees(case.answers[0].error_rad)
-                        if case.answers and math.isfinite(case.answers[0].error_rad)
-                        else None,
+                        _error_deg(case),
                     )
                     for case in judged
                 ),

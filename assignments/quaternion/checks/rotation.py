@@ -35,7 +35,6 @@ from .conversion import (
     Group,
     WrongMessage,
     degrees,
-    sine_of_pitch,
 )
 from .evidence import evidence_of, right_words, shown
 
@@ -55,6 +54,9 @@ _LITTLE_RAD = 1e-3
 _GREETINGS = 2
 # Nor does one that says everything twice; one that does not stop answers the last far more often.
 _MORE_COPIES = 2
+_UNPROMPTED_HINT = (
+    "Publish in the callback of the subscription, once for each message, and not in a timer."
+)
 
 Tolerance = Annotated[float, QuantityOf(Dimension.ANGLE, minimum=0.0, exclusive=True)]
 
@@ -147,7 +149,14 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
     if elsewhere is not None:
         return elsewhere.finding(expected)
     if _is_behind(found):
-        return _behind(parameters, found, evidence)
+        return Finding.failed(
+            expected,
+            "each answer belongs to the message before: that to case 1 came after case 2 had been "
+            f"sent, and so on; case {len(found)}, the last, has none",
+            "Compute from the message that the callback is called with, then publish. What an "
+            "earlier call stored is one message old.",
+            evidence,
+        )
     if wrong:
         return _wrong(parameters, judged, wrong, evidence)
     if missing:
@@ -159,7 +168,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
             f"{counted(unasked, 'message')} on {code(parameters.topic)} before anything was asked "
             f"on {code(parameters.stimulus)}"
         )
-        return _unprompted(parameters, observed, evidence)
+        return Finding.failed(expected, observed, _UNPROMPTED_HINT, evidence)
     copies = max((len(case.answers) for case in judged[:-1]), default=1)
     if judged and (times := len(judged[-1].answers)) > max(copies, 1) + _MORE_COPIES:
         when_s = recording.since_launch_s(received[-1].stamp_ns)
@@ -168,7 +177,7 @@ def answers(recording: Recording, parameters: Answers) -> Finding:
             f"case {judged[-1].number} was answered {counted(times, 'time')}: the same answer "
             f"comes on {code(parameters.topic)} again and again when nothing new is asked"
         )
-        return _unprompted(parameters, observed, evidence)
+        return Finding.failed(expected, observed, _UNPROMPTED_HINT, evidence)
     if len(judged) < parameters.at_least:
         return _too_few(recording, parameters, found, judged).finding(expected)
     return Finding.passed(expected, _summary(judged), evidence)
@@ -224,17 +233,6 @@ def _is_behind(found: tuple[Case, ...]) -> bool:
         len(answered) == len(found) - 1 > 1
         and not found[-1].answers
         and prompt >= _STALE * len(answered)
-    )
-
-
-def _behind(parameters: Answers, found: tuple[Case, ...], evidence: Evidence) -> Finding:
-    return Finding.failed(
-        parameters.words,
-        f"each answer belongs to the message before: that to case 1 came after case 2 had been "
-        f"sent, and so on; case {len(found)}, the last, has none",
-        "Compute from the message that the callback is called with, then publish. What an "
-        "earlier call stored is one message old.",
-        evidence,
     )
 
 
@@ -351,16 +349,6 @@ def _by_kind(parameters: Answers, wrong: list[Case]) -> tuple[str, str]:
     return "", "Work the first wrong case out by hand and compare term by term."
 
 
-def _unprompted(parameters: Answers, observed: str, evidence: Evidence) -> Finding:
-    """What is said about a node that publishes when nothing is asked."""
-    return Finding.failed(
-        parameters.words,
-        observed,
-        "Publish in the callback of the subscription, once for each message, and not in a timer.",
-        evidence,
-    )
-
-
 def _missing(
     recording: Recording,
     parameters: Answers,
@@ -406,7 +394,8 @@ def _too_few(
     if cause is not None:
         return cause
     if any(case.behind_s is not None for case in found) or _is_slow(recording, found):
-        sent = Moment(f"case {found[0].number} is sent", recording.since_launch_s(found[0].asked_ns))
+        first = found[0]
+        sent = Moment(f"case {first.number} is sent", recording.since_launch_s(first.asked_ns))
         return Cause(
             f"{seen}, because the answers come late",
             "A callback must return soon: no time.sleep() and no loop that waits.",

@@ -292,7 +292,7 @@ def _evidence(recording: Recording, groups: list[_Answers]) -> Evidence:
     )
     return Evidence(
         moments=tuple(
-            Moment("call not answered in time", recording.since_launch_s(call.requested_ns))
+            Moment("call that waited too long", recording.since_launch_s(call.requested_ns))
             for call in late[:_MOST_MOMENTS]
         ),
         plots=(plot,) if answered else (),

@@ -26,7 +26,7 @@ _ANSWER_S = 1.0
 class State(Parameters):
     """Parameters of lifecycle.state."""
 
-    needs = (Called("node", suffix="/get_state", count="states"),)
+    needs = (Called("node", suffix="/get_state"),)
     doubt = Doubt.ANSWER_MISSED
 
     node: QualifiedNodeName = Field(

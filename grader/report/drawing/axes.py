@@ -57,13 +57,7 @@ def ticks(low: float, high: float, count: int) -> list[tuple[float, str]]:
 def value_axis(
     y: Scale, left: float, end: float, marks: Sequence[tuple[float, str]] = ()
 ) -> list[Markup]:
-    """Draw a grid line for each value, with its label to the left.
-
-    Args:
-        left: First pixel of the lines.
-        end: Last pixel of the lines.
-        marks: Values and labels; by default round ones.
-    """
+    """Draw a line from ``left`` to ``end`` for each value, by default for round ones."""
     drawn = []
     for value, text in marks or ticks(y.low, y.high, 4):
         drawn.append(line(left, y(value), end, y(value), "grid"))
@@ -72,12 +66,7 @@ def value_axis(
 
 
 def time_axis(scale: Scale, y: float, width: float) -> list[Markup]:
-    """Draw seconds since launch along the bottom.
-
-    Args:
-        scale: Seconds to pixels.
-        y: Pixel of the line.
-    """
+    """Draw seconds since launch along a line at ``y``."""
     drawn = [line(scale.begin, y, scale.end, y, "axis")]
     for value, text in ticks(scale.low, scale.high, 10 if width > NARROW else 5):
         x = scale(value)

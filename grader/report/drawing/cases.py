@@ -28,7 +28,10 @@ def draw_cases(cases: Cases, name: str) -> svg.Figure:
     high = math.ceil(max([*errors, limit]) + 1e-9)
     y = Scale(low, high + (low == high), HEIGHT - BOTTOM, TOP)
     every = max(1, math.ceil((y.high - y.low) / 6))
-    powers = [(power, _power(power)) for power in range(low, int(y.high) + 1, every)]
+    powers = [
+        (power, f"{10.0**power:g}".replace("e-0", "e-").replace("e+0", "e+"))
+        for power in range(low, int(y.high) + 1, every)
+    ]
     of_limit = f"{cases.limit:g}{unit_of(cases.label)}"
 
     def draw(width: float) -> tuple[float, list[Markup]]:
@@ -87,10 +90,6 @@ def _is_wrong(case: Case, limit: float) -> bool:
 
 def _power_of(error: float) -> float:
     return math.log10(CEILING if math.isnan(error) else min(max(abs(error), FLOOR), CEILING))
-
-
-def _power(power: int) -> str:
-    return f"{10.0**power:g}".replace("e-0", "e-").replace("e+0", "e+")
 
 
 def _caption(cases: Cases, limit: str) -> str:

@@ -71,8 +71,6 @@ def draw_flags(flags: Sequence[Flag], scale: Scale, below: float) -> tuple[list[
     """Draw flags with leaders that go on through what is drawn below.
 
     Args:
-        flags: By time.
-        scale: Seconds to pixels.
         below: Height of what is drawn below, in pixels.
 
     Returns:

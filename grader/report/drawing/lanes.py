@@ -37,12 +37,7 @@ class Lane:
 
 
 def draw_lanes(lanes: Sequence[Lane], scale: Scale, top: float, width: float) -> list[Markup]:
-    """Draw rows, each :data:`LANE` pixels high.
-
-    Args:
-        scale: Seconds to pixels.
-        top: First pixel.
-    """
+    """Draw rows from ``top`` on, each :data:`LANE` pixels high."""
     drawn = []
     room = width - 2 * SIDE
     for index, lane in enumerate(lanes):

@@ -23,13 +23,7 @@ HANDOUT_FILE = "README.md"
 
 @dataclass(frozen=True)
 class Handout:
-    """What a student is given.
-
-    Attributes:
-        text: The handout in Markdown; empty where the author wrote none.
-        checks: Those that a student gets to see.
-        total: What there is to be earned, in words.
-    """
+    """What a student is given: Markdown, visible checks, and what there is to be earned in words."""
 
     id: str
     title: str

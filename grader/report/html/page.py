@@ -20,7 +20,7 @@ from grader import resources
 from grader.checks.finding import Status
 from grader.checks.wording import counted
 from grader.report.text import explanation, words
-from grader.safe_text import clean
+from grader.safe_text import clean, one_line
 
 if TYPE_CHECKING:
     from jinja2 import Environment, FileSystemBytecodeCache
@@ -80,6 +80,7 @@ def environment() -> Environment:
     )
     environment.filters["prose"] = prose
     environment.filters["number"] = words.number
+    environment.filters["one_line"] = one_line
     environment.globals.update(Status=Status, counted=counted, explanation=explanation, words=words)
     return environment
 

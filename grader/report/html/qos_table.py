@@ -26,11 +26,6 @@ class Pair:
     refused: frozenset[str]
     types_differ: bool
 
-    @property
-    def matches(self) -> bool:
-        """Whether messages can pass."""
-        return not self.refused and not self.types_differ
-
 
 def pairs(recording: Recording) -> tuple[Pair, ...]:
     """Every publisher and subscription that could meet, each different pair once."""

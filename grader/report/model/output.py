@@ -21,11 +21,6 @@ class Output:
     left_out: int
     dropped_bytes: int
 
-    @property
-    def count(self) -> int:
-        """Number of lines in all."""
-        return len(self.head) + self.left_out + len(self.tail)
-
 
 def printed(recording: Recording) -> tuple[LogLine, ...]:
     """Lines that the processes wrote; /rosout only where there are none.

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from grader.recording.event import Disturbance
 from grader.recording.model import NS
-from grader.sandbox.usage import OrphanCpu, Process, Taken
+from grader.sandbox.usage import OrphanCpu, Process, Taken, usage_at
 
 _STAT = Path("/proc/stat")
 _TICK_NS = NS // os.sysconf("SC_CLK_TCK")
@@ -102,14 +102,16 @@ class CpuMeter:
 
     def read(self, pids: Iterable[int]) -> CpuTimes:
         """Read them now."""
-        found = [_process(pid) for pid in pids]
-        there = {process: taken for process, taken, _ in filter(None, found)}
+        own = {pid: _own_ns(pid) for pid in pids}
+        found = [usage_at(pid) for pid, own_ns in own.items() if own_ns is not None]
+        there = {Process(one.pid, one.started): one.taken for one in found if one is not None}
+        complete = len(there) == len(own)
         waited = os.times()
         waited_s = waited.children_user + waited.children_system
         there[Process(os.getpid(), 0)] = Taken(0, round(waited_s * NS / _TICK_NS))
-        self._orphan_cpu.look(there, complete=None not in found)
+        self._orphan_cpu.look(there, complete=complete)
         ticks = sum(taken.waited for taken in there.values()) + self._orphan_cpu.ticks
-        student_ns = ticks * _TICK_NS + sum(own_ns for *_, own_ns in filter(None, found))
+        student_ns = ticks * _TICK_NS + sum(filter(None, own.values()))
         times = (time.monotonic_ns(), student_ns, self._idle_ns(), time.process_time_ns())
         return CpuTimes(*times, self._orphan_cpu.ended)
 
@@ -129,17 +131,10 @@ def idle_ticks(stat: str, cpus: Iterable[int]) -> int:
     return sum(int(row[4]) + int(row[5]) for row in rows if row and row[0] in wanted)
 
 
-def _process(pid: int) -> tuple[Process, Taken, int] | None:
+def _own_ns(pid: int) -> int | None:
     try:
-        own_ns = time.clock_gettime_ns(~pid << 3 | _PROCESS_CLOCK)
-        with open(f"/proc/{pid}/stat", "rb") as file:  # noqa: PTH123  often
-            # The command's name may contain anything, but the last ")" ends it.
-            fields = file.read().rpartition(b")")[2].split()
-        # The numbers of the fields are those of proc(5), less three.
-        user, system, waited_user, waited_system = map(int, fields[11:15])
-        taken = Taken(user + system, waited_user + waited_system)
-        return Process(pid, int(fields[19])), taken, own_ns
-    except (OSError, IndexError, ValueError):
+        return time.clock_gettime_ns(~pid << 3 | _PROCESS_CLOCK)
+    except OSError:
         return None
 
 

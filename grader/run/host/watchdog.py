@@ -18,7 +18,7 @@ from grader.run.process.descendants import send
 from grader.sandbox.limits import MIB, SandboxLimits, size_words
 from grader.sandbox.namespaces import STUDENT
 from grader.sandbox.usage import (
-    CpuAccount,
+    OrphanCpu,
     files_in_flight,
     hidden_bytes,
     memory_bytes,
@@ -60,7 +60,7 @@ class Watchdog:
         self._breaches: dict[str, Breach] = {}
         self._looks = 0
         self._hidden_bytes = 0
-        self._cpu = CpuAccount()
+        self._cpu = OrphanCpu()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="watchdog", daemon=True)
 

@@ -49,11 +49,6 @@ _BROKEN = (
     OverflowError,
     NotImplementedError,
 )
-_FOREIGN = {
-    b"Rar!": "a RAR archive",
-    b"7z\xbc\xaf": "a 7z archive",
-    b"\x28\xb5\x2f\xfd": "a Zstandard archive",
-}
 
 
 def unpack(archive: Path, into: Path, limits: ArchiveLimits | None = None) -> None:
@@ -125,9 +120,6 @@ def _plain_tar(
     elif start[257:262] == b"ustar" or name.lower().endswith(".tar"):
         return file
     else:
-        for mark, what in _FOREIGN.items():
-            if start.startswith(mark):
-                raise Refused(f"is {what}; hand in a .zip or .tar.gz")
         if not start:
             raise Refused("is empty: it holds 0 bytes")
         raise Refused("is neither a folder nor a .zip or .tar.gz archive")

@@ -10,7 +10,7 @@ import errno
 import os
 import stat
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import GraderFault, SubmissionError, machine_fault
@@ -38,22 +38,10 @@ class SubmissionFile:
     link: str | None = None
 
 
-@dataclass
-class Listing:
-    """What was found in a folder."""
-
-    files: list[SubmissionFile] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
-
-    def inside(self, folder: str) -> Listing:
-        """The same seen from a folder that holds all files; ``.`` is the whole submission."""
-        if folder == ".":
-            return self
-        start = len(folder) + 1
-        return Listing(
-            [replace(file, path=file.path[start:]) for file in self.files],
-            sorted(path[start:] if is_within(path, folder) else path for path in self.skipped),
-        )
+def inside(files: Iterable[SubmissionFile], folder: str) -> list[SubmissionFile]:
+    """The files of a folder as seen from it; ``.`` is the whole submission."""
+    start = 0 if folder == "." else len(folder) + 1
+    return [replace(file, path=file.path[start:]) for file in files if is_within(file.path, folder)]
 
 
 class ChangedMeanwhile(GraderFault):
@@ -75,7 +63,7 @@ def unreadable(path: str, error: OSError) -> SubmissionError | GraderFault:
     return machine_fault(error, Path(path)) or cannot_be_read
 
 
-def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
+def list_files(root: Path, limits: ArchiveLimits | None = None) -> list[SubmissionFile]:
     """List a folder, the same way on every machine.
 
     Raises:
@@ -83,41 +71,39 @@ def list_files(root: Path, limits: ArchiveLimits | None = None) -> Listing:
             link that leads out of the folder.
     """
     limits = limits or ArchiveLimits()
-    listing = Listing()
+    files: list[SubmissionFile] = []
     links: dict[str, str] = {}
     total = 0
     try:
-        for path, entry in _walk(root, ".", False, listing.skipped, limits.depth):
+        for path, entry in _walk(root, ".", False, limits.depth):
             if entry.is_symlink():
                 links[path] = _target(root, path)
             elif entry.is_file(follow_symlinks=False):
                 status = entry.stat(follow_symlinks=False)
                 total += status.st_size
                 executable = bool(status.st_mode & stat.S_IXUSR)
-                listing.files.append(SubmissionFile(path, status.st_size, executable))
-            if len(listing.files) + len(links) > limits.members:
+                files.append(SubmissionFile(path, status.st_size, executable))
+            if len(files) + len(links) > limits.members:
                 raise SubmissionError(f"the submission holds more than {limits.members} files")
             if total > limits.total_bytes:
-                largest = max(listing.files, key=lambda file: file.size)
+                largest = max(files, key=lambda file: file.size)
                 raise SubmissionError(
                     f"the submission holds more than {limits.total_bytes // MIB} MiB (largest file "
                     f"so far: {shown(largest.path)}, {largest.size / MIB:.1f} MiB)"
                 )
     except OSError as error:
         raise unreadable(str(error.filename), error) from error
-    files = [file.path for file in listing.files]
+    paths = [path for file in files for path in (file.path, *parents(file.path))]
     try:
-        kept = links_inside(links, {*files, *(f for path in files for f in parents(path))}, links)
+        kept = links_inside(links, set(paths), links)
     except LeadsOut as error:
         raise _leads_out(str(error)) from None
-    listing.files += [SubmissionFile(path, 0, link=links[path]) for path in kept]
-    listing.files.sort(key=lambda file: os.fsencode(file.path))
-    listing.skipped.sort()
-    return listing
+    files += [SubmissionFile(path, 0, link=links[path]) for path in kept]
+    return sorted(files, key=lambda file: os.fsencode(file.path))
 
 
 def _walk(
-    root: Path, folder: str, in_package: bool, skipped: list[str], depth: int
+    root: Path, folder: str, in_package: bool, depth: int
 ) -> Iterator[tuple[str, os.DirEntry[str]]]:
     with os.scandir(root / folder) as found:
         entries = sorted(found, key=lambda entry: entry.name)
@@ -132,10 +118,8 @@ def _walk(
                 yield path, entry
             continue
         marks = {mark for mark in MARKS if (root / path / mark).exists()}
-        if is_leftover(entry.name, marks, in_package):
-            skipped.append(path)
-        else:
-            yield from _walk(root, path, in_package, skipped, depth - 1)
+        if not is_leftover(entry.name, marks, in_package):
+            yield from _walk(root, path, in_package, depth - 1)
 
 
 def _target(root: Path, path: str) -> str:

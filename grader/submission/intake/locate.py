@@ -21,14 +21,14 @@ from grader.scratch import Scratch
 from grader.submission.intake import archive
 from grader.submission.intake.listing import (
     ChangedMeanwhile,
-    Listing,
     SubmissionFile,
     find_packages,
+    inside,
     list_files,
     unreadable,
     wrapper_of,
 )
-from grader.submission.intake.paths import is_within, shown
+from grader.submission.intake.paths import shown
 
 NO_FILES = hashlib.sha256().hexdigest()
 """The hash of a submission that is empty."""
@@ -46,7 +46,6 @@ class Located:
         sha256: Hash over the files' paths, contents and executable bits, as hex.
         root: The private copy; holds exactly ``files``, which are sorted by path.
         packages: Folders with a ``package.xml``, sorted; ``.`` for the submission itself.
-        skipped: Folders that were left out, such as ``build`` and ``install``.
     """
 
     id: str
@@ -54,7 +53,6 @@ class Located:
     root: Path
     files: tuple[SubmissionFile, ...]
     packages: tuple[str, ...]
-    skipped: tuple[str, ...] = ()
 
 
 @contextmanager
@@ -74,14 +72,13 @@ def opened(path: Path | str) -> Iterator[Located]:
             listed.mkdir()
             archive.unpack(source, listed)
         root = scratch / "submission"
-        listing, sha256 = _snapshot(listed, root)
+        files, sha256 = _snapshot(listed, root)
         yield Located(
             id=submission_id(source),
             sha256=sha256,
             root=root,
-            files=tuple(listing.files),
-            packages=tuple(find_packages(file.path for file in listing.files)),
-            skipped=tuple(listing.skipped),
+            files=tuple(files),
+            packages=tuple(find_packages(file.path for file in files)),
         )
 
 
@@ -92,13 +89,12 @@ def only(located: Located, folder: str, name: str) -> Iterator[Located]:
     Raises:
         GraderFault: This machine cannot hold the copy.
     """
-    files = [file for file in located.files if is_within(file.path, folder)]
-    inside = Listing(files).inside(folder).files
+    files = inside(located.files, folder)
     with tempfile.TemporaryDirectory(prefix="apart-", dir=located.root.parent) as scratch:
         root = Path(scratch, "submission")
         root.mkdir()
-        sha256 = _copy(located.root / folder, inside, root / name)
-        moved = tuple(replace(file, path=f"{name}/{file.path}") for file in inside)
+        sha256 = _copy(located.root / folder, files, root / name)
+        moved = tuple(replace(file, path=f"{name}/{file.path}") for file in files)
         yield Located(located.id, sha256, root, moved, (name,))
 
 
@@ -126,14 +122,14 @@ def submission_id(source: Path) -> str:
     return shown(name)
 
 
-def _snapshot(source: Path, root: Path) -> tuple[Listing, str]:
+def _snapshot(source: Path, root: Path) -> tuple[list[SubmissionFile], str]:
     """Copy a folder as it was at one moment, as far as one can tell."""
     for pause_s in (*_PAUSES_S, None):
         try:
-            listing = list_files(source)
-            wrapper = wrapper_of(listing.files)
-            listing = listing.inside(wrapper)
-            return listing, _copy(source / wrapper, listing.files, root)
+            files = list_files(source)
+            wrapper = wrapper_of(files)
+            files = inside(files, wrapper)
+            return files, _copy(source / wrapper, files, root)
         except ChangedMeanwhile:
             if pause_s is None:
                 raise

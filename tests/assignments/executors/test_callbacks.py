@@ -235,7 +235,6 @@ class TestRun:
         told = tuple(declared("timer", node=NODE, period_s=1.1) for _ in TIMERS)
         words = failed("run", run(*runs, declarations=told), TIMERS, period="1 s", tolerance="7 %")
         assert "`timer_1` starts every 1.1 s" in words
-        assert "declared a timer of 1.1 s" in words
 
     def test_a_node_that_was_made_twice_is_told(self):
         runs = [
@@ -284,7 +283,7 @@ class TestRun:
         subject = run(*parallel(), endpoints=ends)
         assert judged("run", subject, ["chatter"], stimulus="/chatter").status is Status.ERROR
         deaf = failed("run", run(*parallel()), ["chatter"], stimulus="/chatter")
-        assert "subscribes to nothing" in deaf
+        assert "has no subscription of its own" in deaf
 
     def test_only_one_thing_calls_them(self):
         with pytest.raises(ValueError, match="either 'period' or 'stimulus'"):
@@ -352,7 +351,7 @@ class TestWork:
         runs = [("timer_1", second, second + 0.0004) for second in (1, 2, 3)]
         words = failed("work", run(*runs), ["timer_1"], duration="400 ms")
         assert "works 400 us (median of 3 runs)" in words
-        assert "show no work" in words
+        assert "work with time.sleep(0.4)" in words
 
     def test_the_work_of_another(self):
         words = failed("work", run(*serial()), ["timer_1"], duration="200 ms")
@@ -360,10 +359,9 @@ class TestWork:
         assert "time.sleep(0.2)" in words
         assert "such as for a lock" in words
 
-    def test_a_little_too_long_waits_for_nothing(self):
+    def test_a_little_too_long(self):
         words = failed("work", run(*serial()), ["timer_1"], duration="300 ms")
         assert "time.sleep(0.3)" in words
-        assert "lock" not in words
 
     def test_what_the_machine_took_is_our_fault(self):
         runs = [("timer_1", second, second + 0.6) for second in (1, 2, 3)]
@@ -417,7 +415,7 @@ class TestNeverOverlap:
         several = declared("spin", executor="MultiThreadedExecutor", threads=4)
         for group, words in (
             ("MutuallyExclusiveCallbackGroup", "a thread that a callback starts"),
-            ("ReentrantCallbackGroup", "Give the subscription a MutuallyExclusiveCallbackGroup"),
+            ("ReentrantCallbackGroup", "those of one MutuallyExclusiveCallbackGroup"),
         ):
             subscription = declared("subscription", group={"type": group, "id": 1})
             subject = run(*runs, declarations=(several, subscription))

@@ -53,9 +53,7 @@ class Publish(StimulusModel):
         description="An own function, `file.py:function`, beside assignment.yaml: it takes the "
         "scenario's seed and returns a list of messages, each a dict of its fields.",
     )
-    after: DurationOrZero = Field(
-        0.0, description="Not before so long after the first match.", validate_default=False
-    )
+    after: DurationOrZero = Field(0.0, description="Not before so long after the first match.")
     every: Duration | None = Field(
         None,
         description="Time between two messages. One `message` is repeated with it, `count` times "
@@ -70,9 +68,7 @@ class Publish(StimulusModel):
         "when `within` has passed. One that is the same as before may be a copy, and counts a "
         "moment later.",
     )
-    within: Duration = Field(
-        1.0, description="How long to wait for an `answer`.", validate_default=False
-    )
+    within: Duration = Field(1.0, description="How long to wait for an `answer`.")
     before_launch: int = Field(
         0,
         ge=0,
@@ -98,11 +94,6 @@ class Publish(StimulusModel):
             raise ValueError(f"give the messages in one way of {', '.join(given)}, {told}")
         if self.count is not None and self.message is None:
             raise ValueError("'count' says how often one 'message' is published")
-        if self.before_launch and self.durability == "volatile":
-            raise ValueError(
-                "what is published 'before_launch' is lost for later subscriptions unless the "
-                "durability is transient_local"
-            )
         if self._is_several and not self._is_paced:
             raise ValueError("several messages need a pace: give 'every' or 'answer'")
         return self

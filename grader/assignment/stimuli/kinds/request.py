@@ -22,13 +22,10 @@ _After = Annotated[
     Field(
         description="Not before so long after the first match, nor before the answers to what is "
         "asked earlier. What has the same `after` is asked in the order of the list; a goal is "
-        "answered when it was accepted or rejected.",
-        validate_default=False,
+        "answered when it was accepted or rejected."
     ),
 ]
-_Within = Annotated[
-    Duration, Field(description="How long to wait for each answer.", validate_default=False)
-]
+_Within = Annotated[Duration, Field(description="How long to wait for each answer.")]
 
 
 @kind
@@ -90,9 +87,7 @@ class CallService(StimulusModel):
     at_once: int = Field(
         1, ge=1, le=10, description="Send so many calls at once: the second during the first."
     )
-    within: Duration = Field(
-        2.0, description="How long to wait for an answer.", validate_default=False
-    )
+    within: Duration = Field(2.0, description="How long to wait for an answer.")
 
     @model_validator(mode="after")
     def _consistent(self) -> CallService:
@@ -124,9 +119,8 @@ class CallService(StimulusModel):
             "type": self.type,
             "requests": requests,
             "at_once": self.at_once,
-            "after_s": self.after,
             "every_s": self.every,
-            "within_s": self.within,
+            **_times(self),
         }
 
 
@@ -144,7 +138,8 @@ class ReadParameters(StimulusModel):
 
     def order(self, making: Making) -> dict[str, Any]:
         """The node, and nothing that is set."""
-        return _of_parameters(self.read_parameters, {}, self.after, self.within)
+        node = {"node": self.read_parameters, "values": {}}
+        return {"kind": "ParametersOrder", **node, **_times(self)}
 
 
 @kind
@@ -169,7 +164,8 @@ class SetParameters(StimulusModel):
         """The node, and what is set."""
         drawn = dict(making.drawn)
         values = {name: _value(name, it, drawn) for name, it in self.set_parameters.items()}
-        return _of_parameters(self.node, values, self.after, self.within)
+        node = {"node": self.node, "values": values}
+        return {"kind": "ParametersOrder", **node, **_times(self)}
 
 
 def _value(name: str, value: Any, drawn: dict[str, float]) -> Any:
@@ -179,26 +175,11 @@ def _value(name: str, value: Any, drawn: dict[str, float]) -> Any:
         found = fill_in(value, drawn)
     except UsageError as error:
         raise StimulusError(str(error), place) from None
-    items = found if isinstance(found, list) else [found]
-    types = {type(item) for item in items}
-    if not items:
-        raise StimulusError(f"{name}: an empty list has no type", place)
-    if not types <= {bool, int, float, str} or (len(types) > 1 and types != {int, float}):
+    types = {type(item) for item in (found if isinstance(found, list) else [found])}
+    if not types <= {bool, int, float, str} or (len(types) != 1 and types != {int, float}):
         text = f"{name}: expected a truth, a number, a text, or a list of one kind of these"
         raise StimulusError(text, place)
     return found
-
-
-def _of_parameters(
-    node: str, values: Mapping[str, Any], after_s: float, within_s: float
-) -> dict[str, Any]:
-    return {
-        "kind": "ParametersOrder",
-        "node": node,
-        "values": dict(values),
-        "after_s": after_s,
-        "within_s": within_s,
-    }
 
 
 @kind
@@ -221,9 +202,7 @@ class SendGoal(StimulusModel):
         None, description="Ask to cancel it so long after it was accepted."
     )
     preempt: bool = Field(False, description="Send it while the goal before it is worked on.")
-    within: Duration = Field(
-        10.0, description="How long to wait for its result.", validate_default=False
-    )
+    within: Duration = Field(10.0, description="How long to wait for its result.")
 
     @property
     def exchanged(self) -> tuple[str, str]:
@@ -237,11 +216,14 @@ class SendGoal(StimulusModel):
             "action": self.send_goal,
             "type": self.type,
             "goal": _fields(self.goal, self, making, ("goal",)),
-            "after_s": self.after,
             "cancel_after_s": self.cancel_after,
             "preempt": self.preempt,
-            "within_s": self.within,
+            **_times(self),
         }
+
+
+def _times(item: CallService | ReadParameters | SetParameters | SendGoal) -> dict[str, float]:
+    return {"after_s": item.after, "within_s": item.within}
 
 
 def _fields(
