@@ -67,8 +67,8 @@ def brief(value: Mapping[str, Any]) -> str:
     fields = list(_plain(value))
     if len(fields) <= _MOST_FIELDS:
         return words(value)
-    said = [f"{path} = {value_text(item)}" for path, item in fields if not _is_default(item)]
-    return ", ".join(said) or "every field zero or empty"
+    shown = [f"{path} = {value_text(item)}" for path, item in fields if not _is_default(item)]
+    return ", ".join(shown) or "every field zero or empty"
 
 
 def _is_default(value: Any) -> bool:

@@ -191,7 +191,7 @@ def feedback(recording: Recording, parameters: FeedbackOf) -> Finding:
     """The action gives feedback while it works.
 
     Judged by the feedback that the probe received for each goal that was accepted and let come
-    to its end: how much, at which mean rate, and what the last of it said.
+    to its end: how much, at which mean rate, and the fields of the last.
     """
     goals = answered_goals(recording, parameters, is_undisturbed)
     for goal in goals:

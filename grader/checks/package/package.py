@@ -135,7 +135,7 @@ def _misnamed(submission: SubmissionRecord, parameters: Executable) -> str:
 _COUNTING = frozenset(
     {"depend", "exec_depend", "build_depend", "build_export_depend", "run_depend"}
 )
-# What is said of a dependency that is named in a tag that does not count, by its first part.
+# Words for a dependency in a tag that does not count, by the first part of the tag.
 _IDLE = {
     "test_depend": " (test_depend counts for tests only)",
     "export": " (package.xml names it inside <export>, where it does not count)",

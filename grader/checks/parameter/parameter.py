@@ -52,7 +52,7 @@ class Declared(OfParameter):
 
     type: Type | None = Field(None, description="Its type; by default any.")
     default: Any = Field(
-        None, description="Its value before anybody sets it; by default any. Lists are exact."
+        None, description="Its value before it is set; by default any. Lists are exact."
     )
     range: tuple[float, float] | None = Field(
         None, description="Lowest and highest value that its descriptor allows, [low, high]."
@@ -88,7 +88,7 @@ def declared(recording: Recording, parameters: Declared) -> Finding:
     """The node declares the parameter.
 
     Judged by the node's own parameter services, which the probe asked (`read_parameters` or
-    `set_parameters`): type, value before anybody set it, and descriptor.
+    `set_parameters`): type, value before it was set, and descriptor.
     """
     stop_if(why_not_declared(recording, parameters.node, parameters.name))
     found = descriptor(recording, parameters.node, parameters.name)
@@ -237,9 +237,9 @@ def _why_other_answer(recording: Recording, item: Setting, parameters: Set) -> C
             shown,
         )
     if parameters.reason.casefold() not in item.reason.casefold():
-        said = f"“{item.reason}”" if item.reason else "nothing"
+        reason = f"“{item.reason}”" if item.reason else "nothing"
         return Cause(
-            f"it was refused, but the reason says {said}",
+            f"it was refused, but the reason says {reason}",
             "SetParametersResult(successful=False, reason='...') tells why.",
             shown,
         )
