@@ -44,22 +44,14 @@ class Interpreter(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What environment is made.
-
-    Attributes:
-        ros: `wheels` from the package index, or the `system`'s, which was sourced.
-    """
+    """What environment is made: with the `wheels` of ROS, or the `system`'s, which was sourced."""
 
     ros: str
     interpreter: Interpreter
 
 
 class Locked(NamedTuple):
-    """One entry of the lock.
-
-    Attributes:
-        parents: What it was locked for: names of the lock, or of a file for rosgrade's own needs.
-    """
+    """One entry of the lock, with the names of the entries that need it."""
 
     name: str
     text: str
@@ -76,11 +68,7 @@ def plan(
 
     Args:
         interpreters: The Pythons of the machine, the preferred first; read only as far as needed.
-        ros_python: The Python version that the sourced ROS was built for; None if nothing is
-            sourced.
-
-    Raises:
-        SetupError: There is no way on this machine as it is.
+        ros_python: The Python version that the sourced ROS was built for, or None.
     """
     distro = _sourced(environ)
     ours = f"ROS 2 {DISTRO.title()}"
@@ -128,8 +116,8 @@ def read_lock(lock_text: str) -> List[Locked]:
 def requirements(lock_text: str, plan: Plan) -> str:
     """Return the part of the lock that is installed under this plan.
 
-    With the system's ROS that is everything but the ROS wheels, what only they need, and what
-    ROS was built against.
+    With the system's ROS that is all but the ROS wheels, what only they need, and what ROS was
+    built against.
     """
     entries = read_lock(lock_text)
     if plan.ros == "system":
@@ -173,9 +161,7 @@ def find_interpreters(environ: Mapping[str, str]) -> Iterator[Interpreter]:
 def set_up(root: Path, environ: Mapping[str, str]) -> None:
     """Bring the environment in `root` up to date; quick when it already is.
 
-    Raises:
-        SetupError: It could not be made. Nothing half-made is left, only perhaps a whole
-            environment that waits for rosgrade itself.
+    Nothing half-made is left, only perhaps a whole environment that waits for rosgrade itself.
     """
     lock_text = (root / "requirements.lock").read_text(encoding="utf-8")
     chosen = plan(

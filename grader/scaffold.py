@@ -18,23 +18,15 @@ from grader.submission.read.rosdistro import PACKAGES
 
 
 def write_assignment(name: str, folder: Path) -> Path:
-    """Write a new assignment with a handout, a reference solution and mutants.
-
-    Raises:
-        UsageError: That is no id, the folder is there already, or it cannot be written.
-    """
+    """Write a new assignment with a handout, a reference solution and mutants."""
     try:
         check_id(name)
     except ValueError as error:
         raise UsageError(str(error)) from error
-    if keyword.iskeyword(name) or name in sys.stdlib_module_names:
+    if keyword.iskeyword(name) or name in sys.stdlib_module_names or name in PACKAGES:
         raise UsageError(
-            f"{name!r} is a name of Python's own, and the assignment's package could not be "
-            "imported: take another one"
-        )
-    if name in PACKAGES:
-        raise UsageError(
-            f"{name!r} is a package of ROS, which the assignment's own would hide: take another id"
+            f"{name!r} is a name of Python's own or a package of ROS, which the assignment's "
+            "package would hide: take another id"
         )
     target = folder / name
     if target.exists():

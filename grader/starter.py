@@ -50,11 +50,7 @@ class Interface:
 
 
 def write_starter(loaded: LoadedAssignment, folder: Path) -> tuple[Path, ...]:
-    """Write the starter packages of an assignment.
-
-    Raises:
-        UsageError: A folder of that name is there already, or it cannot be written.
-    """
+    """Write the starter packages of an assignment, unless one is there already."""
     packages = loaded.assignment.packages
     places = tuple(folder / package.name for package in packages)
     for place in places:
@@ -68,11 +64,7 @@ def write_starter(loaded: LoadedAssignment, folder: Path) -> tuple[Path, ...]:
 
 
 def starter_files(loaded: LoadedAssignment) -> dict[str, str]:
-    """Make the starter packages of an assignment.
-
-    Returns:
-        Contents by path, with forward slashes; each begins with a package's name.
-    """
+    """The starter packages of an assignment: contents by path, which begins with a package."""
     assignment = loaded.assignment
     files: dict[str, str] = {}
     for package in assignment.packages:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, Request, sync_playwright
 
 from grader import resources
 
@@ -31,13 +31,7 @@ _taken: list[Path] = []
 
 @dataclass
 class Look:
-    """A page, and what it did that it must not.
-
-    Attributes:
-        page: The page.
-        complaints: Errors and warnings in its console.
-        requests: What it asked for besides its own file.
-    """
+    """A page, errors and warnings in its console, and what it asked for besides its own file."""
 
     page: Page
     complaints: list[str] = field(default_factory=list)
@@ -81,20 +75,17 @@ def look(chromium: Browser, tmp_path: Path) -> Iterator[Callable[..., Look]]:
         contexts.append(context)
         found = Look(context.new_page())
         own = file.as_uri()
-        found.page.on(
-            "request",
-            lambda request: (
-                None if request.url.partition("#")[0] == own else found.requests.append(request.url)
-            ),
-        )
-        found.page.on(
-            "console",
-            lambda message: (
+
+        def requested(request: Request) -> None:
+            if request.url.partition("#")[0] != own:
+                found.requests.append(request.url)
+
+        def told(message: ConsoleMessage) -> None:
+            if message.type in ("error", "warning"):
                 found.complaints.append(message.text)
-                if message.type in ("error", "warning")
-                else None
-            ),
-        )
+
+        found.page.on("request", requested)
+        found.page.on("console", told)
         found.page.on("pageerror", lambda error: found.complaints.append(str(error)))
         found.page.goto(own, wait_until=wait)  # type: ignore[arg-type]
         return found

@@ -83,53 +83,44 @@ def test_search_and_filters_leave_the_rows_that_fit(look, page_of_few):
     assert 0 < shown(page).count() < FEW
 
 
-@pytest.mark.parametrize(
-    ("typed", "found"),
-    [
-        ("muller", "Müller, Jan"),
-        ("MUELLER", "Müller, Jan"),
-        ("müller", "Mueller, Eva"),
-        ("mu\u0308ller", "Müller, Jan"),
-        ("muller", "Mu\u0308ller, NFD"),
-        ("strasse", "Straße, Per"),
-        ("STRAẞE", "Straße, Per"),
-        ("nunez", "Núñez, Ana"),
-        ("lukasz", "Łukasz, Ewa"),
-        ("soren", "Sørensen, Bo"),
-        ("soerensen", "Sørensen, Bo"),
-        ("istanbul", "İstanbul, Can"),
-        ("isik", "Işık, Ada"),
-        ("dogan", "Doğan, Efe"),
-        ("nguyen", "Nguyễn, An"),
-        ("thor", "Þór, Jón"),
-        ("oneil", "O’Neil, Pat"),
-        ("ΣΟΦΟΣ", "σοφός, Νίκος"),
-        ("jan müller", "Müller, Jan"),
-    ],
-)
-def test_search_finds_a_name_however_its_letters_are_written(look, typed, found):
-    people = (
-        *("Müller, Jan", "Mueller, Eva", "Mu\u0308ller, NFD", "Straße, Per", "Núñez, Ana"),
-        *("Łukasz, Ewa", "Sørensen, Bo", "İstanbul, Can", "Işık, Ada", "Doğan, Efe"),
-        *("Nguyễn, An", "Þór, Jón", "O’Neil, Pat", "σοφός, Νίκος", "Plain, Joe"),
-    )
-    rows = [replace(classroom(1)[0], id=f"k{at}", name=one) for at, one in enumerate(people)]
+PEOPLE = {
+    "Müller, Jan": ("muller", "MUELLER", "mu\u0308ller", "jan müller"),
+    "Mueller, Eva": ("müller",),
+    "Mu\u0308ller, NFD": ("muller",),
+    "Straße, Per": ("strasse", "STRAẞE"),
+    "Núñez, Ana": ("nunez",),
+    "Łukasz, Ewa": ("lukasz",),
+    "Sørensen, Bo": ("soren", "soerensen"),
+    "İstanbul, Can": ("istanbul",),
+    "Işık, Ada": ("isik",),
+    "Doğan, Efe": ("dogan",),
+    "Nguyễn, An": ("nguyen",),
+    "Þór, Jón": ("thor",),
+    "O’Neil, Pat": ("oneil",),
+    "σοφός, Νίκος": ("ΣΟΦΟΣ",),
+    "Plain, Joe": ("plain",),
+}
+
+
+def test_search_finds_a_name_however_its_letters_are_written(look):
+    rows = [replace(classroom(1)[0], id=f"k{at}", name=one) for at, one in enumerate(PEOPLE)]
     page = look(render_overview(rows)).page
-    page.get_by_label("Search").fill(typed)
-    assert found in names(page) and "Plain, Joe" not in names(page)
+    for name, spellings in PEOPLE.items():
+        for typed in spellings:
+            page.get_by_label("Search").fill(typed)
+            page.wait_for_function("(all) => +shown.textContent.split(' ')[0] < all", arg=len(rows))
+            assert name in names(page), typed
+            assert name == "Plain, Joe" or "Plain, Joe" not in names(page), typed
 
 
 def test_a_click_on_a_heading_sorts(look, page_of_few):
     page = look(page_of_few).page
-    page.get_by_role("button", name="Score").click()
-    scores = page.locator("#table tbody tr td.num").all_text_contents()
-    numbers = [float(text) for text in scores if text != "–"]
-    assert numbers == sorted(numbers)
-    assert page.locator("#table th[aria-sort]").get_attribute("aria-sort") == "ascending"
-    page.get_by_role("button", name="Score").click()
-    scores = page.locator("#table tbody tr td.num").all_text_contents()
-    numbers = [float(text) for text in scores if text != "–"]
-    assert numbers == sorted(numbers, reverse=True)
+    for order, turned in (("ascending", False), ("descending", True)):
+        page.get_by_role("button", name="Score").click()
+        scores = page.locator("#table tbody tr td.num").all_text_contents()
+        numbers = [float(text) for text in scores if text != "–"]
+        assert numbers == sorted(numbers, reverse=turned)
+        assert page.locator("#table th[aria-sort]").get_attribute("aria-sort") == order
     page.get_by_role("button", name="Submission", exact=True).press("Enter")
     assert names(page) == sorted(names(page))
 

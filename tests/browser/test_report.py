@@ -82,10 +82,8 @@ class TestReplay:
         slider.focus()
         for _ in range(20):
             page.keyboard.press("ArrowRight")
-        assert (
-            slider.get_attribute("aria-valuetext")
-            == f"{float(slider.input_value()):.1f} s after launch"
-        )
+        time = f"{float(slider.input_value()):.1f} s after launch"
+        assert slider.get_attribute("aria-valuetext") == time
         assert robot.get_attribute("aria-label") != before
         assert "heading 0°" in robot.get_attribute("aria-label")
         assert sides.nth(0).locator(".beams").get_attribute("d").count("L") > 5
@@ -104,11 +102,8 @@ class TestReplay:
         for number in range(2):
             side = sides.nth(number)
             circle = side.locator("svg.plan circle.target")
-            assert [circle.get_attribute(name) for name in ("cx", "cy", "r")] == [
-                "0.4",
-                "-0.2",
-                "0.08",
-            ]
+            place = [circle.get_attribute(name) for name in ("cx", "cy", "r")]
+            assert place == ["0.4", "-0.2", "0.08"]
             name, plan = side.locator("svg.plan text"), side.locator("svg.plan")
             assert name.text_content() == "goal"
             inner, outer = name.bounding_box(), plan.bounding_box()
@@ -128,9 +123,8 @@ class TestReplay:
         mine, theirs = page.locator(".replay .told").all_text_contents()
         assert "It touches something." in mine and "Commanded 0.10 m/s" in mine
         assert "Commanded 0.00 m/s" in theirs and "true 0.00 m/s" in theirs
-        assert (
-            page.locator(".replay .said-so-far").first.text_content().count("Front is clear") == 1
-        )
+        said = page.locator(".replay .said-so-far").first.text_content()
+        assert said.count("Front is clear") == 1
         page.locator(".replay").scroll_into_view_if_needed()
         found.keep("replay")
         assert found.complaints == []
@@ -170,9 +164,7 @@ class TestReplay:
         page.get_by_role("button", name="Play").click()
         page.wait_for_function("() => window.seen.length >= 2")
         page.get_by_role("button", name="Pause").click()
-        first, second = (
-            float(text.split()[0]) for text in page.evaluate("window.seen.slice(0, 2)")
-        )
+        first, second = map(float, page.evaluate("seen.slice(0, 2).map(parseFloat)"))
         assert first - float(begin) >= 0.4 and second - first >= 0.4
 
 

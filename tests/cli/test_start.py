@@ -59,7 +59,7 @@ def test_nothing_is_overwritten(rosgrade: Rosgrade, tmp_path: Path) -> None:
     [
         ("My-Lesson", "is not an id: use lower case letters"),
         ("time", "is a name of Python's own"),
-        ("rclpy", "is a package of ROS, which the assignment's own would hide"),
+        ("rclpy", "a package of ROS, which the assignment's package would hide"),
     ],
 )
 def test_a_name_that_cannot_be_is_refused(rosgrade: Rosgrade, name: str, said: str) -> None:

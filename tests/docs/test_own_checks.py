@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from grader import resources
-from tests.docs.tutorial import Command, WriteFile, steps
+from tests.docs.tutorial import WriteFile, run, steps
 
 PAGE = resources.root() / "docs" / "own-checks.md"
 
@@ -34,18 +31,5 @@ def test_every_step_does_what_the_page_says(tmp_path: Path) -> None:
         if isinstance(step, WriteFile):
             extend(tmp_path / step.path, step.content)
             continue
-        assert isinstance(step, Command)
-        ended = subprocess.run(
-            [sys.executable, "-m", "grader", *step.words[1:]],
-            cwd=tmp_path,
-            env={**os.environ, "COLUMNS": "100", "PYTHONPATH": str(resources.root())},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=250,
-            check=False,
-        )
-        told = f"$ {step.line}\n{ended.stdout}"
-        assert ended.returncode == 0, told
-        assert step.printed_by(ended.stdout), told
+        run(step, tmp_path)
     assert not list(tmp_path.rglob("__pycache__"))

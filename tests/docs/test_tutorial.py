@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from grader import resources
-from tests.docs.tutorial import Command, WriteFile, steps
+from tests.docs.tutorial import Command, WriteFile, run, steps
 
 PAGE = resources.root() / "docs" / "tutorial.md"
 SHOWN_FAILURES = ("WRONG", "✗")
@@ -53,18 +50,4 @@ def test_every_step_does_what_the_page_says(tmp_path: Path) -> None:
             assert file.is_file(), f"{step.path} is replaced, but is not there"
             file.write_text(step.content, encoding="utf-8")
             continue
-        words = step.words
-        is_ours = words[0] == "rosgrade"
-        ended = subprocess.run(
-            [sys.executable, "-m", "grader", *words[1:]] if is_ours else words,
-            cwd=tmp_path,
-            env={**os.environ, "COLUMNS": "100", "PYTHONPATH": str(resources.root())},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=300,
-            check=False,
-        )
-        told = f"$ {step.line}\n{ended.stdout}"
-        assert ended.returncode == any(mark in step.printed for mark in SHOWN_FAILURES), told
-        assert step.printed_by(ended.stdout), told
+        run(step, tmp_path, any(mark in step.printed for mark in SHOWN_FAILURES))

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
+import subprocess
+import sys
 from collections.abc import Collection
 from dataclasses import dataclass
+from pathlib import Path
+
+from grader import resources
 
 _FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 _TITLE = re.compile(r'title="([^"]+)"')
@@ -58,3 +64,22 @@ def steps(page: str, skipped: Collection[str] = ()) -> list[WriteFile | Command]
         elif language not in skipped:
             raise ValueError(f"a block that no step is made of: {language}{rest}")
     return found
+
+
+def run(step: Command, folder: Path, ends_with: int = 0) -> None:
+    """Do what a reader does, and see that it prints and ends as the page says."""
+    words = step.words
+    is_ours = words[0] == "rosgrade"
+    ended = subprocess.run(
+        [sys.executable, "-m", "grader", *words[1:]] if is_ours else words,
+        cwd=folder,
+        env={**os.environ, "COLUMNS": "100", "PYTHONPATH": str(resources.root())},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    told = f"$ {step.line}\n{ended.stdout}"
+    assert ended.returncode == ends_with, told
+    assert step.printed_by(ended.stdout), told

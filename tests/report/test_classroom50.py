@@ -104,8 +104,3 @@ def test_without_a_grade_there_is_no_result():
 def test_what_the_runner_did_not_say_is_named():
     with pytest.raises(UsageError, match="the environment lacks COMMIT_URL, RELEASE_URL"):
         identity({k: v for k, v in ENVIRONMENT.items() if not k.endswith("_URL")})
-
-
-def test_the_review_is_the_commit_where_there_is_none():
-    assert identity(ENVIRONMENT)["review"] == ENVIRONMENT["COMMIT_URL"]
-    assert identity({**ENVIRONMENT, "REVIEW_URL": "https://r"})["review"] == "https://r"

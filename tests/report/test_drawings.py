@@ -31,11 +31,8 @@ class TestPlot:
         assert figure.caption == (
             "Period of /cmd_vel: allowed 285 to 315 ms (shaded), 2 of 4 outside (marked ×)."
         )
-
-    def test_axes_name_their_units(self):
-        shown = words(draw_plot(make_plot([300.0, 310.0]), "p").wide)
+        shown = words(figure.wide)
         assert "time since launch (s)" in shown and "period (ms)" in shown
-        assert "290" in shown and "310" in shown
 
     def test_the_whole_band_is_in_sight(self):
         (band,) = of_class(draw_plot(make_plot([300.0, 300.1]), "p").wide, "band")

@@ -31,14 +31,6 @@ def test_the_old_file_stays_when_the_new_one_cannot_be_written(tmp_path):
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_a_place_that_cannot_be_written_is_named(tmp_path):
-    (tmp_path / "report").write_text("a file where a folder is needed")
-    with pytest.raises(
-        UsageError, match=r"report/result\.json cannot be written: .*/report is not a folder"
-    ):
-        write_whole(tmp_path / "report" / "result.json", "")
-
-
 @pytest.mark.parametrize("inside", [".", "a", "a/b"])
 def test_a_file_where_a_folder_is_needed_is_named(tmp_path, inside):
     (tmp_path / "report").write_text("a file")
@@ -51,12 +43,19 @@ def test_a_file_where_a_folder_is_needed_is_named(tmp_path, inside):
         check_folder(folder)
 
 
-def test_a_folder_in_its_place_is_named_and_no_draft_is_left(tmp_path):
-    folder = tmp_path / "result.json"
-    folder.mkdir()
-    with pytest.raises(UsageError, match=r"result\.json cannot be written: it is a folder"):
-        write_whole(folder, "text")
-    assert list(tmp_path.iterdir()) == [folder]
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("report", r"report cannot be written: it is a folder"),
+        ("file/result.json", r"result\.json cannot be written: .*/file is not a folder"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_named_and_no_draft_is_left(tmp_path, place, said):
+    (tmp_path / "report").mkdir()
+    (tmp_path / "file").touch()
+    with pytest.raises(UsageError, match=said):
+        write_whole(tmp_path / place, "text")
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_a_full_disk_is_no_wrong_use(tmp_path, monkeypatch):

@@ -61,9 +61,6 @@ def test_an_annotation_is_at_the_student_s_line():
     }
     assert "observed: a median of 322.4 ms" in message
     assert "also: Let a timer do the waiting" in message
-
-
-def test_without_the_files_in_the_repository_there_is_no_place():
     (line,) = github.annotation_lines(lost_points().result, None)
     assert set(runner_reads(line)[1]) == {"title"}
 
@@ -74,14 +71,6 @@ def test_the_runner_shows_ten_so_the_most_useful_come_first():
     titles = [runner_reads(line)[1]["title"] for line in lines]
     assert titles[0] == "Title of c1 (0 / 1)"
     assert titles[1:] == [f"Title of c{n} (0 / {n})" for n in range(14, 5, -1)]
-
-
-def test_what_is_only_shown_is_a_notice():
-    checks = [Told("node"), Told("silence", FAIL, points=0)]
-    (line,) = github.annotation_lines(judged(checks).result)
-    kind, properties, _ = runner_reads(line)
-    assert kind == "notice"
-    assert properties["title"] == "Title of silence (0 / 0)"
 
 
 def test_a_message_stays_below_what_the_runner_cuts():
@@ -113,15 +102,13 @@ def test_a_hostile_name_stays_in_its_property():
         assert properties["file"] == text
 
 
-def test_what_is_not_graded_is_one_warning_and_no_error():
+def test_what_is_not_graded_is_a_warning_and_what_is_only_shown_a_notice():
     (line,) = github.annotation_lines(not_graded().result)
     assert runner_reads(line)[0] == "warning"
+    shown = judged([Told("node"), Told("silence", FAIL, points=0)])
+    (line,) = github.annotation_lines(shown.result)
+    assert runner_reads(line)[0] == "notice"
     assert github.annotation_lines(full_points().result) == ()
-
-
-def test_commands_are_stopped_and_resumed_by_the_same_token():
-    assert github.stop_commands("t0k3n") == "::stop-commands::t0k3n"
-    assert github.resume_commands("t0k3n") == "::t0k3n::"
 
 
 @pytest.mark.parametrize(

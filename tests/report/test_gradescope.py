@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import pytest
 
@@ -20,7 +19,6 @@ from tests.report.sample import (
     judged,
     judged_runs,
     lost_points,
-    make_facts,
     make_run,
     not_built,
     not_graded,
@@ -101,12 +99,6 @@ def test_scores_and_whose_test_it_is():
     assert tests["builds"]["status"] == "passed"
     assert [test["number"] for test in data["tests"]] == ["1", "2", "3", "4"]
     assert sum(test["score"] for test in data["tests"]) == pytest.approx(data["score"])
-
-
-def test_staff_can_see_whether_there_was_a_sandbox():
-    facts = make_facts(environment={"sandbox": "none"})
-    data = rendered(lambda: replace(full_points(), facts=facts))
-    assert data["extra_data"]["sandbox"] == "none"
 
 
 @pytest.mark.parametrize("visibility", ["visible", "after_due_date", "after_published", "hidden"])

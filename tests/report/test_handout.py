@@ -40,11 +40,8 @@ def test_the_checks_with_their_points_and_none_that_is_hidden(tmp_path):
     )
 
 
-def test_without_hidden_checks_none_are_announced(tmp_path):
-    assert handout(tmp_path, checks=CHECKS[:1]).total == "1 point in all."
-
-
 def test_an_assignment_that_is_hidden_altogether_still_has_a_handout(tmp_path):
+    assert handout(tmp_path, checks=CHECKS[:1]).total == "1 point in all."
     page = Page(render_handout(handout(tmp_path, "# Title\n\nDo it.", CHECKS[2:3])))
     assert "Do it." in page.text
     assert "3 points in all: 0 points here, and 3 points for 1 more check at grading." in page.text
@@ -74,14 +71,6 @@ def test_html_and_scripts_in_it_are_inert(tmp_path, attack):
     assert "script" not in page.tags and "img" not in page.tags
     assert len(page.all("style")) == 1
     assert not any((a["href"] or "").startswith("javascript") for a in page.all("a"))
-
-
-def test_the_page_may_load_nothing(tmp_path):
-    (policy,) = Page(render_handout(handout(tmp_path))).all(
-        "meta", http_equiv="Content-Security-Policy"
-    )
-    assert policy["content"].startswith("default-src 'none'; style-src 'sha256-")
-    assert "script-src 'none'" in policy["content"]
 
 
 @pytest.mark.parametrize("name", list_assignments())

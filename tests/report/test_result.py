@@ -81,9 +81,7 @@ def test_a_check_with_its_evidence():
     place = {"file": PLACE.file, "line": 18, "message": "time.sleep(0.3)"}
     assert period["evidence"]["places"] == [place]
     assert period["evidence"]["plots"][0]["band"] == [285.0, 315.0]
-
-
-def test_the_hint_of_an_author_is_not_given_away_where_a_check_passed():
+    # The hint of an author is not given away where a check passed.
     assert {check["author_hint"] for check in written(full_points())["checks"]} == {""}
 
 
@@ -111,13 +109,6 @@ def test_a_check_of_several_scenarios_tells_the_one_that_decided_and_the_others(
         ("a", "passed"),
         ("c", "passed"),
     ]
-
-
-def test_a_build_that_failed():
-    data = written(not_built())
-    assert data["build"]["culprit"]["line"] == 24
-    assert data["build"]["log"] == "Failed <<< bot"
-    assert data["scenarios"] == []
 
 
 def test_without_a_verdict_there_is_no_number_that_a_gradebook_could_take():

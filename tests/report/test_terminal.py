@@ -71,12 +71,6 @@ def test_no_line_is_wider_than_the_terminal(make, width):
     assert max(map(len, make().printed(width).splitlines())) <= width
 
 
-def test_full_points_end_with_the_score():
-    text = full_points().printed()
-    assert text.endswith("\nScore: 3 of 3 points\n")
-    assert "Fix this first" not in text and "Limits" not in text and "Worth knowing" not in text
-
-
 def test_limits_that_were_reached_and_what_is_worth_knowing_stand_before_the_score():
     limits = "".join(reached_limits().printed().partition("Limits of")[1:])
     assert limits.startswith(
@@ -237,7 +231,3 @@ def test_what_a_student_reads_after_a_save(before, after, text, width):
 def test_a_check_that_was_not_judged_before_is_new():
     text = changes(graded(only=1), graded())
     assert text.count("passed  new") == 2 and "Title of builds" not in text
-
-
-def test_changes_fit_into_a_narrow_terminal():
-    assert max(map(len, changes(graded(), graded(FAIL), 40).splitlines())) <= 40

@@ -17,7 +17,7 @@ from grader.ros import RosInstallation
 from grader.run.process.descendants import descendants
 from grader.sandbox.sandbox import Sandbox
 from grader.sandbox.trial import try_sandbox
-from grader.submission.build.build_key import build_key
+from grader.submission.build.build import build_key
 from grader.submission.build.colcon import BuildLimits
 from grader.submission.prepare import Prepared, prepare
 from grader.submission.record import BuildRecord, PackageRecord

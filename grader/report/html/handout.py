@@ -23,7 +23,7 @@ HANDOUT_FILE = "README.md"
 
 @dataclass(frozen=True)
 class Handout:
-    """What a student is given: Markdown, visible checks, and what there is to be earned in words."""
+    """What a student is given: Markdown, visible checks, and in words what they give."""
 
     id: str
     title: str

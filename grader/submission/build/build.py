@@ -8,28 +8,37 @@ business of a sandbox around them.
 from __future__ import annotations
 
 import errno
+import hashlib
+import json
 import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 from grader.errors import GraderFault, machine_fault
 from grader.out_of_memory import oom_kills
+from grader.ros import RosInstallation
 from grader.submission.build import build_log, standalone_build
 from grader.submission.build.bounded import Outcome
 from grader.submission.build.build_cache import INSTALL, BuildCache, CachedBuild
 from grader.submission.build.build_error_location import Sources, find_build_error, last_started
-from grader.submission.build.build_key import build_key
-from grader.submission.build.colcon import COMPILE_S, STOPPED, BuildSetting, Colcon
+from grader.submission.build.colcon import COMPILE_S, STOPPED, BuildLimits, BuildSetting, Colcon
 from grader.submission.build.installed import tidy
-from grader.submission.build.toolchain import missing_here, missing_tools
+from grader.submission.build.toolchain import missing_here, missing_tools, watched_folders
 from grader.submission.intake.locate import Located, only
 from grader.submission.intake.members import MIB
 from grader.submission.read.rosdistro import PACKAGES
 from grader.submission.record import BuildRecord
 
+if TYPE_CHECKING:
+    from grader.sandbox.sandbox import Sandbox
+
 _T = TypeVar("_T")
+# Raise it when the same submission would now be built differently.
+_VERSION = 5
+_TOOLS = ("cc", "c++", "cmake", "ld", "make", "ninja")
 _SUMMARY = re.compile(r"Summary: \d+ packages? finished")
 _SIGNALLED = 128
 # What colcon, Python, compilers and make say of a program of theirs that was killed.
@@ -37,6 +46,39 @@ _KILLED = re.compile(r"code -9\b|\bSIGKILL\b|\bKilled\b")
 _LEAST_FREE_BYTES = 64 * MIB
 # What makes the sandbox, each with its own complaint; colcon is only started by the last.
 _NOT_STARTED = re.compile(r"(?:/\S*/)?(?:sh|unshare|mkdir|mount|setpriv|bwrap|prlimit): .*")
+
+
+def build_key(
+    sha256: str,
+    ros: RosInstallation,
+    limits: BuildLimits,
+    sandbox: Sandbox | None,
+    is_standalone: bool,
+) -> str:
+    """Name a build by everything that it depends on."""
+    watched = [prefix / "share/ament_index/resource_index/packages" for prefix in ros.prefixes]
+    # colcon and setuptools come with ROS, too.
+    watched += [ros.python, *ros.site_packages, *watched_folders()]
+    # What compiles and links, behind all links such as /etc/alternatives.
+    found = (shutil.which(name, path=ros.environment({})["PATH"]) for name in _TOOLS)
+    watched += [Path(tool).resolve() for tool in found if tool is not None]
+    parts = [
+        _VERSION,
+        sha256,
+        ros.source,
+        ros.distro,
+        str(ros.python),
+        [str(prefix) for prefix in ros.prefixes],
+        ros.inherited,
+        # An underlay is an install space in the cache, below the name of its build.
+        [str(underlay) for underlay in ros.underlays],
+        [(str(path), path.stat().st_mtime_ns) for path in watched if path.exists()],
+        sorted(ros.packages),
+        repr((limits.output, limits.room)),
+        sorted(sandbox.libraries) if sandbox is not None else None,
+        is_standalone,
+    ]
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 class BuildKilled(GraderFault):

@@ -102,17 +102,22 @@ class Colcon:
                     finished.discard(match[2])
 
         failed: set[str] = set()
-        total: Outcome | None = None
+        total = Outcome(status=0, ended_by_us=None, output="", duration_s=0.0)
         while True:
             command = self._command()
             if failed or finished:
                 command += ["--packages-skip", *sorted(failed | finished)]
             if failed:
                 command += ["--packages-skip-by-dep", *sorted(failed)]
-            used_s = total.duration_s if total else 0.0
-            outcome = self._run(command, self.wall_s - used_s, on_output)
+            outcome = self._run(command, self.wall_s - total.duration_s, on_output)
             outcome = replace(outcome, output=build_log.own_lines(outcome.output))
-            total = _together(total, outcome) if total else outcome
+            total = Outcome(
+                # It succeeded if all did.
+                status=total.status or outcome.status,
+                ended_by_us=outcome.ended_by_us,
+                output=total.output + outcome.output,
+                duration_s=total.duration_s + outcome.duration_s,
+            )
             # Where setup.py raises before anything is built, colcon's executor stops with the
             # exception, whatever --continue-on-error says; the others are still to be built.
             stopped = not outcome.ended_by_us and STOPPED in outcome.output
@@ -124,16 +129,8 @@ class Colcon:
         """Compile what the build installed, so that nodes start without doing it."""
         folders = [str(path) for path in site_packages(self.install)]
         if folders:
-            command = [
-                str(self.setting.ros.python),
-                "-I",
-                "-S",
-                "-m",
-                "compileall",
-                "-qq",
-                *folders,
-            ]
-            self._run(command, COMPILE_S)
+            options = ["-I", "-S", "-m", "compileall", "-qq"]
+            self._run([str(self.setting.ros.python), *options, *folders], COMPILE_S)
 
     @cached_property
     def environment(self) -> dict[str, str]:
@@ -143,18 +140,14 @@ class Colcon:
             folder = self.scratch / name.lower()
             folder.mkdir()
             environment[name] = str(folder)
-        # Messages of CMake and the compiler are searched for whom to blame.
+        # Messages of CMake and the compiler are searched for the place of an error.
         environment["LC_ALL"] = "C.UTF-8"
         return environment
 
     def _command(self) -> list[str]:
         folders = [str(self.root / folder) for folder in self.folders]
-        command = [
-            *_colcon(self.setting.ros, self.environment["PATH"]),
-            "--log-base",
-            os.devnull,
-            "build",
-        ]
+        command = _colcon(self.setting.ros, self.environment["PATH"])
+        command += ["--log-base", os.devnull, "build"]
         command += ["--merge-install", "--continue-on-error", "--executor", "sequential"]
         command += ["--build-base", str(self.scratch / "build")]
         command += ["--install-base", str(self.install)]
@@ -173,10 +166,7 @@ class Colcon:
 
     @cached_property
     def _include(self) -> Path:
-        """Copied where a sandbox shows it, too, and only before anything of the student's ran.
-
-        Afterwards there might be a link in its place.
-        """
+        """Copied before anything of the student's ran, which could put a link in its place."""
         return Path(shutil.copy(_CMAKE_INCLUDE, self.scratch))
 
     def _run(
@@ -217,16 +207,6 @@ class Colcon:
         if not deep or outcome.ended_by_us:
             return outcome
         return replace(outcome, ended_by_us=f"it made more than {MOST_DEEP} folders in one another")
-
-
-def _together(first: Outcome, second: Outcome) -> Outcome:
-    """One outcome of two commands: it succeeded if both did."""
-    return Outcome(
-        status=first.status or second.status,
-        ended_by_us=second.ended_by_us,
-        output=first.output + second.output,
-        duration_s=first.duration_s + second.duration_s,
-    )
 
 
 def _colcon(ros: RosInstallation, path: str) -> list[str]:
