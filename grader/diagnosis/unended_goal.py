@@ -107,10 +107,11 @@ def executor_busy_with_the_goal(symptom: NotCanceled) -> Cause | None:
 @explanation(NotCanceled, general=True)
 def request_ignored(symptom: NotCanceled) -> Cause:
     """The loop of the execute callback never looks whether the goal is to be canceled."""
-    never = None
-    if symptom.goal.result_ns is None:
-        asked_ns = symptom.goal.canceled_ns or 0
-        never = why_no_end(symptom.recording, symptom.seen, asked_ns, symptom.within_s)
+    if symptom.goal.result_ns is not None:
+        seen = f"{symptom.seen}, although the server agreed to cancel"
+        return Cause(seen, _LOOK, symptom.evidence)
+    asked_ns = symptom.goal.canceled_ns or 0
+    never = why_no_end(symptom.recording, symptom.seen, asked_ns, symptom.within_s)
     seen = f"{symptom.seen}: the execute callback goes on"
     return never or Cause(seen, _LOOK, symptom.evidence)
 

@@ -104,7 +104,7 @@ def test_a_right_action_passes(check, run, parameters, observed):
             "cancels",
             acting(canceled(status="succeeded", end_s=0.9)),
             FIB,
-            "succeeded instead of being canceled: the execute callback goes on",
+            "instead of being canceled, although the server agreed to cancel",
         ),
         ("cancels", acting(canceled(end_s=None)), FIB, "the execute callback goes on"),
         ("cancels", acting(canceled(end_s=2.21)), FIB, "was not canceled for 2 s"),
