@@ -239,7 +239,7 @@ def process_crashed(symptom: NoEndpoint) -> Cause | None:
 def never_appeared(symptom: NoEndpoint) -> Cause | None:
     """The process created it, but it never appeared in the ROS graph."""
     noun, name = symptom.word.noun, symptom.name
-    if not declarations.declares(symptom.recording, noun, "topic", name):
+    if not declarations.declares(symptom.recording, noun, topic=name):
         return None
     return why_never_appeared(symptom.recording, f"a {noun} on {code(name)}")
 

@@ -119,7 +119,7 @@ def no_answer(symptom: NoMessages) -> Cause | None:
 def no_timer(symptom: NoMessages) -> Cause | None:
     """No timer was created, so nothing calls the callback that publishes."""
     recording = symptom.recording
-    traced, timer = declarations.traced(recording), declarations.said(recording, "timer")
+    traced, timer = declarations.traced(recording), declarations.declares(recording, "timer")
     if not traced or timer or _heard(recording, symptom.topic):
         return None
     return Cause(
@@ -138,9 +138,9 @@ def publish_not_reached(symptom: NoMessages) -> Cause:
     heard = _heard(recording, symptom.topic)
     periods = [format_duration(timer.period_s) for timer in _firing(recording)]
     although = ""
-    if heard and not declarations.said(recording, "timer"):
+    if heard and not declarations.declares(recording, "timer"):
         although = f", although {heard} reached the node"
-    elif periods and declarations.said(recording, "spin"):
+    elif periods and declarations.declares(recording, "spin"):
         although = f", although the process declared a timer of {listing(periods)}"
     return Cause(
         _idle(symptom) + although,
